@@ -168,7 +168,7 @@ def compare(ops: Any, name: str, build: Any, drive: Any, section: Any, tolerance
 def _opensees(ops: Any, path: Any, drive: Any, count: int, section: tuple[float, float, float]) -> Any:
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 3)
-    network, tags = path.net, {}
+    network, tags = path.network, {}
     for tag, (name, node) in enumerate(network.nodes.items(), 1):
         tags[name] = tag
         ops.node(tag, 1e3 * node.x, 1e3 * node.y)

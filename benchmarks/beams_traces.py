@@ -94,7 +94,7 @@ def main() -> None:
             path = trace(build(), drive, replace(control, tolerance=options.tolerance))
             assert len(path.effort)
             times.append(time.process_time() - start)
-        mesh = f"degree {path.network.degree}, {len(path.network.elements.length)} elements"
+        mesh = f"degree {path.mesh.degree}, {len(path.mesh.elements.length)} elements"
         print(f"{name:38s} {1e3 * min(times):9.2f} ms  {path.error:.0e} {mesh} {path.status.name}", flush=True)
 
 

@@ -95,7 +95,7 @@ def _opensees(ops: Any, path: Path, drive: Displacement, count: int, masses: Any
     """Return the frequencies of a peer, "held" and "free", at the last of the drive's points [Hz]."""
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 3)
-    network, tags = path.net, {}
+    network, tags = path.network, {}
     for tag, (name, node) in enumerate(network.nodes.items(), 1):
         tags[name] = tag
         ops.node(tag, 1e3 * node.x, 1e3 * node.y)

@@ -33,7 +33,7 @@ class Slow(Exception):
 def observe(path: Any) -> dict[str, Any]:
     """Return what is compared of a path."""
     at = pick(path)
-    names = [name for name in path.net.nodes if not path.net.moved(name)] if len(at) else []
+    names = [name for name in path.network.nodes if not path.network.moved(name)] if len(at) else []
     return {
         "status": path.status.name,
         "points": len(path.at_requested),
@@ -62,7 +62,7 @@ def judge(case: Any, seconds: int, tolerance: float) -> tuple[str, str]:
         signal.alarm(0)
     spent = f"{time.process_time() - begun:.1f} s"
     expected = {**case["expected"], "stress": {}, "frequencies": []}
-    length = path.network.scales.length
+    length = path.mesh.scales.length
     seen = observe(path)
     for level in LEVELS:
         wrong = differences(seen, expected, level, length)

@@ -27,9 +27,7 @@ class LimitRows:
 
     name: str  # the limit
     values: FloatArray  # (m,) by how much it holds
-    slopes: FloatArray | None = (
-        None  # (m, k) derivatives by the first k variables, if requested; others: zero
-    )
+    slopes: FloatArray | None = None  # (m, k) derivatives by the first k variables, if requested; others: zero
     about: Callable[[], list[str]] = list  # what each row is about; nothing: no report speaks of these rows
 
 

@@ -54,7 +54,7 @@ class Gradient:
     @cached_property
     def at(self) -> Equilibria:
         """The equilibria at the points."""
-        return Equilibria(self.path.network, self.path.at.z[self.points], self.path.at.drive[self.points])
+        return Equilibria(self.path.mesh, self.path.at.z[self.points], self.path.at.drive[self.points])
 
     @cached_property
     def unknowns(self) -> FloatArray:
@@ -86,7 +86,7 @@ class Gradient:
     @cached_property
     def effort(self) -> FloatArray:
         """Derivatives of `EquilibriumPath.effort`, (p, k)."""
-        if isinstance(self.path.given, Loading):
+        if isinstance(self.path.load_case, Loading):
             each = zip(self.designs.networks, self.stepped, strict=True)
             columns = [load_displacement(at, drive) for (_, drive), at in each if isinstance(drive, Loading)]
             return read_only(np.imag(np.stack(columns, axis=-1)) / COMPLEX_STEP)
@@ -98,7 +98,7 @@ class Gradient:
     @cached_property
     def _rates(self) -> FloatArray:
         """Slopes of the free unknowns along the path at the points, (p, free)."""
-        solutions = equations(self.path.network).solve_each(self.path.free[self.points], self.at.drive)
+        solutions = equations(self.path.mesh).solve_each(self.path.free[self.points], self.at.drive)
         if not (solutions.converged.all() and np.isfinite(solutions.rate).all()):
             raise InputError(SINGULAR)
         return solutions.rate
@@ -117,7 +117,7 @@ class Gradient:
         """Return the derivatives of `EquilibriumPath.end_force`, (p, 3, k)."""
 
         def output(net: Network, at: Equilibria) -> Any:
-            element = beam_states.elements_of(at.network, beam)[-1 if end else 0]
+            element = beam_states.elements_of(at.mesh, beam)[-1 if end else 0]
             found = beam_states.states_of_elements(net, at, [element], np.array([float(end)]))
             return np.stack([found.h[:, 0], found.v[:, 0], found.moment[:, 0]], axis=-1)
 
@@ -126,7 +126,7 @@ class Gradient:
     @cached_property
     def energy(self) -> FloatArray:
         """Derivatives of `EquilibriumPath.energy`, (p, k)."""
-        moment = self.path.network.scales.moment
+        moment = self.path.mesh.scales.moment
         return self.of(lambda _, at: strain_energy(at) * moment)
 
     def shape(self, beam: str) -> FloatArray:
@@ -136,12 +136,12 @@ class Gradient:
 
     def states(self, beam: str, fractions: Any = None) -> beam_states.BeamStates:
         """Return the derivatives of states at fractions of every element of a beam; arrays (p, n, k)."""
-        elements = beam_states.elements_of(self.path.network, beam)
+        elements = beam_states.elements_of(self.path.mesh, beam)
         return beam_states.BeamStates(*map(self._slopes, self.dual_states(elements, fractions)))
 
     def sections(self, beam: str, fractions: Any = None) -> beam_states.BeamSections:
         """Return the derivatives of section forces and stresses at fractions of every element; arrays (p, n, k)."""
-        elements = beam_states.elements_of(self.path.network, beam)
+        elements = beam_states.elements_of(self.path.mesh, beam)
         return beam_states.BeamSections(*map(self._slopes, self.dual_sections(elements, fractions)))
 
     def dual_states(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamStates:
@@ -156,9 +156,9 @@ class Gradient:
     def dual_sections(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamSections:
         """Return section forces and stresses with their derivatives, as of `dual_states`."""
         states = self.dual_states(elements, fractions)
-        names = [self.path.network.elements.beam[element] for element in elements]
+        names = [self.path.mesh.elements.beam[element] for element in elements]
         each = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])
-        own = np.array([self.path.net.beams[name].section.width for name in names])
+        own = np.array([self.path.network.beams[name].section.width for name in names])
         count = len(states.place) // len(names)
         width = DualArray(np.repeat(own, count), np.repeat(np.imag(each) / COMPLEX_STEP, count, axis=1))
         return beam_states.sections_of_width(width, states)
@@ -200,14 +200,14 @@ class _Lookup(Mapping[str, Any]):
         return self.output(node)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.gradient.path.net.nodes)
+        return iter(self.gradient.path.network.nodes)
 
     def __len__(self) -> int:
-        return len(self.gradient.path.net.nodes)
+        return len(self.gradient.path.network.nodes)
 
 
 def _residual(at: Equilibria) -> Any:
-    return np.array([energy.gradient(at.network, z, drive) for z, drive in zip(at.z, at.drive, strict=True)])
+    return np.array([energy.gradient(at.mesh, z, drive) for z, drive in zip(at.z, at.drive, strict=True)])
 
 
 def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any, points: Any = None) -> Gradient:
@@ -237,15 +237,15 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
         moved = x.astype(complex)
         moved[k] += 1j * COMPLEX_STEP
         built = build(moved)
-        pairs.append(built if isinstance(built, tuple) else (built, path.given))
-    own = make_up(path.net)
+        pairs.append(built if isinstance(built, tuple) else (built, path.load_case))
+    own = make_up(path.network)
     for k, (network, _) in enumerate(pairs):
         if make_up(network) != own:
             raise InputError(
                 f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
             )
     designs = set_up(
-        path.network, (path.net, path.given), pairs, partial(discretise_alike, path.network, cuts=path.network.cuts)
+        path.mesh, (path.network, path.load_case), pairs, partial(discretise_alike, path.mesh, cuts=path.mesh.cuts)
     )
     chosen = np.asarray(path.at_requested if points is None else points, dtype=np.int64)
     return Gradient(path, read_only(chosen, np.int64), designs)

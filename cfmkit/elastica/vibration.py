@@ -132,14 +132,14 @@ def frequencies(
     """
     _check(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
-    fine = raise_degree(path.network, _degree(path.network, count))
+    fine = raise_degree(path.mesh, _degree(path.mesh, count))
     system = _VibratingNetwork(path, fine, masses)
-    by_load = isinstance(path.given, Loading)
+    by_load = isinstance(path.load_case, Loading)
     held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
     grows = np.zeros((2, len(chosen)), dtype=bool)
     unit = np.sqrt(fine.scales.force / fine.scales.length) / (2 * np.pi)
     for k, point in enumerate(chosen.tolist()):
-        z = embed(path.network, fine, path.at.z[point])
+        z = embed(path.mesh, fine, path.at.z[point])
         matrices = system.at(z, float(path.at.drive[point]))
         row = system.row_of(z, *hold) if hold is not None and by_load else None
         (squares, *still), (others, *loose) = (
@@ -154,13 +154,13 @@ def frequencies(
 def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     if count < 1:
         raise InputError(f"at least one frequency must be requested, got {count}")
-    if missing := [name for name in path.net.beams if name not in masses.density]:
+    if missing := [name for name in path.network.beams if name not in masses.density]:
         raise InputError(f"no density is given for the beams {', '.join(missing)}")
     for name in masses.nodes:
-        if name not in path.net.nodes:
+        if name not in path.network.nodes:
             raise InputError(f"a mass is given for {name!r}, which is not a node")
-    elements, degree = len(path.network.elements.length), _degree(path.network, count)
-    size = path.network.size + elements * (degree - path.network.degree + 4 * _order(path.network, degree))
+    elements, degree = len(path.mesh.elements.length), _degree(path.mesh, count)
+    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _order(path.mesh, degree))
     if size > MAX_UNKNOWNS:
         raise InputError(
             f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
@@ -168,19 +168,19 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
         )
 
 
-def _degree(network: Discretisation, count: int) -> int:
+def _degree(mesh: Discretisation, count: int) -> int:
     """Return the degree of the rotations: modes of a beam are spread over its elements."""
-    wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(network))
-    return max(network.degree, min(MAX_DEGREE, max(wanted, network.degree + DEGREES_BESIDE_STATICS)))
+    wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(mesh))
+    return max(mesh.degree, min(MAX_DEGREE, max(wanted, mesh.degree + DEGREES_BESIDE_STATICS)))
 
 
-def _order(network: Discretisation, degree: int) -> int:
+def _order(mesh: Discretisation, degree: int) -> int:
     """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
-    return degree - 1 if _elements_a_beam(network) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
+    return degree - 1 if _elements_a_beam(mesh) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
 
 
-def _elements_a_beam(network: Discretisation) -> float:
-    return len(network.elements.beam) / len(set(network.elements.beam))
+def _elements_a_beam(mesh: Discretisation) -> float:
+    return len(mesh.elements.beam) / len(set(mesh.elements.beam))
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class _VibratingNetwork:
     """Stiffness and mass about one pose after another."""
 
     def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
-        self.net, self.fine, self.masses = path.net, fine, masses
+        self.net, self.fine, self.masses = path.network, fine, masses
         self.order = _order(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule

@@ -114,12 +114,12 @@ class SolvedBeams:
     def axes(self) -> Mapping[str, FloatArray]:
         """Centre lines before any load, (k, 2) each [m]."""
         path = self.path
-        return {name: path.shape(name, 0) - path.line_motion(name)[0] for name in path.net.beams}
+        return {name: path.shape(name, 0) - path.line_motion(name)[0] for name in path.network.beams}
 
     @cached_property
     def sections(self) -> Mapping[str, Sections]:
         """Stresses at the places of the centre lines, at all points."""
-        return {name: self.path.sections(name) for name in self.path.net.beams}
+        return {name: self.path.sections(name) for name in self.path.network.beams}
 
     @cached_property
     def largest(self) -> FloatArray:
@@ -136,7 +136,7 @@ class SolvedBeams:
             return float("nan")
         stresses = [
             stress
-            for name, beam in self.path.net.beams.items()
+            for name, beam in self.path.network.beams.items()
             for place in edge
             if (stress := self._on_edge(name, beam, place, point)) is not None
         ]

@@ -16,15 +16,15 @@ from cfmkit.elastica.results.path import N_PLACES
 def parameters(path: Path, beam: str) -> np.ndarray:
     """Return the parameters of a beam's shape at its sampled places: evenly spaced on each element."""
     share = np.linspace(0.0, 1.0, N_PLACES)
-    cuts = path.network.elements.cuts[elements_of(path.network, beam)]
+    cuts = path.mesh.elements.cuts[elements_of(path.mesh, beam)]
     return np.concatenate([left + (right - left) * share for left, right in cuts])
 
 
 def mean_motion(path: Path, beam: str) -> np.ndarray:
     """Return the integral of the displacements along a beam at every point, (n, 2) [m^2]."""
-    places, own = basis(path.network.degree).places, elements_of(path.network, beam)
-    weights = path.network.elements.weight[own].ravel() * path.network.scales.length
-    now, rest = states(path.net, path.at, beam, places), unloaded(path.net, path.at, beam, places)
+    places, own = basis(path.mesh.degree).places, elements_of(path.mesh, beam)
+    weights = path.mesh.elements.weight[own].ravel() * path.mesh.scales.length
+    now, rest = states(path.network, path.at, beam, places), unloaded(path.network, path.at, beam, places)
     return np.stack([(now.x - rest[:, 0]) @ weights, (now.y - rest[:, 1]) @ weights], axis=1)
 
 
@@ -32,10 +32,10 @@ class Judge:
     """What is out of balance at one point of a path, from its answers alone."""
 
     def __init__(self, path: Path, point: int) -> None:
-        self.path, self.point, self.network = path, point, path.net
+        self.path, self.point, self.network = path, point, path.network
         self.beams = list(self.network.beams)
         self.moved = {name: path.motion(name)[point] for name in self.network.nodes}
-        drive = path.given
+        drive = path.load_case
         self.loads: list[tuple[Any, float]] = [(load, 1.0) for load in self.network.loads]
         if isinstance(drive, Loading):
             self.loads += [(load, float(path.drive[point])) for load in drive.loads]

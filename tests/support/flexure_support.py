@@ -44,7 +44,7 @@ def corners(unloaded: float = UNLOADED, before: Sequence[float] = (0.5, 0.5, 0.5
 def knee(path: Path, index: int, unloaded: float) -> np.ndarray:
     """Return where the crank pin, or the middle of a strip, is."""
     pins = joints(LINKAGE, unloaded)
-    if STRIP not in path.net.beams:
+    if STRIP not in path.network.beams:
         return pins[1] + path.motion("crank end")[index, :2]
     shape = path.shape(STRIP, index)
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(shape, axis=0).T))])

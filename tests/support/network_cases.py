@@ -83,7 +83,7 @@ def observe(path: elastica.Path) -> dict[str, Any]:
     those at the last picked point, the drive held, if the path is stable there and no load follows.
     """
     at = pick(path)
-    network = path.net
+    network = path.network
     seen: dict[str, Any] = {
         "status": path.status.name,
         "points": len(path.at_requested),
@@ -101,7 +101,7 @@ def observe(path: elastica.Path) -> dict[str, Any]:
             seen["reaction"][name] = path.reaction(name)[at].tolist()
     for name in network.beams:
         seen["stress"][name] = path.beam_stress(name)[0][at].tolist()
-    loads = (*network.loads, *path.given.loads)
+    loads = (*network.loads, *path.load_case.loads)
     if path.unstable[at[-1]] == 0 and not any(getattr(load, "follows", False) for load in loads):
         masses = NetworkMasses(dict.fromkeys(network.beams, DENSITY))
         held = frequencies(path, masses, N_FREQUENCIES, [int(at[-1])]).held[0]

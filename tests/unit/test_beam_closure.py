@@ -11,7 +11,7 @@ def test_the_closure_chain_says_which_nodes_it_moved_and_how_far():
     result = solved("beam_lan2010", "mechanism.closure=chain", "analysis.points=19")
     reported = next(item.message for item in result.warnings if "nodes were moved" in item.message)
     assert reported.startswith("nodes were moved to where the beams end: n3 by ")
-    network = result.state.path.net
+    network = result.state.path.network
     for part in reported.split(": ")[1].split(", "):
         name, _, size, unit = part.split(" ")
         node, given = network.nodes[name], result.spec.mechanism.nodes[name].at

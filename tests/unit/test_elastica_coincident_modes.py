@@ -47,7 +47,7 @@ def alone(count: int = 15, factor: float = 1.0, thickness: float = 7e-4, angle: 
 def moments(path: Path, point: int) -> Any:
     """Return the moments at the shuttle."""
     at = path.at_requested[point]
-    return np.array([path.end_force(name, 1)[at, 2] for name in path.net.beams])
+    return np.array([path.end_force(name, 1)[at, 2] for name in path.network.beams])
 
 
 def changes(path: Path) -> list[tuple[str, int, int]]:

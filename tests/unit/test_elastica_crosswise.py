@@ -94,7 +94,7 @@ def eighty_beams() -> Path:
 
 def test_matrices_of_large_networks_are_not_all_held_at_once() -> None:
     path, poses = eighty_beams(), 30
-    size = 8 * len(path.network.free) ** 2
+    size = 8 * len(path.mesh.free) ** 2
     cross_stiffness(path, "n80", 0.0)
     tracemalloc.start()
     try:

@@ -52,8 +52,8 @@ def test_a_straight_curve_is_a_linear_spring() -> None:
     linear = functional_path(leaf(SlideSpring("tip", 0.3, 80.0), arm=True), load, 10)
     curved = functional_path(leaf(straight, arm=True), load, 10)
     assert curved.motion("tip") == pytest.approx(linear.motion("tip"), rel=1e-9, abs=1e-13)
-    assert isinstance(equations(linear.network), NumpyEquations)
-    assert type(equations(curved.network)) is NumpyEquations
+    assert isinstance(equations(linear.mesh), NumpyEquations)
+    assert type(equations(curved.mesh)) is NumpyEquations
 
 
 def test_gradient_and_hessian_are_the_derivatives_of_the_energy() -> None:

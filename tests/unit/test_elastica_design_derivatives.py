@@ -63,7 +63,7 @@ def test_effort_slopes_are_those_of_the_gradient_of_a_trace(build: Any, x: Any) 
     net, drive = build(x)
     known = gradient(trace(net, drive, FINE), build, x).effort
     at, rates = equilibria(net, drive)
-    found = effort_slopes(at, stepped(at.network, build, x), rates)
+    found = effort_slopes(at, stepped(at.mesh, build, x), rates)
     size = np.abs(known * x).max()
     np.testing.assert_allclose(found * x, known * x, rtol=2e-6, atol=1e-7 * size)
 
@@ -72,12 +72,12 @@ def test_unknowns_have_the_slopes_of_differences() -> None:
     net, drive = arms_pushed(CASES[1][1])
     x = np.array(CASES[1][1])
     at, _ = equilibria(net, drive, 10)
-    exact = unknown_slopes(at, stepped(at.network, arms_pushed, x))
+    exact = unknown_slopes(at, stepped(at.mesh, arms_pushed, x))
     for k in range(len(x)):
         h = 1e-4 * x[k]
         sides = [equilibria(*arms_pushed(x + step * h * np.eye(len(x))[k]), 10)[0] for step in (-1, 1)]
-        scales = [side.network.scales.length / at.network.scales.length for side in sides]
-        node = at.network.bodies["b"]
+        scales = [side.mesh.scales.length / at.mesh.scales.length for side in sides]
+        node = at.mesh.bodies["b"]
         moved = [side.z[:, node] * np.array([scale, scale, 1.0]) for side, scale in zip(sides, scales, strict=True)]
         slope = (moved[1] - moved[0]) / (2 * h)
         np.testing.assert_allclose(exact[:, k, node], slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
@@ -129,7 +129,7 @@ def test_the_tangent_of_the_path_is_the_adjoint() -> None:
     """With slopes of the path, and with one solution a point, the same derivatives."""
     net, drive = lan_pushed(LAN)
     at, rates = equilibria(net, drive, 8)
-    designs = stepped(at.network, lan_pushed, LAN)
+    designs = stepped(at.mesh, lan_pushed, LAN)
     np.testing.assert_allclose(effort_slopes(at, designs, rates), effort_slopes(at, designs), rtol=1e-7)
 
 
@@ -137,15 +137,15 @@ def test_the_effort_s_slope_by_an_array_is_a_difference_of_the_functional() -> N
     """At a state that is no equilibrium the derivative by a table is that of the gradient along the motion."""
     net, drive = lan_pushed(LAN)
     at, rates = equilibria(net, drive, 6)
-    designs = stepped(at.network, lan_pushed, LAN)
+    designs = stepped(at.mesh, lan_pushed, LAN)
     one = design_of(designs, 3)
-    motions = np.tile(at.network.rate, (len(at.z), 1))
-    motions[:, at.network.free] = rates
+    motions = np.tile(at.mesh.rate, (len(at.z), 1))
+    motions[:, at.mesh.free] = rates
     direct = [
         (energy.gradient(one, z, drive).imag / COMPLEX_STEP) @ w
         for z, drive, w in zip(at.z, at.drive, motions, strict=True)
     ]
-    unit = at.network.scales.moment / at.network.scales.drive
+    unit = at.mesh.scales.moment / at.mesh.scales.drive
     np.testing.assert_allclose(effort_slopes(at, designs, rates)[:, 3], np.array(direct) * unit, rtol=1e-10)
 
 
@@ -168,11 +168,11 @@ def test_slopes_of_other_outputs_are_those_of_the_gradient_of_a_trace(build: Any
 
     outputs = {
         "motion": lambda _, states: node_motion(states, node),
-        "energy": lambda _, states: strain_energy(states) * at.network.scales.moment,
+        "energy": lambda _, states: strain_energy(states) * at.mesh.scales.moment,
         "force": end_force,
         "stress": stress,
     }
-    designs = stepped(at.network, build, x)
+    designs = stepped(at.mesh, build, x)
     slopes = unknown_slopes(at, designs)
     moved = [
         Equilibria(design_of(designs, k), at.z + 1j * COMPLEX_STEP * slopes[:, k], at.drive) for k in range(len(x))

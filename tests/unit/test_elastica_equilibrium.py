@@ -43,7 +43,7 @@ def solved(net: Any, drive: Any, points: Any = None) -> Path:
 def test_every_beam_and_every_body_is_in_equilibrium(seed: int, kind: int) -> None:
     net = network(seed)
     path = solved(net, drives(net, seed)[kind])
-    scales = path.network.scales
+    scales = path.mesh.scales
     forces = np.array([scales.force, scales.force, scales.moment])
     judge = Judge(path, int(path.at_requested[-1]))
     largest = max(1.0, *(np.abs(path.end_force(beam, 0)[-1] / forces).max() for beam in net.beams))
@@ -59,7 +59,7 @@ def test_every_beam_and_every_body_is_in_equilibrium(seed: int, kind: int) -> No
 def dead_work(path: Path, point: int) -> float:
     """Return the work of the constant dead loads up to a point, from the first."""
     total = 0.0
-    for load in path.net.loads:
+    for load in path.network.loads:
         if isinstance(load, PointLoad):
             moved = path.motion(load.node)[point] - path.motion(load.node)[0]
             total += float(np.dot([load.fx, load.fy, load.moment], moved))

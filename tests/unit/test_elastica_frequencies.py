@@ -126,15 +126,15 @@ def test_becks_column_flutters_at_its_load() -> None:
 def test_a_network_of_a_higher_degree_is_the_same_network() -> None:
     net = beam_networks.network(5)
     path = functional_path(net, beam_networks.drives(net, 5)[0], 14)
-    fine = raise_degree(path.network, 18)
-    z = embed(path.network, fine, path.at.z)
+    fine = raise_degree(path.mesh, 18)
+    z = embed(path.mesh, fine, path.at.z)
     from cfmkit.elastica.mechanics import energy
 
     for state, drive in zip(z, path.at.drive, strict=True):
         residual = energy.gradient(fine, state, drive)
         assert np.abs(residual[fine.free]).max() < 1e-4 * np.abs(residual).max()
     assert energy.gradient(fine, z[1], path.at.drive[1]) @ fine.rate == pytest.approx(
-        path.residual[1] @ path.network.rate, rel=1e-5
+        path.residual[1] @ path.mesh.rate, rel=1e-5
     )
 
 

@@ -53,7 +53,7 @@ def test_force_is_proportional_to_the_modulus_and_the_gradient_knows() -> None:
 def test_efforts_are_the_same_with_all_unknowns_and_without_them() -> None:
     path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3, 6e-3])), FINE)
     alone, last = gradient(path, lan, LAN), gradient(path, lan, LAN)
-    assert last.unknowns.shape == (2, len(LAN), path.network.size)
+    assert last.unknowns.shape == (2, len(LAN), path.mesh.size)
     np.testing.assert_allclose(alone.effort, last.effort, rtol=1e-9)
 
 

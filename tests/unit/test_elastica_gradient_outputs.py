@@ -30,11 +30,11 @@ def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
     """Everything that can be requested at the requested points."""
     keep = path.at_requested[at]
     found = {"effort": path.effort[keep], "energy": path.energy[keep]}
-    for node in path.net.nodes:
+    for node in path.network.nodes:
         found[f"motion {node}"] = path.motion(node)[keep]
-    for node in path.network.bodies:
+    for node in path.mesh.bodies:
         found[f"reaction {node}"] = path.reaction(node)[keep]
-    for beam in path.net.beams:
+    for beam in path.network.beams:
         found[f"start force {beam}"] = path.end_force(beam, 0)[keep]
         found[f"end force {beam}"] = path.end_force(beam, 1)[keep]
         found[f"shape {beam}"] = np.array([path.shape(beam, int(k)) for k in keep])
@@ -51,11 +51,11 @@ def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
 def slopes(g: Any) -> dict[str, Any]:
     """The derivatives of the same."""
     found = {"effort": g.effort, "energy": g.energy}
-    for node in g.path.net.nodes:
+    for node in g.path.network.nodes:
         found[f"motion {node}"] = g.motion[node]
-    for node in g.path.network.bodies:
+    for node in g.path.mesh.bodies:
         found[f"reaction {node}"] = g.reaction[node]
-    for beam in g.path.net.beams:
+    for beam in g.path.network.beams:
         found[f"start force {beam}"] = g.end_force(beam, 0)
         found[f"end force {beam}"] = g.end_force(beam, 1)
         found[f"shape {beam}"] = g.shape(beam)

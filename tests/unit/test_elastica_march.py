@@ -220,7 +220,7 @@ def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
     net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})
     own = kind(discretise(net, Loading((PointLoad("b", fy=1.0),), np.array([1.0])), 8))
     border = np.zeros(own.n + 1)
-    border[np.flatnonzero(own.network.free == own.network.bodies["b"][2])] = 1.0
+    border[np.flatnonzero(own.mesh.free == own.mesh.bodies["b"][2])] = 1.0
     state = own.solve(np.zeros(own.n), 0.0, border, 0.8)
     assert state.free @ border[:-1] == pytest.approx(0.8, rel=1e-9)
     again = own.solve(state.free, state.way)
@@ -261,7 +261,7 @@ def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
     assert (codes == MarchCode.DONE).all()
     for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
         own = NumpyEquations(discretise(*leaf(thickness, taper), 8))
-        goals = TARGETS / own.network.scales.drive
+        goals = TARGETS / own.mesh.scales.drive
         march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
         assert row == pytest.approx(known, rel=1e-7)

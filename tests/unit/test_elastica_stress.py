@@ -37,7 +37,7 @@ def pressed(shape: object, thickness: object, travel: float, tolerance: float = 
 
 def densely(path: Path, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return places, bending and axial stress at them, by Reissner's equations from the clamped end."""
-    fitted, section = path.fits["x"], path.net.beams["x"].section
+    fitted, section = path.fits["x"], path.network.beams["x"].section
     h, v, m = path.end_force("x", 0)[point]
 
     def forces(t: float, turn: float) -> tuple[float, float, float]:

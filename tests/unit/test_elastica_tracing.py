@@ -60,7 +60,7 @@ def test_paths_on_the_functional_are_those_of_the_file(name: str, monkeypatch: p
     network, drive, control = (from_json(case[part]) for part in ("network", "drive", "control"))
     path: Any = trace(network, drive, replace(control, tolerance=1e-8))
     monkeypatch.setattr(network_cases, "frequencies", frequencies)
-    length = path.network.scales.length
+    length = path.mesh.scales.length
     assert differences(observe(path), case["expected"], LOOSER.get(name, TOLERANCE), length) == []
 
 

@@ -57,7 +57,7 @@ def test_the_frame_stays_clear_of_beams_over_the_travel():
     gaps = [
         LineString(path.shape(name, point)).distance(side) - 0.5e-3
         for point in range(0, len(path), 5)
-        for name in path.net.beams
+        for name in path.network.beams
         for side in sides
     ]
     assert min(gaps) >= 2e-3 - 1e-5

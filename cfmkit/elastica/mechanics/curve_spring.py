@@ -86,12 +86,12 @@ def _energy_at_rest(knots: Any, force: Any, slopes: Any, primitive: Any) -> floa
     return float(primitive(knots[k]) + d * force[k] + d * d * slopes[k] / 2)
 
 
-def curve_spring(network: Discretisation, spring: Attached, z: Any, _share: Any, _drive: Any) -> Contribution:
+def curve_spring(mesh: Discretisation, spring: Attached, z: Any, _share: Any, _drive: Any) -> Contribution:
     """Return the term of a spring with a curve of forces."""
-    item, scales = spring.item, network.scales
-    at = poses(network.attachments, z, list(spring.places))
+    item, scales = spring.item, mesh.scales
+    at = poses(mesh.attachments, z, list(spring.places))
     along = np.array([np.cos(item.direction), np.sin(item.direction)])
-    rest = network.attachments.origin[spring.places[0]] + network.attachments.arm[spring.places[0]]
+    rest = mesh.attachments.origin[spring.places[0]] + mesh.attachments.arm[spring.places[0]]
     energy, force, stiffness = item.evaluate((at.place[0] - rest) @ along * scales.length)
     return along_direction(
         at, along, energy / scales.moment, force / scales.force, stiffness * scales.length / scales.force

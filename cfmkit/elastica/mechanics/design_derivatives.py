@@ -45,29 +45,29 @@ MAX_TOGETHER = 300_000  # numbers of a table of all designs at some points: 5 MB
 class Equilibria:
     """Points of a path: all unknowns (p, size) and the drive (p,), dimensionless; what is constant is all there."""
 
-    network: Discretisation
+    mesh: Discretisation
     z: FloatArray
     drive: FloatArray
 
     @cached_property
     def residual(self) -> FloatArray:
         """Gradient of the functional by all unknowns at every point, (p, size): zero at free ones."""
-        return read_only(equations(self.network).gradients(self.z, self.drive))
+        return read_only(equations(self.mesh).gradients(self.z, self.drive))
 
 
-def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
+def partials(mesh: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
     """Return the derivatives of the functional by the arrays of the elements, (p, ...) each.
 
     By name those of `Elements`, and `origin`, `arm` and `frame` of the attachments that elements end at.
     """
-    e, at = network.elements, energy.fields(network, z, drive)
-    load = energy.line_load(network, drive)
+    e, at = mesh.elements, energy.fields(mesh, z, drive)
+    load = energy.line_load(mesh, drive)
     last = z[..., e.unknowns[:, -2:]]
     first = last + load * e.length[:, None]
     w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
     bent = bending(e, at.curvature)
     density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
-    start = poses(network.attachments, z, e.ends[:, 0])
+    start = poses(mesh.attachments, z, e.ends[:, 0])
     found = {
         "weight": density,
         "rigidity": w * bent.energy / e.rigidity,
@@ -85,12 +85,12 @@ def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
     grows = np.asarray(drive)[..., None, None]
     found["line"] = np.stack([constant + 0 * grows, constant * grows], axis=-2)
     found["gap"] = np.zeros_like(last)
-    return found | _by_attachments(network, z, first, last)
+    return found | _by_attachments(mesh, z, first, last)
 
 
-def _by_attachments(network: Discretisation, z: Any, first: Any, last: Any) -> dict[str, Any]:
+def _by_attachments(mesh: Discretisation, z: Any, first: Any, last: Any) -> dict[str, Any]:
     """Return the derivatives by origin, arm and frame, from the forces on both ends of every element."""
-    a, ends = network.attachments, network.elements.ends
+    a, ends = mesh.attachments, mesh.elements.ends
     force = np.zeros((*z.shape[:-1], *a.arm.shape), np.result_type(z, first, last))
     by_place = np.moveaxis(force, -2, 0)  # a view
     np.add.at(by_place, ends[:, 0], np.moveaxis(-first, -2, 0))
@@ -111,7 +111,7 @@ def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArra
     rates : (p, n) array, optional
         Slopes of the free unknowns along the path: they are w unless loads grow with the drive, or follow.
     """
-    network = at.network
+    network = at.mesh
     loads = [load for load in network.loads if load.grows or load.item.follows]
     found = np.tile(network.rate, (len(at.z), 1))
     if rates is not None and not loads and not network.elements.line[:, 1].any():
@@ -137,7 +137,7 @@ def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | N
     rates : (p, n) array, optional
         Slopes of the free unknowns along the path, if they are known.
     """
-    network, motions = at.network, effort_motions(at, rates)
+    network, motions = at.mesh, effort_motions(at, rates)
     stepped = at.z + 1j * COMPLEX_STEP * motions
     known = {name: value.imag / COMPLEX_STEP for name, value in partials(network, stepped, at.drive).items()}
     total = _contracted(known, designs)
@@ -198,7 +198,7 @@ def _term_slopes(own: tuple[Discretisation, Attached], at: Equilibria, motions: 
 
 def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
     """Return the derivatives of the effort by the values of held unknowns, (p, size); zero at free ones."""
-    network, found = at.network, np.zeros(at.z.shape)
+    network, found = at.mesh, np.zeros(at.z.shape)
     held = np.setdiff1d(np.arange(network.size), network.free)
     for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
         tangent = energy.hessian(network, z, drive)
@@ -214,7 +214,7 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     numpy.linalg.LinAlgError
         If a tangent is singular.
     """
-    network, chosen = at.network, at.network.free
+    network, chosen = at.mesh, at.mesh.free
     own, forces = equations(network), _force_slopes(at, designs)
     found = np.zeros((len(at.z), designs.count, network.size))
     if designs.base is not None:
@@ -231,7 +231,7 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
 
     Held ones move with their support, to which every spring and load at them answers.
     """
-    network, unknowns = at.network, at.network.elements.unknowns
+    network, unknowns = at.mesh, at.mesh.elements.unknowns
     moved: Any = at.z
     stepped, held = dual_arrays(designs), None
     if designs.base is not None:
@@ -273,7 +273,7 @@ def _dual(owner: Any, stepped: dict[str, Any]) -> dict[str, Any]:
 
 def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
     """Return the springs and loads of each design that have a complex step, or all where held unknowns have one."""
-    if designs.base is None or not (at.network.springs or at.network.loads):
+    if designs.base is None or not (at.mesh.springs or at.mesh.loads):
         return _changed_terms(designs)
     each = (design_of(designs, d) for d in range(designs.count))
     return [[(one, attached) for attached in (*one.springs, *one.loads)] for one in each]

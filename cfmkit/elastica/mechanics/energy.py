@@ -40,12 +40,12 @@ class Fields(NamedTuple):
     slope_y: Any
 
 
-def fields(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
+def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
     """Return rotations and section forces at the Gauss points, of one state (size,) or of several (n, size)."""
-    e, rule = network.elements, basis(network.degree)
+    e, rule = mesh.elements, basis(mesh.degree)
     own = z[..., e.unknowns]
-    rotation = own[..., rotation_columns(network.degree)]
-    force = own[..., None, -2:] + line_load(network, drive, share)[..., None, :] * e.ahead[..., None]
+    rotation = own[..., rotation_columns(mesh.degree)]
+    force = own[..., None, -2:] + line_load(mesh, drive, share)[..., None, :] * e.ahead[..., None]
     turn = e.angle + rotation @ rule.values.T
     cos, sin = cos_sin(turn)
     normal = force[..., 0] * cos + force[..., 1] * sin
@@ -61,70 +61,70 @@ def rotation_columns(degree: int) -> Any:
     return np.r_[3, 7, 8 : degree + 7]
 
 
-def line_load(network: Discretisation, drive: Any, share: Any = 1.0) -> Any:
+def line_load(mesh: Discretisation, drive: Any, share: Any = 1.0) -> Any:
     """Return the line load on the elements, (..., e, 2), at one drive or several (n,)."""
-    line = network.elements.line
+    line = mesh.elements.line
     return share * line[..., 0, :] + np.asarray(drive)[..., None, None] * line[..., 1, :]
 
 
-def gradient(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
+def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
-    own, kind = element_gradients(network, z, drive, share)
-    parts = list(_contributions(network, z, drive, share))
-    total = np.zeros(network.size, np.result_type(kind, *(part.gradient for part in parts)))
-    np.add.at(total, network.elements.unknowns, own)
+    own, kind = element_gradients(mesh, z, drive, share)
+    parts = list(_contributions(mesh, z, drive, share))
+    total = np.zeros(mesh.size, np.result_type(kind, *(part.gradient for part in parts)))
+    np.add.at(total, mesh.elements.unknowns, own)
     for part in parts:
         np.add.at(total, part.unknowns, part.gradient)
     return total
 
 
-def _contributions(network: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
-    for attached in (*network.springs, *network.loads):
-        yield TERMS[type(attached.item)](network, attached, z, share, drive)
+def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
+    for attached in (*mesh.springs, *mesh.loads):
+        yield TERMS[type(attached.item)](mesh, attached, z, share, drive)
 
 
-def _end_poses(network: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
-    return tuple(poses(network.attachments, z, network.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
+def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
+    return tuple(poses(mesh.attachments, z, mesh.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
 
 
-def element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
+def element_gradients(mesh: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
     """Return the gradients of the elements by their unknowns, (..., e, degree + 9), and their type.
 
     Of one state (size,) or of several (n, size).
     """
-    parts = dict(element_forces(network, z, drive, share))
-    e, kind = network.elements, np.result_type(*parts.values())
+    parts = dict(element_forces(mesh, z, drive, share))
+    e, kind = mesh.elements, np.result_type(*parts.values())
     own = np.zeros((*np.broadcast_shapes(*(part.shape[:-1] for part in parts.values())), e.unknowns.shape[1]), kind)
     for columns, part in parts.items():
         own[..., list(columns)] = part
     return own, kind
 
 
-def element_forces(network: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[tuple[tuple[int, ...], Any]]:
+def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[tuple[tuple[int, ...], Any]]:
     """Yield columns of the elements' unknowns (c,), and the gradients of the elements by them, (..., e, c).
 
     The arrays of the network, and the unknowns, may be dual.
     """
-    e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
-    start, end = _end_poses(network, z)
+    e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
+    start, end = _end_poses(mesh, z)
     last = z[..., e.unknowns[:, -2:]]
-    first = last + line_load(network, drive, share) * e.length[..., None]
+    first = last + line_load(mesh, drive, share) * e.length[..., None]
     bend = e.weight * bending(e, at.curvature).moment
     turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
     turned = bend @ rule.slopes - turning @ rule.values
     reach = stack([(e.weight * at.slope_x).sum(axis=-1), (e.weight * at.slope_y).sum(axis=-1)])
     count = e.unknowns.shape[1]
-    yield tuple(rotation_columns(network.degree).tolist()), turned
+    yield tuple(rotation_columns(mesh.degree).tolist()), turned
     yield (0, 1, 2), -start.works(first)
     yield (4, 5, 6), end.works(last)
     yield (count - 2, count - 1), end.place - start.place - reach - (1.0 - share) * e.gap
 
 
-def hessian(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
+def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the Hessian by all unknowns, (size, size): symmetric unless loads follow."""
-    e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
-    start, end = _end_poses(network, z)
-    columns, softer = rotation_columns(network.degree), e.axial - e.shear
+    e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
+    start, end = _end_poses(mesh, z)
+    columns, softer = rotation_columns(mesh.degree), e.axial - e.shear
     f, g = 1 + softer * at.normal, softer * at.shear
     own = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
     bend, turn = e.weight * bending(e, at.curvature).stiffness, e.weight * (at.normal * f - g * at.shear)
@@ -140,34 +140,34 @@ def hessian(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> An
     own[:, -1, -1] = -(e.weight * (e.axial * at.sin**2 + e.shear * at.cos**2)).sum(axis=1)
     own[:, -2, -1] = own[:, -1, -2] = -(e.weight * softer * at.cos * at.sin).sum(axis=1)
     last = z[e.unknowns[:, -2:]]
-    first = last + line_load(network, drive, share) * e.length[:, None]
+    first = last + line_load(mesh, drive, share) * e.length[:, None]
     own[:, 2, 2] += (first * start.arm).sum(axis=1)
     own[:, 6, 6] -= (last * end.arm).sum(axis=1)
-    total = np.zeros((network.size, network.size))
+    total = np.zeros((mesh.size, mesh.size))
     np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), own)
-    for part in _contributions(network, z, drive, share):
+    for part in _contributions(mesh, z, drive, share):
         np.add.at(total, (part.unknowns[:, None], part.unknowns), part.hessian)
     return total
 
 
-def values(network: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
+def values(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return all unknowns from the free ones: held ones are displaced by their share, and by the drive."""
-    z = share * network.base + drive * network.rate
+    z = share * mesh.base + drive * mesh.rate
     z = z.astype(np.result_type(z, free))
-    z[network.free] = free
+    z[mesh.free] = free
     return z
 
 
-def strain_energy(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
+def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the energy of beams and springs."""
-    e, at = network.elements, fields(network, z, drive, share)
+    e, at = mesh.elements, fields(mesh, z, drive, share)
     strain = e.axial * at.normal**2 + e.shear * at.shear**2
     beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
-    springs = (TERMS[type(spring.item)](network, spring, z, share, drive).energy for spring in network.springs)
+    springs = (TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
     return beams.sum() / 2 + sum(springs)
 
 
-def count_unstable(network: Discretisation, tangent: Any) -> int:
+def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     """Return the number of unstable directions at a held drive from the tangent of the free unknowns [Ha].
 
     Without loads that follow: the negative pivots of L D L^T less one for every component of a section force. Those
@@ -176,19 +176,19 @@ def count_unstable(network: Discretisation, tangent: Any) -> int:
     """
     from scipy.linalg import lapack
 
-    if any(load.item.follows for load in network.loads):
-        return int((motion_eigenvalues(network, tangent) < 0).sum())
+    if any(load.item.follows for load in mesh.loads):
+        return int((motion_eigenvalues(mesh, tangent) < 0).sum())
 
     factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
     single = pivots > 0
     negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
-    return negative - 2 * len(network.elements.length)
+    return negative - 2 * len(mesh.elements.length)
 
 
-def motion_eigenvalues(network: Discretisation, tangent: Any) -> Any:
+def motion_eigenvalues(mesh: Discretisation, tangent: Any) -> Any:
     """Return the real eigenvalues of the stiffness of the motions, section forces condensed, ascending."""
-    moves = np.flatnonzero(network.free < network.n_motions)
-    unit = np.zeros((len(network.free), len(moves)))
+    moves = np.flatnonzero(mesh.free < mesh.n_motions)
+    unit = np.zeros((len(mesh.free), len(moves)))
     unit[moves, np.arange(len(moves))] = 1.0
     flexibility = np.linalg.solve(tangent, unit)[moves]
     inverse = np.linalg.eigvals(flexibility)

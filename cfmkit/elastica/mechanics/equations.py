@@ -103,32 +103,32 @@ class NaturalMarch:
 class NumpyEquations:
     """Equations of a network for its free unknowns, along a drive or, with `ramp`, the share of what is constant."""
 
-    network: Discretisation
+    mesh: Discretisation
     ramp: bool = False
     unit: Any = field(init=False)  # (n,) unit of a section force; infinite for motions
 
     def __post_init__(self) -> None:
         """Set the units."""
-        object.__setattr__(self, "unit", force_units(self.network))
+        object.__setattr__(self, "unit", force_units(self.mesh))
 
-    def stiffen(self, network: Discretisation) -> NumpyEquations:
+    def stiffen(self, mesh: Discretisation) -> NumpyEquations:
         """Return the equations of the same network with another flexibility along its beams."""
-        return replace(self, network=network)
+        return replace(self, mesh=mesh)
 
     @property
     def n(self) -> int:
         """Number of free unknowns."""
-        return len(self.network.free)
+        return len(self.mesh.free)
 
     @property
     def effort_unit(self) -> float:
         """Unit of the efforts of a drive by a motion [N or N m]."""
-        return self.network.scales.moment / self.network.scales.drive
+        return self.mesh.scales.moment / self.mesh.scales.drive
 
     @property
     def follows(self) -> bool:
         """True if some load turns with its node: the tangent is unsymmetric."""
-        return any(load.item.follows for load in self.network.loads)
+        return any(load.item.follows for load in self.mesh.loads)
 
     def factors(self, way: Any) -> tuple[Any, Any]:
         """Return drive and share at a place of the way."""
@@ -136,27 +136,27 @@ class NumpyEquations:
 
     def values(self, free: Any, way: Any) -> Any:
         """Return all unknowns, (size,)."""
-        return energy.values(self.network, free, *self.factors(way))
+        return energy.values(self.mesh, free, *self.factors(way))
 
     def gradient(self, free: Any, way: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
         drive, share = self.factors(way)
-        return energy.gradient(self.network, energy.values(self.network, free, drive, share), drive, share)
+        return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
-        return energy.gradient(self.network, z, drive, share), energy.hessian(self.network, z, drive, share)
+        return energy.gradient(self.mesh, z, drive, share), energy.hessian(self.mesh, z, drive, share)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size); what is constant is all there."""
-        each = [energy.gradient(self.network, *pair) for pair in zip(z, drive, strict=True)]
+        each = [energy.gradient(self.mesh, *pair) for pair in zip(z, drive, strict=True)]
         return np.array(each).reshape(z.shape)
 
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         drive, share = self.factors(way)
-        z, chosen = energy.values(self.network, free, drive, share), self.network.free
-        tangent = energy.hessian(self.network, z, drive, share)[np.ix_(chosen, chosen)]
+        z, chosen = energy.values(self.mesh, free, drive, share), self.mesh.free
+        tangent = energy.hessian(self.mesh, z, drive, share)[np.ix_(chosen, chosen)]
         stepped = self.gradient(free, way + 1j * COMPLEX_STEP)[chosen]
         return LinearEquations(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)
 
@@ -169,7 +169,7 @@ class NumpyEquations:
             If the tangent is singular.
         """
         tangent = self.linearise(free, way).tangent
-        return np.asarray(np.linalg.solve(tangent, right.T).T, float), energy.count_unstable(self.network, tangent)
+        return np.asarray(np.linalg.solve(tangent, right.T).T, float), energy.count_unstable(self.mesh, tangent)
 
     def solve(
         self,
@@ -218,12 +218,12 @@ class NumpyEquations:
             old, old_way, free, way = free, way, free + change, way + along
             if quick and largest**2 < tolerance:
                 effort = self._effort(old, old_way) + float(at.change @ step)
-                return MarchState(free, way, rate, energy.count_unstable(self.network, at.tangent), effort)
+                return MarchState(free, way, rate, energy.count_unstable(self.mesh, at.tangent), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
             rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < STANDING and largest < 1e-3)
             stands = rounds and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
-                unstable = energy.count_unstable(self.network, at.tangent)
+                unstable = energy.count_unstable(self.mesh, at.tangent)
                 return MarchState(free, way, rate, unstable, self._effort(free, way))
             last = largest
         return None
@@ -261,7 +261,7 @@ class NumpyEquations:
         return flexibility, vector
 
     def _effort(self, free: FloatArray, way: float) -> float:
-        moved = self.network.base if self.ramp else self.network.rate
+        moved = self.mesh.base if self.ramp else self.mesh.rate
         return float(self.gradient(free, way) @ moved)
 
     def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
@@ -273,13 +273,13 @@ class NumpyEquations:
         return _march(self, start, np.asarray(targets, float), plan)
 
 
-def force_units(network: Discretisation) -> FloatArray:
+def force_units(mesh: Discretisation) -> FloatArray:
     """Return the unit of each free unknown that is a section force, EI/L^2 of its element; infinite for motions."""
-    e = network.elements
+    e = mesh.elements
     bending = (np.real(e.rigidity) * np.real(e.weight)).sum(axis=1) * np.real(e.length)
-    unit = np.full(network.size, np.inf)
+    unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / np.real(e.length) ** 2)[:, None]
-    return np.asarray(unit[network.free])
+    return np.asarray(unit[mesh.free])
 
 
 # -- natural march -----------------------------------------------------------------------------------------------------

@@ -77,22 +77,22 @@ def engine() -> str:
     return "numpy" if compiled() is None else "C"
 
 
-def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
+def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
     """Return the equations of a network, compiled if they can be.
 
     Parameters
     ----------
-    network : Discretisation
+    mesh : Discretisation
         With real arrays.
     ramp : bool
         Whether the way is the share of what is constant instead of the drive.
     """
     key = equations, ramp, compiled() is not None
-    if key not in network.known:
-        kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
-        plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
-        network.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(network, ramp)
-    return network.known[key]  # type: ignore[no-any-return]
+    if key not in mesh.known:
+        kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
+        plain = kinds <= set(KNOWN) and mesh.degree <= MAX_DEGREE
+        mesh.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(mesh, ramp)
+    return mesh.known[key]  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,16 +107,16 @@ class CompiledEquations(NumpyEquations):
         """Collect the arrays."""
         super().__post_init__()
         arrays = model_arrays(self)
-        counts = model_counts(self.network, self.ramp)
+        counts = model_counts(self.mesh, self.ramp)
         row = np.array([*counts.values(), *(0 for _ in ADDRESSES)], np.int64)
         self.code.place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
 
-    def stiffen(self, network: Discretisation) -> CompiledEquations:
+    def stiffen(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with another flexibility along its beams."""
-        stiff, axial = copy(self), np.ascontiguousarray(network.elements.axial, float)
-        object.__setattr__(stiff, "network", network)
+        stiff, axial = copy(self), np.ascontiguousarray(mesh.elements.axial, float)
+        object.__setattr__(stiff, "network", mesh)
         object.__setattr__(stiff, "arrays", {**self.arrays, "axial": axial})
         object.__setattr__(stiff, "row", self.row.copy())
         self.code.place(stiff.row, len(COUNTS) + ADDRESSES.index("axial"), (axial,))
@@ -156,7 +156,7 @@ class CompiledEquations(NumpyEquations):
 
     def _unstable(self, free: FloatArray, way: float, told: int) -> int:
         """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
-        return told if told >= 0 else energy.count_unstable(self.network, self.linearise(free, way).tangent)
+        return told if told >= 0 else energy.count_unstable(self.mesh, self.linearise(free, way).tangent)
 
     def solve(
         self,
@@ -286,7 +286,7 @@ def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: 
 
 def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
-    rule, tables, products = basis(own.network.degree), designs.tables, slope_products(own.network.degree)
+    rule, tables, products = basis(own.mesh.degree), designs.tables, slope_products(own.mesh.degree)
     found = tables | designs.places
     bend = tables["weight"] * tables["rigidity"]
     if designs.each:
@@ -309,17 +309,17 @@ def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
 
 
 # -- arrays ------------------------------------------------------------------------------------------------------------
-def model_counts(network: Discretisation, ramp: bool) -> dict[str, int]:
+def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     """Return the counts of a `Model`."""
-    elements, points = network.elements.weight.shape
-    follows = any(load.item.follows for load in network.loads)
-    values = (elements, points, network.degree, network.size, len(network.free), len(network.springs))
-    return dict(zip(COUNTS, (*values, len(network.loads), int(ramp), int(follows)), strict=True))
+    elements, points = mesh.elements.weight.shape
+    follows = any(load.item.follows for load in mesh.loads)
+    values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
+    return dict(zip(COUNTS, (*values, len(mesh.loads), int(ramp), int(follows)), strict=True))
 
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     """Return the arrays of a `Model` in C order."""
-    network = of.network
+    network = of.mesh
     e, a = network.elements, network.attachments
     slot = np.full(network.size, -1, np.int64)
     slot[network.free] = np.arange(len(network.free))
@@ -353,16 +353,16 @@ def slope_products(degree: int) -> FloatArray:
     return read_only(slopes[:, i] * slopes[:, j])
 
 
-def _leaves(network: Discretisation) -> Any:
+def _leaves(mesh: Discretisation) -> Any:
     """Return the last element that holds each free unknown, -1 if none does."""
-    last, unknowns = np.full(network.size, -1, np.int64), network.elements.unknowns
+    last, unknowns = np.full(mesh.size, -1, np.int64), mesh.elements.unknowns
     last[unknowns.ravel()] = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])  # of several values the last stays
-    return last[network.free]
+    return last[mesh.free]
 
 
-def _spring(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+def _spring(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
     """Return kind and places of a spring, and its stiffness and what else it needs."""
-    item, scales, attachments = attached.item, network.scales, network.attachments
+    item, scales, attachments = attached.item, mesh.scales, mesh.attachments
     rest = attachments.origin[list(attached.places)] + attachments.arm[list(attached.places)]
     stiffness = item.stiffness * scales.length / scales.force
     if isinstance(item, SlideSpring):
@@ -379,9 +379,9 @@ def _spring(network: Discretisation, attached: Attached) -> tuple[tuple[int, int
     return (2, start, end), (item.stiffness / scales.moment, item.free_angle, 0.0, 0.0, 0.0, 0.0)
 
 
-def _load(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+def _load(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
     """Return place of a load, whether it grows and follows, and force and moment."""
-    item, scales = attached.item, network.scales
+    item, scales = attached.item, mesh.scales
     unit = scales.drive if attached.grows else 1.0
     values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
     return (attached.places[0], int(attached.grows), int(item.follows)), values

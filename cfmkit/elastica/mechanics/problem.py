@@ -41,7 +41,7 @@ class NetworkProblem:
     free lengths of springs, the gap of beams that are forced into place.
     """
 
-    network: Discretisation
+    mesh: Discretisation
     ramp: bool = False
     next_correction: float = 1e-10
     """Size of the next of Newton's corrections, as the square of the last, at which a march accepts an equilibrium."""
@@ -49,12 +49,12 @@ class NetworkProblem:
     @cached_property
     def motions(self) -> Any:
         """Which free unknowns are motions."""
-        return self.network.free < self.network.n_motions
+        return self.mesh.free < self.mesh.n_motions
 
     @cached_property
     def equations(self) -> NumpyEquations:
         """Residual, tangent and Newton's method, compiled where they can be."""
-        return equations(self.network, self.ramp)
+        return equations(self.mesh, self.ramp)
 
     @cached_property
     def unit(self) -> FloatArray:
@@ -68,7 +68,7 @@ class NetworkProblem:
     def linearise(self, x: FloatArray, drive: float) -> Tangent:
         """Return residual, tangent and the residual's change with the drive."""
         at = self.equations.linearise(x, drive)
-        return Tangent(self.network, at.residual, at.change, at.tangent)
+        return Tangent(self.mesh, at.residual, at.change, at.tangent)
 
     def solve(
         self, x: FloatArray, drive: float, border: Border | None = None, push: FloatArray | None = None
@@ -141,14 +141,14 @@ class NetworkProblem:
     @cached_property
     def _any_vector(self) -> FloatArray:
         """Unit vector that has a share of every mode."""
-        count = len(self.network.free)
+        count = len(self.mesh.free)
         vector = np.cos(np.arange(count) * np.arange(1, count + 1))
         return np.asarray(vector / np.linalg.norm(vector))
 
     @cached_property
     def follows(self) -> bool:
         """True if a load turns with its node: the tangent is unsymmetric."""
-        return any(load.item.follows for load in self.network.loads if isinstance(load.item, PointLoad))
+        return any(load.item.follows for load in self.mesh.loads if isinstance(load.item, PointLoad))
 
     def orient(self, modes: FloatArray) -> FloatArray:
         """Return one combination of modes, its largest motion one, on the side that `Control.sign` 1 names.
@@ -176,17 +176,17 @@ class NetworkProblem:
     @cached_property
     def _node_rows(self) -> Any:
         """Which free unknowns move nodes."""
-        named = [unknown for body in self.network.bodies.values() for unknown in body]
-        return np.flatnonzero(np.isin(self.network.free, named))
+        named = [unknown for body in self.mesh.bodies.values() for unknown in body]
+        return np.flatnonzero(np.isin(self.mesh.free, named))
 
     def _end_moments(self, modes: FloatArray) -> FloatArray:
         """Return the moments at the ends of the beams in modes, (beams, k)."""
-        z = np.zeros((self.network.size, modes.shape[1]))
-        z[self.network.free] = modes
-        e = self.network.elements
+        z = np.zeros((self.mesh.size, modes.shape[1]))
+        z[self.mesh.free] = modes
+        e = self.mesh.elements
         last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
-        unknowns = e.unknowns[last][:, energy.rotation_columns(self.network.degree)]
-        _, slopes = shape_functions(self.network.degree, np.ones(1))
+        unknowns = e.unknowns[last][:, energy.rotation_columns(self.mesh.degree)]
+        _, slopes = shape_functions(self.mesh.degree, np.ones(1))
         return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
 
 
@@ -202,7 +202,7 @@ def _equilibrium(state: MarchState) -> PathEquilibrium:
 class Tangent:
     """Residual and tangent of a network at one place."""
 
-    network: Discretisation
+    mesh: Discretisation
     residual: FloatArray  # (n,)
     rate: FloatArray  # (n,) change of the residual with the drive
     tangent: FloatArray  # (n, n)
@@ -210,7 +210,7 @@ class Tangent:
     @cached_property
     def unstable(self) -> int:
         """Number of unstable directions at a held drive."""
-        return energy.count_unstable(self.network, self.tangent)
+        return energy.count_unstable(self.mesh, self.tangent)
 
     def solve(self, right: FloatArray) -> FloatArray | None:
         """Return the tangent's inverse times columns."""

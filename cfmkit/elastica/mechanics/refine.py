@@ -13,36 +13,36 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
-def raise_degree(network: Discretisation, degree: int) -> Discretisation:
+def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     """Return a network with the same elements and a higher degree of their rotations, and with its floors."""
-    if degree == network.degree:
-        return network
-    e = network.elements
-    tables = element_tables(network.fits, network.scales, degree, network.cuts)
-    if network.floor.any():
-        tables["axial"] = tables["axial"] + network.floor[:, None]
-    count, ends = len(e.length), _n_end_motions(network)
+    if degree == mesh.degree:
+        return mesh
+    e = mesh.elements
+    tables = element_tables(mesh.fits, mesh.scales, degree, mesh.cuts)
+    if mesh.floor.any():
+        tables["axial"] = tables["axial"] + mesh.floor[:, None]
+    count, ends = len(e.length), _n_end_motions(mesh)
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)
     unknowns = np.hstack([e.unknowns[:, :8], bubbles, forces])
     size = ends + count * (degree + 1)
-    free = np.concatenate([network.free[network.free < ends], np.arange(ends, size)])
-    base, rate = np.zeros(size, network.base.dtype), np.zeros(size)
-    base[:ends], rate[:ends] = network.base[:ends], network.rate[:ends]
+    free = np.concatenate([mesh.free[mesh.free < ends], np.arange(ends, size)])
+    base, rate = np.zeros(size, mesh.base.dtype), np.zeros(size)
+    base[:ends], rate[:ends] = mesh.base[:ends], mesh.rate[:ends]
     elements = e._replace(**tables, unknowns=unknowns)
-    return replace(network, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate)
+    return replace(mesh, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate)
 
 
-def embed(network: Discretisation, fine: Discretisation, z: Any) -> Any:
+def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
     """Return a state (..., size) of a network in the unknowns of one of a higher degree: shapes are hierarchical."""
-    ends, old, new = _n_end_motions(network), network.elements.unknowns, fine.elements.unknowns
+    ends, old, new = _n_end_motions(mesh), mesh.elements.unknowns, fine.elements.unknowns
     found = np.zeros((*z.shape[:-1], fine.size), z.dtype)
     found[..., :ends] = z[..., :ends]
-    found[..., new[:, 8 : network.degree + 7]] = z[..., old[:, 8 : network.degree + 7]]
+    found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
     found[..., new[:, -2:]] = z[..., old[:, -2:]]
     return found
 
 
-def _n_end_motions(network: Discretisation) -> int:
+def _n_end_motions(mesh: Discretisation) -> int:
     """Return the number of unknowns that move ends of elements; bubbles and forces come behind them."""
-    return network.size - len(network.elements.length) * (network.degree + 1)
+    return mesh.size - len(mesh.elements.length) * (mesh.degree + 1)

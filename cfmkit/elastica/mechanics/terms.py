@@ -27,13 +27,13 @@ class Contribution(NamedTuple):
     hessian: Any  # (n, n); unsymmetric under loads that follow
 
 
-def point_load(network: Discretisation, load: Attached, z: Any, share: Any, drive: Any) -> Contribution:
+def point_load(mesh: Discretisation, load: Attached, z: Any, share: Any, drive: Any) -> Contribution:
     """Return the term of a force and a moment at a node: dead, or turning with the node."""
-    at = poses(network.attachments, z, list(load.places))
-    factor = drive * network.scales.drive if load.grows else share
+    at = poses(mesh.attachments, z, list(load.places))
+    factor = drive * mesh.scales.drive if load.grows else share
     turn = z[at.unknowns[0, 3]]
-    force = np.array([load.item.fx, load.item.fy]) * factor / network.scales.force
-    moment = load.item.moment * factor / network.scales.moment
+    force = np.array([load.item.fx, load.item.fy]) * factor / mesh.scales.force
+    moment = load.item.moment * factor / mesh.scales.moment
     if load.item.follows:
         cos, sin = np.cos(turn), np.sin(turn)
         force = np.array([cos * force[0] - sin * force[1], sin * force[0] + cos * force[1]])
@@ -42,17 +42,17 @@ def point_load(network: Discretisation, load: Attached, z: Any, share: Any, driv
     hessian[2, 2] = force @ at.arm[0]
     if load.item.follows:
         hessian[:3, 3] = -np.array([-force[1], force[0]]) @ at.jacobian[0]
-    rest = network.attachments.origin[load.places[0]] + network.attachments.arm[load.places[0]]
+    rest = mesh.attachments.origin[load.places[0]] + mesh.attachments.arm[load.places[0]]
     work = force @ (at.place[0] - rest) + moment * turn
     return Contribution(-work, at.unknowns[0], np.append(-moves, -moment), hessian)
 
 
-def slide_spring(network: Discretisation, spring: Attached, z: Any, share: Any, _drive: Any) -> Contribution:
+def slide_spring(mesh: Discretisation, spring: Attached, z: Any, share: Any, _drive: Any) -> Contribution:
     """Return the term of a spring that resists the motion of a node along a fixed direction."""
-    item, scales = spring.item, network.scales
-    at = poses(network.attachments, z, list(spring.places))
+    item, scales = spring.item, mesh.scales
+    at = poses(mesh.attachments, z, list(spring.places))
     along = np.array([np.cos(item.direction), np.sin(item.direction)])
-    rest = network.attachments.origin[spring.places[0]] + network.attachments.arm[spring.places[0]]
+    rest = mesh.attachments.origin[spring.places[0]] + mesh.attachments.arm[spring.places[0]]
     gap = (at.place[0] - rest) @ along - share * item.free_displacement / scales.length
     stiffness = item.stiffness * scales.length / scales.force
     return along_direction(at, along, stiffness * gap**2 / 2, stiffness * gap, stiffness)
@@ -66,9 +66,9 @@ def along_direction(at: Any, along: Any, energy: Any, force: Any, stiffness: Any
     return Contribution(energy, at.unknowns[0, :3], force * reach, hessian)
 
 
-def line_spring(network: Discretisation, spring: Attached, z: Any, share: Any, _drive: Any) -> Contribution:
+def line_spring(mesh: Discretisation, spring: Attached, z: Any, share: Any, _drive: Any) -> Contribution:
     """Return the term of a spring along the line between two places; its free length goes from the length at rest."""
-    item, scales, attachments = spring.item, network.scales, network.attachments
+    item, scales, attachments = spring.item, mesh.scales, mesh.attachments
     at = poses(attachments, z, list(spring.places))
     rest = attachments.origin[list(spring.places)] + attachments.arm[list(spring.places)]
     ground = np.array(item.ground) / scales.length
@@ -90,12 +90,12 @@ def line_spring(network: Discretisation, spring: Attached, z: Any, share: Any, _
     return Contribution(energy, at.unknowns[:, :3].ravel(), force * stretch, hessian)
 
 
-def torsion_spring(network: Discretisation, spring: Attached, z: Any, share: Any, _drive: Any) -> Contribution:
+def torsion_spring(mesh: Discretisation, spring: Attached, z: Any, share: Any, _drive: Any) -> Contribution:
     """Return the term of a spring between two rotations, or of one against the ground."""
-    unknowns = network.attachments.unknowns[list(spring.places), 3]
+    unknowns = mesh.attachments.unknowns[list(spring.places), 3]
     sign = np.array([-1.0, 1.0]) if spring.item.start is not None else np.array([1.0])
     gap = sign @ z[unknowns] - share * spring.item.free_angle
-    stiffness = spring.item.stiffness / network.scales.moment
+    stiffness = spring.item.stiffness / mesh.scales.moment
     return Contribution(stiffness * gap**2 / 2, unknowns, stiffness * gap * sign, stiffness * np.outer(sign, sign))
 
 

@@ -62,9 +62,9 @@ class BeamStates(NamedTuple):
     thickness: Any  # (k,) [m]
 
 
-def elements_of(network: Discretisation, beam: str) -> list[int]:
+def elements_of(mesh: Discretisation, beam: str) -> list[int]:
     """Return the elements of a beam, in order."""
-    return [number for number, name in enumerate(network.elements.beam) if name == beam]
+    return [number for number, name in enumerate(mesh.elements.beam) if name == beam]
 
 
 def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamStates:
@@ -81,13 +81,13 @@ def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamState
     fractions : (k,) array
         Places on every element as fractions of its parameter, from 0 to 1.
     """
-    return states_of_elements(net, at, elements_of(at.network, beam), fractions)
+    return states_of_elements(net, at, elements_of(at.mesh, beam), fractions)
 
 
 def states_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
     """Return states at the same fractions (k,) of each of m elements, one after the other: (p, m k)."""
     given = np.asarray(fractions, float)
-    by_element = _states(at, list(elements), given, _rest(net, at.network, elements, given))
+    by_element = _states(at, list(elements), given, _rest(net, at.mesh, elements, given))
     return BeamStates(*map(_join_elements, by_element))
 
 
@@ -104,7 +104,7 @@ def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequenc
         As of `states_of_elements`.
     """
     given, numbers = np.asarray(fractions, float), list(elements)
-    by_element = _states(at, numbers, given, _rest_of_designs(designs, at.network, numbers, given))
+    by_element = _states(at, numbers, given, _rest_of_designs(designs, at.mesh, numbers, given))
     return BeamStates(*map(_join_elements, by_element))
 
 
@@ -123,14 +123,14 @@ class _BeamAtRest(NamedTuple):
     thickness: Any
 
 
-def _rest(net: Network, network: Discretisation, elements: Sequence[int], given: FloatArray) -> _BeamAtRest:
+def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], given: FloatArray) -> _BeamAtRest:
     """Return beams at fractions of elements before any load."""
-    rule, e = basis(network.degree), network.elements
-    through = _matrices(network.degree, tuple(given.tolist())).interpolation
+    rule, e = basis(mesh.degree), mesh.elements
+    through = _matrices(mesh.degree, tuple(given.tolist())).interpolation
     rows = []
     for element in elements:
         beam, (left, right) = e.beam[element], e.cuts[element]
-        fitted, middle = network.fits[beam], 0.5 * (left + right)
+        fitted, middle = mesh.fits[beam], 0.5 * (left + right)
         t, known = left + (right - left) * given, left + (right - left) * rule.places
         added = e.angle[element] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
         place = fitted.arc(t)
@@ -140,7 +140,7 @@ def _rest(net: Network, network: Discretisation, elements: Sequence[int], given:
 
 
 def _rest_of_designs(
-    designs: NetworkDesigns, network: Discretisation, elements: list[int], given: FloatArray
+    designs: NetworkDesigns, mesh: Discretisation, elements: list[int], given: FloatArray
 ) -> _BeamAtRest:
     """Return beams at fractions of elements before any load with their derivatives, dual where they have some."""
     template, names = designs.template, [designs.template.elements.beam[element] for element in elements]
@@ -152,7 +152,7 @@ def _rest_of_designs(
         return _BeamAtRest(own.place, DualArray(own.angle, angle), DualArray(own.thickness, thickness))
     # plain beams: their angle is a polynomial, their speed and thickness are even
     cuts = template.elements.cuts[elements]
-    angle = network.elements.angle[elements] @ _matrices(template.degree, tuple(given.tolist())).interpolation.T
+    angle = mesh.elements.angle[elements] @ _matrices(template.degree, tuple(given.tolist())).interpolation.T
     steps: Any = np.array([[net.beams[name].section.thickness for name in names] for net, _ in designs.networks])
     first: Any = np.array([template.fits.network.beams[name].section.thickness for name in names])
     even = DualArray(first[:, None], np.imag(steps)[..., None] / COMPLEX_STEP)
@@ -161,7 +161,7 @@ def _rest_of_designs(
 
 def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> BeamStates:
     """Return states at k fractions of m elements, (p, m, k); dual if the equilibria are."""
-    network, scales, whole = at.network, at.network.scales, at.network.elements
+    network, scales, whole = at.mesh, at.mesh.scales, at.mesh.elements
     rule, own = basis(network.degree), at.z[..., whole.unknowns[elements]]
     tables = {name: getattr(whole, name) for name in ON_POINTS}
     picked = {name: table[elements] for name, table in tables.items() if table is not None}
@@ -240,13 +240,13 @@ def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
     """Return the places before any load, (k, 2) [m], at the fractions of `states`."""
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 
-    rest = Equilibria(at.network, np.zeros((1, at.network.size)), np.zeros(1))
-    line = at.network.elements.line[:, 0]
+    rest = Equilibria(at.mesh, np.zeros((1, at.mesh.size)), np.zeros(1))
+    line = at.mesh.elements.line[:, 0]
     if line.any():  # without its loads
         from dataclasses import replace
 
-        bare = at.network.elements._replace(line=0.0 * at.network.elements.line)
-        rest = Equilibria(replace(at.network, elements=bare), rest.z, rest.drive)
+        bare = at.mesh.elements._replace(line=0.0 * at.mesh.elements.line)
+        rest = Equilibria(replace(at.mesh, elements=bare), rest.z, rest.drive)
     found = states(net, rest, beam, fractions)
     return np.stack([found.x[0], found.y[0]], axis=-1)
 

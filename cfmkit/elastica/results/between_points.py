@@ -66,7 +66,7 @@ def between_points(
     allowed : float or None
         Stress [Pa]; where it is passed is solved for.
     """
-    if isinstance(path.given, Loading) or len(path) < FEWEST or not np.all(path.accurate):
+    if isinstance(path.load_case, Loading) or len(path) < FEWEST or not np.all(path.accurate):
         return None
     steps = np.diff(path.at.drive)
     if not ((steps > 0).all() or (steps < 0).all()):
@@ -96,7 +96,7 @@ class BetweenPoints(ShortRepr):
     @property
     def _scale(self) -> float:
         """The unit of dimensionless places [m or rad]."""
-        return self.path.network.scales.drive
+        return self.path.mesh.scales.drive
 
     @property
     def places(self) -> FloatArray:
@@ -163,7 +163,7 @@ class BetweenPoints(ShortRepr):
         """
         corners = list(self._corners.values())
         numbers = np.searchsorted([corner.drive for corner in corners], self._drive)
-        names = list(self.path.net.beams)
+        names = list(self.path.network.beams)
         at_points = self.path.beam_stresses(self.axial)[0][:, self._order]
         at_corners = np.empty((0, len(names)))
         if corners:
@@ -263,7 +263,7 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def _equations(self) -> NumpyEquations:
-        return equations(self.path.network)
+        return equations(self.path.mesh)
 
     def _solve(
         self, y: FloatArray, drive: float, row: FloatArray | None = None, goal: float = 0.0
@@ -273,7 +273,7 @@ class BetweenPoints(ShortRepr):
 
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of a motion in each of some changes of the unknowns, (n,)."""
-        network = self.path.network
+        network = self.path.mesh
         return np.asarray(np.abs(changes[:, network.free < network.n_motions]).max(axis=1, initial=0.0))
 
     def _counts(self, near: int, _left: int) -> tuple[int, ...]:
@@ -311,7 +311,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _events(self) -> FloatArray:
         """Where the path bifurcates, dimensionless, increasing."""
-        scale = self.path.network.scales.drive
+        scale = self.path.mesh.scales.drive
         return np.sort([one.drive / scale for one in self.path.events if one.kind == "bifurcation"])
 
     def _nearest(self, wanted: FloatArray, left: Any) -> Any:
@@ -445,7 +445,7 @@ def between_loads(
     allowed : float or None
         Stress [Pa]; where it is passed is solved for.
     """
-    network = path.network
+    network = path.mesh
     if len(path) < FEWEST or not np.all(path.accurate) or (along is not None and node not in network.bodies):
         return None
     place = network.nodes[node]

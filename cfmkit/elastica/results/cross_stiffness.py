@@ -50,7 +50,7 @@ def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: 
         Negative where the node would leave sideways; nan where nothing gives way.
     """
     chosen = slice(None) if points is None else np.asarray(points, dtype=np.int64)
-    scales = path.network.scales
+    scales = path.mesh.scales
     return read_only(_condensed_along(path, node, direction)[0][chosen] * scales.force / scales.length)
 
 
@@ -86,7 +86,7 @@ def _blocks(path: EquilibriumPath, node: str, direction: float) -> Iterator[tupl
 
     The network is the same but for the node, whose axes are turned along the direction and which nothing guides.
     """
-    network = path.network
+    network = path.mesh
     x, y, _ = network.bodies[node]
     frame = network.attachments.frame.copy()
     place = network.attachments.unknowns[:, 0] == x

@@ -40,13 +40,13 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
     To first order that is the share of the force that is missing, too. Beams that are solved as wide strips miss
     nothing.
     """
-    network, names = path.network, list(path.net.beams)
+    network, names = path.mesh, list(path.network.beams)
     places = basis(network.degree).places
     energies, lost = (np.zeros((len(names), len(path))) for _ in range(2))
     for number, name in enumerate(names):
-        section, fitted = path.net.beams[name].section, network.fits[name]
+        section, fitted = path.network.beams[name].section, network.fits[name]
         for element in elements_of(network, name):
-            found = states_of_elements(path.net, path.at, [element], places)
+            found = states_of_elements(path.network, path.at, [element], places)
             left, right = network.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = np.imag(fitted.angle(t + 1j * _STEP, inside)) / _STEP / np.real(fitted.speed(t, inside))

@@ -119,7 +119,7 @@ class AlongTheWay:
     def at(self, ways: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places of the way (n,); `accurate` is False where none was found."""
         path, known_y, known_drive = self.path, self.path.free, self.path.at.drive
-        own = equations(path.network)
+        own = equations(path.mesh)
         left = np.clip(ways.astype(np.int64), 0, len(path) - 2)
         share = ways - left
         y, drive = self._guesses(left, share)
@@ -179,7 +179,7 @@ class AlongTheWay:
 
 def _largest(path: EquilibriumPath, change: FloatArray) -> float:
     """Return the largest change of positions and rotations in a change of the unknowns."""
-    network = path.network
+    network = path.mesh
     return float(np.abs(change[network.free < network.n_motions]).max(initial=0.0))
 
 

@@ -31,10 +31,10 @@ ROUNDING = 30 * np.finfo(float).eps
 """Share of the stiffest element's force for a unit motion that rounding of places leaves, with room."""
 
 
-def stiffest(network: Discretisation) -> float:
+def stiffest(mesh: Discretisation) -> float:
     """Return the largest force on the end of an element that is moved by a unit length, dimensionless."""
-    e = network.elements
-    stretch = np.where(network.floored, 0.0, (e.weight * e.axial).sum(axis=1))
+    e = mesh.elements
+    stretch = np.where(mesh.floored, 0.0, (e.weight * e.axial).sum(axis=1))
     bent = 12.0 / (e.weight / e.rigidity).sum(axis=1)
     return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
 
@@ -52,8 +52,8 @@ def effort_error(path: EquilibriumPath, tolerance: float) -> float:
     tolerance : float
         That its accurate points reach, relative to the largest force [1].
     """
-    scales = path.network.scales
-    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + ROUNDING * stiffest(path.network)
+    scales = path.mesh.scales
+    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + ROUNDING * stiffest(path.mesh)
     return error * scales.moment / scales.drive
 
 
@@ -85,7 +85,7 @@ def largest_member_efforts(
 
 def _ways(path: EquilibriumPath) -> tuple[FloatArray, FloatArray]:
     """Return the directions of a path at its points, (n, free) and (n,): their largest motion or drive is one."""
-    own, moves = equations(path.network), path.network.free < path.network.n_motions
+    own, moves = equations(path.mesh), path.mesh.free < path.mesh.n_motions
     free, drive = np.empty_like(path.free), np.empty(len(path))
     for k, (y, at) in enumerate(zip(path.free, path.at.drive.tolist(), strict=True)):
         equation = own.linearise(y, at)
@@ -103,7 +103,7 @@ def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatA
 
     The gradient of a member's own energy times the motion of its ends: inside a beam it is in equilibrium.
     """
-    network, names = path.network, list(path.net.beams)
+    network, names = path.mesh, list(path.network.beams)
     z = drive[:, None] * network.rate
     z[:, network.free] = free
     found = np.zeros((len(names) + len(network.springs), len(path)))

@@ -52,8 +52,8 @@ def neighbouring(path: EquilibriumPath, network: Network, drive: Drive, largest_
     cfmkit.errors.InputError
         If the two networks are not of one kind, or the numbers of points differ.
     """
-    arrays, known = discretise_alike(path.network, network, drive), path.at_requested
-    if not np.array_equal(arrays.free, path.network.free) or len(known) != len(drive.points):
+    arrays, known = discretise_alike(path.mesh, network, drive), path.at_requested
+    if not np.array_equal(arrays.free, path.mesh.free) or len(known) != len(drive.points):
         raise InputError("neighbouring equilibria need networks of the same kind and as many points as were reached")
     own, moves = equations(arrays), arrays.free < arrays.n_motions
     guesses, wanted = path.free[known], drive.points / arrays.scales.drive
@@ -73,8 +73,8 @@ def neighbouring(path: EquilibriumPath, network: Network, drive: Drive, largest_
     z[:, arrays.free] = np.array(states).reshape(len(kept), len(arrays.free))
     return replace(
         path,
-        net=network,
-        given=drive,
+        network=network,
+        load_case=drive,
         at=Equilibria(arrays, z, wanted[kept]),
         unstable=read_only(path.unstable[known[kept]], np.int64),
         requested=read_only(kept, np.int64),
@@ -102,9 +102,9 @@ def drive_slope(path: EquilibriumPath, indices: Any = None) -> FloatArray:
     cfmkit.errors.InputError
         If loads drive, or a point is not an equilibrium.
     """
-    if isinstance(path.given, Loading):
+    if isinstance(path.load_case, Loading):
         raise InputError("the slope of the effort needs a displacement or a rotation as the drive")
-    network, slopes = path.network, []
+    network, slopes = path.mesh, []
     own, unit = equations(network), network.scales.moment / network.scales.drive**2
     for index in (path.at_requested if indices is None else np.asarray(indices)).tolist():
         drive = float(path.at.drive[index])

@@ -76,8 +76,8 @@ class StressPeak:
 class EquilibriumPath(ShortRepr):
     """Equilibria of a network under a drive, n points in the order of the path; SI."""
 
-    net: Network  # the model
-    given: Drive  # what was done to it
+    network: Network  # as specified
+    load_case: Drive  # what was done to it
     at: Equilibria  # the equilibria, dimensionless
     unstable: Any  # (n,) number of unstable directions while the drive is held
     requested: Any  # (n,) index of the requested point, -1 for points in between
@@ -94,25 +94,25 @@ class EquilibriumPath(ShortRepr):
         return len(self.at.z)
 
     @property
-    def network(self) -> Discretisation:
+    def mesh(self) -> Discretisation:
         """The arrays of the network."""
-        return self.at.network
+        return self.at.mesh
 
     @property
     def free(self) -> FloatArray:
         """Unknowns that were solved for at every point, (n, free); dimensionless."""
-        return np.asarray(self.at.z[:, self.network.free])
+        return np.asarray(self.at.z[:, self.mesh.free])
 
     @property
     def follows(self) -> bool:
         """True if a load turns with its node."""
-        return any(load.item.follows for load in self.network.loads)
+        return any(load.item.follows for load in self.mesh.loads)
 
     def take(self, points: Any) -> EquilibriumPath:
         """Return some of the points: their indices, or True for each."""
         return replace(
             self,
-            at=Equilibria(self.network, self.at.z[points], self.at.drive[points]),
+            at=Equilibria(self.mesh, self.at.z[points], self.at.drive[points]),
             unstable=self.unstable[points],
             requested=self.requested[points],
             branch=self.branch[points],
@@ -124,7 +124,7 @@ class EquilibriumPath(ShortRepr):
         return replace(
             self,
             at=Equilibria(
-                self.network, np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
+                self.mesh, np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
             ),
             unstable=read_only(np.concatenate([self.unstable, other.unstable]), np.int64),
             requested=read_only(np.concatenate([self.requested, other.requested]), np.int64),
@@ -144,7 +144,7 @@ class EquilibriumPath(ShortRepr):
         accurate : (m,) array of bool
             False where there is no equilibrium.
         """
-        network = self.network
+        network = self.mesh
         z = network.base + drive[:, None] * network.rate
         z[:, network.free] = free
         count = len(drive)
@@ -160,7 +160,7 @@ class EquilibriumPath(ShortRepr):
     @cached_property
     def drive(self) -> FloatArray:
         """Value of the drive at every point [m, rad or 1]."""
-        return read_only(self.at.drive * self.network.scales.drive)
+        return read_only(self.at.drive * self.mesh.scales.drive)
 
     @property
     def stable(self) -> Any:
@@ -175,7 +175,7 @@ class EquilibriumPath(ShortRepr):
     @property
     def fits(self) -> Any:
         """Fit of each beam between its nodes, by its name."""
-        fits: dict[str, Fit] = dict(self.network.fits)
+        fits: dict[str, Fit] = dict(self.mesh.fits)
         return fits
 
     # -- nodes -------------------------------------------------------------------------------------------------------
@@ -198,20 +198,20 @@ class EquilibriumPath(ShortRepr):
         cfmkit.errors.InputError
             If there is no such node, or a link moves it.
         """
-        if node not in self.net.nodes:
-            raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.net.nodes)}")
-        if self.net.moved(node):
-            master = self.net.master_of(node)
+        if node not in self.network.nodes:
+            raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.network.nodes)}")
+        if self.network.moved(node):
+            master = self.network.master_of(node)
             raise InputError(f"node {node!r} is moved by a link: what is held is its master, {master!r}")
         return read_only(node_reaction(self.at, node, self.residual))
 
     @cached_property
     def effort(self) -> FloatArray:
         """Work-conjugate of the drive: the force along it [N], the moment [N m], or for loads the displacement [J]."""
-        scales = self.network.scales
-        if isinstance(self.given, Loading):
-            return read_only(load_displacement(self.at, self.given))
-        return read_only(self.residual @ self.network.rate * scales.moment / scales.drive)
+        scales = self.mesh.scales
+        if isinstance(self.load_case, Loading):
+            return read_only(load_displacement(self.at, self.load_case))
+        return read_only(self.residual @ self.mesh.rate * scales.moment / scales.drive)
 
     # -- along beams -------------------------------------------------------------------------------------------------
     @property
@@ -221,7 +221,7 @@ class EquilibriumPath(ShortRepr):
     def states(self, beam: str) -> beam_states.BeamStates:
         """Return states at the sampled places of a beam at every point."""
         if beam not in self._states:
-            self._states[beam] = beam_states.states(self.net, self.at, beam, self._fractions)
+            self._states[beam] = beam_states.states(self.network, self.at, beam, self._fractions)
         return self._states[beam]
 
     @cached_property
@@ -239,7 +239,7 @@ class EquilibriumPath(ShortRepr):
     def line_motion(self, beam: str) -> FloatArray:
         """Return the displacements of the sampled places of a beam, (n, k, 2) [m]."""
         found = self.states(beam)
-        rest = beam_states.unloaded(self.net, self.at, beam, self._fractions)
+        rest = beam_states.unloaded(self.network, self.at, beam, self._fractions)
         return read_only(np.stack([found.x, found.y], axis=-1) - rest)
 
     def shape(self, beam: str, point: int) -> FloatArray:
@@ -253,27 +253,27 @@ class EquilibriumPath(ShortRepr):
 
     def sections(self, beam: str) -> beam_states.BeamSections:
         """Return section forces and stresses along a beam at all points; arrays (n, k)."""
-        return beam_states.sections(self.net, beam, self.states(beam))
+        return beam_states.sections(self.network, beam, self.states(beam))
 
     @cached_property
     def energy(self) -> FloatArray:
         """Strain energy of beams and springs at every point [J]."""
-        return read_only(strain_energy(self.at) * self.network.scales.moment)
+        return read_only(strain_energy(self.at) * self.mesh.scales.moment)
 
     # -- stresses ----------------------------------------------------------------------------------------------------
     def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
         """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
         known = self._beam_stresses.get(axial)
         if known is not None:
-            number = list(self.net.beams).index(beam)
+            number = list(self.network.beams).index(beam)
             return known[0][number], known[1][number]
-        value, place = stress_extremes.largest_stresses(self.net, self.at, [beam], axial)
+        value, place = stress_extremes.largest_stresses(self.network, self.at, [beam], axial)
         return value[0], place[0]
 
     def beam_stresses(self, axial: bool = True) -> tuple[FloatArray, FloatArray]:
         """Return the largest stress of each of b beams at every point, (b, n) [Pa], and its place."""
         if axial not in self._beam_stresses:
-            found = stress_extremes.largest_stresses(self.net, self.at, list(self.net.beams), axial)
+            found = stress_extremes.largest_stresses(self.network, self.at, list(self.network.beams), axial)
             self._beam_stresses[axial] = read_only(found[0]), read_only(found[1])
         return self._beam_stresses[axial]
 
@@ -289,11 +289,11 @@ class EquilibriumPath(ShortRepr):
 
     def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:
         """Return the highest and lowest stress on both sides of a beam at every point, signed, with their places."""
-        return stress_extremes.signed_extremes(self.net, self.at, beam, axial)
+        return stress_extremes.signed_extremes(self.network, self.at, beam, axial)
 
     def peak_stress(self, axial: bool = True) -> StressPeak:
         """Return the largest stress of the network at every point, with its place; see `most_stressed`."""
-        names = list(self.net.beams)
+        names = list(self.network.beams)
         values, places = self.beam_stresses(axial)
         best, pick = most_stressed(values, places), np.arange(len(self))
         return StressPeak(
@@ -314,7 +314,7 @@ def most_stressed(values: FloatArray, places: FloatArray) -> Any:
 
 def node_motion(at: Equilibria, node: str) -> Any:
     """Return displacement and rotation of a node, (p, 3) [m, m, rad]."""
-    network = at.network
+    network = at.mesh
     here = poses(network.attachments, at.z, [network.nodes[node]])
     rest = (network.attachments.origin + network.attachments.arm)[network.nodes[node]]
     moved = (here.place[:, 0] - rest) * network.scales.length
@@ -323,7 +323,7 @@ def node_motion(at: Equilibria, node: str) -> Any:
 
 def node_reaction(at: Equilibria, node: str, residual: Any) -> Any:
     """Return force and moment on a node from the gradient at all unknowns, (p, 3) [N, N, N m]."""
-    network, scales = at.network, at.network.scales
+    network, scales = at.mesh, at.mesh.scales
     if node not in network.bodies:
         raise InputError(f"{node!r} is moved by a link: it has no support of its own")
     cos, sin = network.attachments.frame[network.nodes[node]]
@@ -334,7 +334,7 @@ def node_reaction(at: Equilibria, node: str, residual: Any) -> Any:
 
 def load_displacement(at: Equilibria, drive: Loading) -> Any:
     """Return the work-conjugate displacement of a drive by loads, (p,) [J]."""
-    network, scales = at.network, at.network.scales
+    network, scales = at.mesh, at.mesh.scales
     total: Any = 0.0
     for load in drive.loads:
         if not isinstance(load, PointLoad):
@@ -355,20 +355,20 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
 
 def strain_energy(at: Equilibria) -> Any:
     """Return the strain energy of beams and springs, (p,), dimensionless."""
-    e, fields = at.network.elements, energy.fields(at.network, at.z, at.drive)
+    e, fields = at.mesh.elements, energy.fields(at.mesh, at.z, at.drive)
     density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
     total = (e.weight * density).sum(axis=(1, 2)) / 2
-    for spring in at.network.springs:
+    for spring in at.mesh.springs:
         term = TERMS[type(spring.item)]
         total = total + np.array(
-            [term(at.network, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
+            [term(at.mesh, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
         )
     return total
 
 
 def largest_force(at: Equilibria) -> float:
     """Return the largest force or moment in a beam at any state, dimensionless."""
-    network, e = at.network, at.network.elements
+    network, e = at.mesh, at.mesh.elements
     own = at.z[:, e.unknowns]
     curvature = own[..., energy.rotation_columns(network.degree)] @ basis(network.degree).slopes.T
     moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)

@@ -71,7 +71,7 @@ def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArr
     value, place, element, fraction : (b, p, c) arrays
         [Pa]; fraction of the arc length; number of the element on the beam, and place on it.
     """
-    own = [elements_of(at.network, beam) for beam in beams]
+    own = [elements_of(at.mesh, beam) for beam in beams]
     elements = [number for numbers in own for number in numbers]
     together = max(1, MAX_TOGETHER // max(1, len(elements) * len(signs) * N_GRID))
     parts = [
@@ -93,8 +93,8 @@ def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArr
 
 def _on_elements(net: Network, at: Equilibria, elements: list[int], signs: FloatArray) -> tuple[Any, Any, Any]:
     """Return the highest stresses on each of m elements, places on their beams and on them, (m, p, c) each."""
-    fractions, to_series = places(at.network.degree + N_MORE_PLACES)
-    widths = np.array([net.beams[at.network.elements.beam[number]].section.width for number in elements])
+    fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
+    widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
     found = states_of_elements(net, at, elements, fractions)
     seen = sections_of_width(np.repeat(widths, len(fractions)), found)
     both = np.array([seen.bending_stress, seen.axial_stress]).reshape(2, len(at.z), len(elements), len(fractions))
@@ -167,10 +167,10 @@ def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: A
     axial : bool
         Whether the stress has its axial part.
     """
-    fractions, to_series = places(at.network.degree + N_MORE_PLACES)
+    fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     found = np.zeros(np.shape(fraction), at.z.dtype)
     sides = np.array([1.0, -1.0])[:, None]
-    for number, own in enumerate(elements_of(at.network, beam)):
+    for number, own in enumerate(elements_of(at.mesh, beam)):
         here = element == number
         if not here.any():
             continue

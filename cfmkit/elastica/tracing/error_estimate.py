@@ -44,9 +44,9 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
     chosen, own = list(indices), path.at
-    problem, scales = NetworkProblem(finer), path.network.scales
-    n_bodies = int(path.network.elements.unknowns[:, 8].min())
-    guesses, drives = embed(path.network, finer, own.z[chosen]), own.drive[chosen]
+    problem, scales = NetworkProblem(finer), path.mesh.scales
+    n_bodies = int(path.mesh.elements.unknowns[:, 8].min())
+    guesses, drives = embed(path.mesh, finer, own.z[chosen]), own.drive[chosen]
     solved = problem.equations.solve_each(guesses[:, finer.free], drives, NEXT_CORRECTION, quick=True)
     states = guesses.copy()
     states[:, finer.free] = np.where(solved.converged[:, None], solved.free, guesses[:, finer.free])
@@ -83,7 +83,7 @@ def polish(path: Path) -> Path:
     A march leaves it when the next correction would be small if it converged quadratically: beside a bifurcation it
     does not.
     """
-    network, z = path.network, path.at.z.copy()
+    network, z = path.mesh, path.at.z.copy()
     own = z[:, network.free]
     solved = NetworkProblem(network).equations.solve_each(own, path.at.drive)
     count = int((network.free < network.n_motions).sum())
@@ -101,7 +101,7 @@ def pick_points(path: Path, places: Sequence[float]) -> list[int]:
     if len(at) <= MAX_POINTS:
         chosen.update(at.tolist())
     else:
-        highest = path.at.z[at][:, path.network.elements.unknowns[:, -4:-2].ravel()]
+        highest = path.at.z[at][:, path.mesh.elements.unknowns[:, -4:-2].ravel()]
         left = np.abs(highest).max(axis=1)  # what the last polynomials say: the next may be as large
         bounds = [len(at) * k // (MAX_POINTS - 2) for k in range(MAX_POINTS - 1)]
         chosen.update(int(at[a + left[a:b].argmax()]) for a, b in itertools.pairwise(bounds))

@@ -55,8 +55,8 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
     """
     if not _goes_straight_on(path, control):
         return None
-    efforts = np.full((len(networks), len(path.given.points)), np.nan)
-    own = _same_for_all(path.net)
+    efforts = np.full((len(networks), len(path.load_case.points)), np.nan)
+    own = _same_for_all(path.network)
     alike = [k for k, network in enumerate(networks) if _same_for_all(network) == own]
     if alike:
         try:
@@ -85,28 +85,30 @@ def _kept(beam: Beam) -> Any:
 
 def _goes_straight_on(path: Path, control: Control) -> bool:
     """Return True if a network rests before its drive, is set up without cuts, and nothing happens on its path."""
-    arrays = path.network
+    arrays = path.mesh
     springs = [spring.item for spring in arrays.springs]
-    rests = not (path.net.loads or arrays.base.any() or any(getattr(s, name, None) for s in springs for name in FREE))
+    rests = not (
+        path.network.loads or arrays.base.any() or any(getattr(s, name, None) for s in springs for name in FREE)
+    )
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
-    simple = _same_for_all(path.net) is not None and arrays.pieces == 1 and not arrays.tension
-    alone = control.imperfection or isinstance(path.given, Loading) or np.any(arrays.floored)
+    simple = _same_for_all(path.network) is not None and arrays.pieces == 1 and not arrays.tension
+    alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
     return bool(rests and quiet and simple and not alone and engine() == "C")
 
 
 def _follow(path: Path, networks: list[Network], control: Control) -> Any:
     """Return the efforts of networks that are like that of a path."""
-    drive, points = path.given, path.given.points
-    origin, pairs = (path.net, drive), [(network, drive) for network in networks]
+    drive, points = path.load_case, path.load_case.points
+    origin, pairs = (path.network, drive), [(network, drive) for network in networks]
 
     def efforts_at(degree: int, some: list[Any], targets: FloatArray) -> FloatArray:
-        template = discretise(*origin, degree, scales=path.network.scales, fits=path.network.fits)
+        template = discretise(*origin, degree, scales=path.mesh.scales, fits=path.mesh.fits)
         designs = set_up(template, origin, some)
         correction, turn = next_correction(control), control.largest_turn
         efforts, codes = march_many(designs, targets, tolerance=correction, largest_turn=turn)
         return np.where((codes == MarchCode.DONE)[:, None], efforts, np.nan)
 
-    highest = path.network.degree + DEGREES_MORE
+    highest = path.mesh.degree + DEGREES_MORE
     exact = efforts_at(highest, [origin], points)[0]
     size = np.abs(exact).max()
     errors = ((k, np.abs(efforts_at(k, [origin], points)[0] - exact).max()) for k in range(LOWEST_DEGREE, highest))

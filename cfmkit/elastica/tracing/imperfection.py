@@ -45,8 +45,8 @@ def bend(network: Network, drive: Drive, buckling: Buckling | None, size: float)
     if buckling is None:
         return network, "none: the perfect path has no bifurcation"
     problem, event, _ = buckling
-    mode = np.zeros(problem.network.size)
-    mode[problem.network.free] = problem.orient(event.modes)
+    mode = np.zeros(problem.mesh.size)
+    mode[problem.mesh.free] = problem.orient(event.modes)
     share = size / _reach(network, problem, mode)
     nodes, turns = dict(network.nodes), {}
     for name, node in network.nodes.items():
@@ -68,8 +68,8 @@ def _where(drive: Drive, buckling: Buckling) -> str:
     problem, event, what = buckling
     if what:
         return f"under {100 * event.drive:.4g} % of the {what}"
-    place = event.drive * problem.network.scales.drive
-    network, near = problem.network, event.near
+    place = event.drive * problem.mesh.scales.drive
+    network, near = problem.mesh, event.near
     if near is not None and network.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
         residual = energy.gradient(network, problem.values(near.x, near.drive), near.drive)
         force = float(residual @ network.rate) * network.scales.moment / network.scales.drive
@@ -79,7 +79,7 @@ def _where(drive: Drive, buckling: Buckling) -> str:
 
 def _node_motion(problem: NetworkProblem, name: str, change: FloatArray) -> tuple[FloatArray, float]:
     """Return displacement [m] and rotation [rad] of a node, to first order from rest."""
-    network = problem.network
+    network = problem.mesh
     at = poses(network.attachments, np.zeros(network.size), [network.nodes[name]])
     moved = at.jacobian[0] @ change[at.unknowns[0, :3]] * network.scales.length
     return moved, float(change[at.unknowns[0, 3]])
@@ -87,7 +87,7 @@ def _node_motion(problem: NetworkProblem, name: str, change: FloatArray) -> tupl
 
 def _rotations(problem: NetworkProblem, beam: str, mode: FloatArray) -> Chebyshev:
     """Return the rotations of a beam's sections in a mode, over the parameter of its shape [rad]."""
-    network, places, values = problem.network, [], []
+    network, places, values = problem.mesh, [], []
     shares = (1 - np.cos(np.pi * np.arange(PLACES) / (PLACES - 1))) / 2
     shapes, _ = shape_functions(network.degree, shares)
     columns = energy.rotation_columns(network.degree)
@@ -103,7 +103,7 @@ def _reach(network: Network, problem: NetworkProblem, mode: FloatArray) -> float
     """Return the largest displacement of the unloaded lines in a mode [m]; beams are turned and scaled to fit."""
     largest = 0.0
     for name, beam in network.beams.items():
-        fitted, turn = problem.network.fits[name], _rotations(problem, name, mode)
+        fitted, turn = problem.mesh.fits[name], _rotations(problem, name, mode)
         ends = []
         for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset)):
             (dx, dy), rotation = _node_motion(problem, node, mode)

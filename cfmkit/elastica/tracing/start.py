@@ -42,19 +42,19 @@ class DriveStart(NamedTuple):
     stopped: tuple[str, PathStop] | None  # what could not be applied, and how the way to it ended
 
 
-def find_start(network: Discretisation, control: Control) -> DriveStart:
+def find_start(mesh: Discretisation, control: Control) -> DriveStart:
     """Return the equilibrium under what is constant, on a stable branch if there is one.
 
     Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
     applied: of several stable states it is the one to which this way leads.
     """
-    problem = NetworkProblem(network, next_correction=next_correction(control))
+    problem = NetworkProblem(mesh, next_correction=next_correction(control))
     events: list[Event] = []
     branch: PathBranch | None = None
     first: Buckling | None = None
-    ramps = list(_ramps(network))
-    at_rest = NetworkProblem(_without_loads(network), ramp=True) if ramps else problem
-    at = correct(at_rest, np.zeros(len(network.free)), 0.0)
+    ramps = list(_ramps(mesh))
+    at_rest = NetworkProblem(_without_loads(mesh), ramp=True) if ramps else problem
+    at = correct(at_rest, np.zeros(len(mesh.free)), 0.0)
     if at is None:
         return DriveStart(problem, None, (), None, None, None)
     for what, ramp in ramps:
@@ -90,30 +90,30 @@ def next_correction(control: Control) -> float:
     return min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance)
 
 
-def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
+def _ramps(mesh: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
     """Yield what is constant, in the order in which it is applied, with the problem along the share of it."""
-    springs = [spring.item for spring in network.springs]
+    springs = [spring.item for spring in mesh.springs]
     tight = any(getattr(item, name, None) for item in springs for name in FREE)
-    if tight or network.elements.gap.any():
-        yield "prestress", NetworkProblem(_without_loads(network), ramp=True)
-    if any(not load.grows for load in network.loads) or network.elements.line[:, 0].any() or network.base.any():
-        yield "constant loads", NetworkProblem(_loads_as_drive(network))
+    if tight or mesh.elements.gap.any():
+        yield "prestress", NetworkProblem(_without_loads(mesh), ramp=True)
+    if any(not load.grows for load in mesh.loads) or mesh.elements.line[:, 0].any() or mesh.base.any():
+        yield "constant loads", NetworkProblem(_loads_as_drive(mesh))
 
 
-def _without_loads(network: Discretisation) -> Discretisation:
+def _without_loads(mesh: Discretisation) -> Discretisation:
     """Return the network with its supports at rest and no loads."""
-    elements = network.elements._replace(line=np.zeros_like(network.elements.line))
-    return replace(network, loads=(), elements=elements, base=np.zeros(network.size), rate=np.zeros(network.size))
+    elements = mesh.elements._replace(line=np.zeros_like(mesh.elements.line))
+    return replace(mesh, loads=(), elements=elements, base=np.zeros(mesh.size), rate=np.zeros(mesh.size))
 
 
-def _loads_as_drive(network: Discretisation) -> Discretisation:
+def _loads_as_drive(mesh: Discretisation) -> Discretisation:
     """Return the network with constant loads and displacements of supports as what grows with the drive."""
-    line = network.elements.line
+    line = mesh.elements.line
     grown = np.stack([np.zeros_like(line[:, 0]), line[:, 0]], axis=1)
-    loads = tuple(load._replace(grows=True) for load in network.loads if not load.grows)
+    loads = tuple(load._replace(grows=True) for load in mesh.loads if not load.grows)
     return replace(
-        network, loads=loads, elements=network.elements._replace(line=grown), scales=network.scales._replace(drive=1.0),
-        rate=network.base, base=np.zeros(network.size),
+        mesh, loads=loads, elements=mesh.elements._replace(line=grown), scales=mesh.scales._replace(drive=1.0),
+        rate=mesh.base, base=np.zeros(mesh.size),
     )  # fmt: skip
 
 
@@ -122,7 +122,7 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
 
     Left in, nearly rigid networks of thin straight beams have errors of 1e-5 and more.
     """
-    network = problem.network
+    network = problem.mesh
     elements = np.flatnonzero(network.floored)
     if not elements.size:
         return problem, at
@@ -140,14 +140,14 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     needless = elements[share < FLOOR_SHARE]
     if not needless.size:
         return problem, at
-    stiff = replace(problem, network=without_floor(network, needless))
+    stiff = replace(problem, mesh=without_floor(network, needless))
     return stiff, correct(stiff, at.x, at.drive) or at
 
 
-def is_stretched(network: Discretisation, z: np.ndarray) -> bool:
+def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
     """Return True if a beam that does not stretch was stretched through its floor at any of k states, (k, size)."""
-    elements = np.flatnonzero(network.floored)
+    elements = np.flatnonzero(mesh.floored)
     if not elements.size or not len(z):
         return False
-    force = np.abs(z[:, network.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
-    return bool((force * network.elements.axial[elements].max(axis=1) > FLOOR_STRAIN).any())
+    force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
+    return bool((force * mesh.elements.axial[elements].max(axis=1) > FLOOR_STRAIN).any())

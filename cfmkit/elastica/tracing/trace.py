@@ -72,7 +72,7 @@ class TraceAttempt(NamedTuple):
     """A path on one discretisation."""
 
     path: Path
-    mesh: DegreeAndPieces
+    resolution: DegreeAndPieces
     start: DriveStart
     first: Buckling | None  # first loss of stability
     events: tuple[PathEvent, ...]  # along the drive
@@ -105,14 +105,13 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
         return replace(path, imperfection=name, branch=read_only(branch, np.str_))
     attempt = _reach_tolerance(network, drive, control)
     path, tolerance = attempt.path, control.tolerance
-    if is_stretched(path.network, path.at.z):
-        nothing = trace_on(network, drive, control, attempt.mesh, limit=0).path
+    if is_stretched(path.mesh, path.at.z):
+        nothing = trace_on(network, drive, control, attempt.resolution, limit=0).path
         return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID)
     if path.error <= tolerance or not len(path):
         return path
     accurate = (
-        point_errors(path, raise_degree(path.network, path.network.degree + DEGREES_MORE), range(len(path)))
-        <= tolerance
+        point_errors(path, raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE), range(len(path))) <= tolerance
     )
     text = f"the tolerance of {tolerance:.3g} was not reached: error {path.error:.3g}, "
     text += f"{(~accurate).sum()} of {len(path)} points"
@@ -126,24 +125,24 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceAttempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
-    mesh, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
+    resolution, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
     attempt: TraceAttempt | None = None  # raised from the one before
     fits: BeamFits | None = None
     for count in range(MAX_ROUNDS):
-        attempt = attempt or trace_on(network, drive, control, mesh, fits=fits)
-        fits = attempt.path.network.fits
+        attempt = attempt or trace_on(network, drive, control, resolution, fits=fits)
+        fits = attempt.path.mesh.fits
         path = attempt.path
-        if is_stretched(path.network, path.at.z):
+        if is_stretched(path.mesh, path.at.z):
             return attempt
-        taut = _tension(path, mesh.tension or {})
+        taut = _tension(path, resolution.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
             degree = max(_plain_degree(tolerance), DEGREE_OF_LAYERS)
-            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=degree)
+            resolution = replace(resolution, tension={**(resolution.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
         finer = _finer(path)
         attempt = _with_error(attempt, finer)
-        raised = mesh.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
+        raised = resolution.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
         if tolerance < attempt.path.error < NEARLY * tolerance and not raised:
             attempt = _with_error(attempt._replace(path=polish(path)), finer)
         path = attempt.path
@@ -157,11 +156,11 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
         if before is not None and _end_alike(path, before):
             break
         before = path
-        if mesh.degree < MAX_DEGREE:
-            mesh = replace(mesh, degree=_next_degree(path, tolerance))
-            attempt = raise_attempt(attempt, mesh, control)
-        elif mesh.pieces < MAX_PIECES:
-            mesh, attempt = replace(mesh, pieces=2 * mesh.pieces, degree=DEGREE_OF_PIECES), None
+        if resolution.degree < MAX_DEGREE:
+            resolution = replace(resolution, degree=_next_degree(path, tolerance))
+            attempt = raise_attempt(attempt, resolution, control)
+        elif resolution.pieces < MAX_PIECES:
+            resolution, attempt = replace(resolution, pieces=2 * resolution.pieces, degree=DEGREE_OF_PIECES), None
         else:
             break
     assert best is not None
@@ -184,7 +183,7 @@ def _next_degree(path: Path, tolerance: float) -> int:
 
     The error of forces falls as the square of the last coefficients of the rotation.
     """
-    degree, e = path.network.degree, path.network.elements
+    degree, e = path.mesh.degree, path.mesh.elements
     last = np.abs(path.at.z[:, e.unknowns[:, -6:-2]]).max(axis=(0, 1)) if len(path) else np.ones(4)
     fall = float(np.sqrt(last[2:].max() / max(last[:2].max(), 1e-300)))  # from one degree to the next
     if not (np.isfinite(path.error) and 0 < fall < 1):
@@ -193,7 +192,7 @@ def _next_degree(path: Path, tolerance: float) -> int:
     return int(min(MAX_DEGREE, degree + np.clip(2 * np.ceil(0.5 * more), 2, 8)))
 
 
-def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control) -> TraceAttempt | None:
+def raise_attempt(attempt: TraceAttempt, resolution: DegreeAndPieces, control: Control) -> TraceAttempt | None:
     """Return a path with a higher degree, its points and events found from what they were.
 
     None if it is another path then.
@@ -201,9 +200,9 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
     path, start = attempt.path, attempt.start
     if not _can_be_raised(attempt):
         return None
-    fine = raise_degree(path.network, mesh.degree)
-    problem = replace(start.problem, network=fine)
-    z = embed(path.network, fine, path.at.z)
+    fine = raise_degree(path.mesh, resolution.degree)
+    problem = replace(start.problem, mesh=fine)
+    z = embed(path.mesh, fine, path.at.z)
     guess = z[:, fine.free]
     solved = problem.equations.solve_each(guess, path.at.drive)
     moved = np.abs(solved.free - guess)[:, problem.motions].max(initial=0.0)
@@ -218,12 +217,12 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
         branch if branch is None else branch._replace(drive=moved_to.get(branch.drive, branch.drive))
         for branch in attempt.branches
     )
-    unit = path.network.scales.drive
+    unit = path.mesh.scales.drive
     told = tuple(_tell(replace(event, drive=drive), unit) for event, drive in zip(attempt.events, drives, strict=True))
     raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=told)
-    lifted = tuple(_lift(event, drive, path.network, fine) for event, drive in zip(attempt.events, drives, strict=True))
+    lifted = tuple(_lift(event, drive, path.mesh, fine) for event, drive in zip(attempt.events, drives, strict=True))
     started = start._replace(problem=problem)
-    return attempt._replace(path=raised, mesh=mesh, start=started, branches=branches, events=lifted)
+    return attempt._replace(path=raised, resolution=resolution, start=started, branches=branches, events=lifted)
 
 
 def _can_be_raised(attempt: TraceAttempt) -> bool:
@@ -233,10 +232,10 @@ def _can_be_raised(attempt: TraceAttempt) -> bool:
 
 
 def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
-    """Return the drives of the events of a path on a finer mesh, None if one of them is not there."""
-    path, fine = attempt.path, problem.network
-    span = _span(path) / path.network.scales.drive
-    lift = partial(_lift_free, path.network, fine)
+    """Return the drives of the events of a path on a finer resolution, None if one of them is not there."""
+    path, fine = attempt.path, problem.mesh
+    span = _span(path) / path.mesh.scales.drive
+    lift = partial(_lift_free, path.mesh, fine)
     drives = []
     for event in attempt.events:
         drive = relocate(problem, event, lift, span)
@@ -246,17 +245,17 @@ def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | N
     return drives
 
 
-def _lift_free(network: Discretisation, fine: Discretisation, x: FloatArray) -> FloatArray:
-    z = np.zeros(network.size)
-    z[network.free] = x
-    return np.asarray(embed(network, fine, z)[fine.free])
+def _lift_free(mesh: Discretisation, fine: Discretisation, x: FloatArray) -> FloatArray:
+    z = np.zeros(mesh.size)
+    z[mesh.free] = x
+    return np.asarray(embed(mesh, fine, z)[fine.free])
 
 
-def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discretisation) -> PathEvent:
+def _lift(event: PathEvent, drive: float, mesh: Discretisation, fine: Discretisation) -> PathEvent:
     def lift(at: PathEquilibrium | None) -> Any:
         if at is None:
             return None
-        return at._replace(x=_lift_free(network, fine, at.x), rate=_lift_free(network, fine, at.rate))
+        return at._replace(x=_lift_free(mesh, fine, at.x), rate=_lift_free(mesh, fine, at.rate))
 
     within = None if event.within is None else (lift(event.within[0]), lift(event.within[1]))
     return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
@@ -264,11 +263,11 @@ def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discret
 
 def _finer(path: Path) -> Discretisation:
     """Return the arrays by which errors are estimated."""
-    return raise_degree(path.network, path.network.degree + DEGREES_MORE)
+    return raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE)
 
 
 def _with_error(attempt: TraceAttempt, finer: Discretisation) -> TraceAttempt:
-    path, unit = attempt.path, attempt.path.network.scales.drive
+    path, unit = attempt.path, attempt.path.mesh.scales.drive
     errors = point_errors(path, finer, pick_points(path, [event.drive * unit for event in attempt.events]))
     told = replace(path, error=float(errors.max(initial=0.0)))
     vars(told)["effort"] = path.effort  # is known
@@ -293,13 +292,13 @@ def trace_on(
     network: Network,
     drive: Drive,
     control: Control,
-    mesh: DegreeAndPieces,
+    resolution: DegreeAndPieces,
     first_only: bool = False,
     limit: int | None = None,
     fits: BeamFits | None = None,
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
-    arrays = mesh.arrays(network, drive, fits)
+    arrays = resolution.arrays(network, drive, fits)
     start = find_start(arrays, control)
     events, first, points = list[PathEvent](), start.first, list[Point]()
     ending = PathStop(WhyStopped.LOST, 0.0)
@@ -324,7 +323,7 @@ def trace_on(
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _without_locked_points(_path(network, drive, start, points, told, status, message))
     branches = tuple(point.branch for point in points[: len(path)])
-    return TraceAttempt(path, mesh, start, first, tuple(events), branches)
+    return TraceAttempt(path, resolution, start, first, tuple(events), branches)
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
@@ -341,7 +340,7 @@ def _path(
     network: Network, drive: Drive, start: DriveStart, points: list[Point], events: tuple[Event, ...],
     status: PathStatus, message: str,
 ) -> Path:  # fmt: skip
-    arrays = start.problem.network
+    arrays = start.problem.mesh
     drives = np.array([point.at.drive for point in points])
     z: Any = arrays.base + drives[:, None] * arrays.rate
     z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
@@ -414,10 +413,10 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
     if not attempt.events or not (folds or control.branch == "primary"):
         return True
     limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
-    drives = _relocate(attempt, replace(attempt.start.problem, network=finer))
+    drives = _relocate(attempt, replace(attempt.start.problem, mesh=finer))
     if drives is not None:
         places = np.array([event.drive for event in attempt.events])
-        return bool(np.abs(places - drives).max() * path.network.scales.drive <= limit)
+        return bool(np.abs(places - drives).max() * path.mesh.scales.drive <= limit)
     if before is None or len(before.events) != len(path.events):
         return False
     shifts = [abs(one.drive - other.drive) for one, other in zip(path.events, before.events, strict=True)]
@@ -425,7 +424,7 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
 
 
 def _span(path: Path) -> float:
-    return _range(path.given)
+    return _range(path.load_case)
 
 
 def _range(drive: Drive) -> float:
@@ -435,7 +434,7 @@ def _range(drive: Drive) -> float:
 
 def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
-    e, found = path.network.elements, dict[str, float]()
+    e, found = path.mesh.elements, dict[str, float]()
     if not len(path):
         return {}
     whole = _tautness(path)
@@ -448,7 +447,7 @@ def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
 
 def _tautness(path: Path) -> FloatArray:
     """Return L sqrt(N/EI) at every point with the length of an element's beam, (n, e)."""
-    e = path.network.elements
+    e = path.mesh.elements
     force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=1) * e.length
     lengths = {beam: e.length[[other == beam for other in e.beam]].sum() for beam in set(e.beam)}
@@ -457,7 +456,7 @@ def _tautness(path: Path) -> FloatArray:
 
 def _without_locked_points(path: Path) -> Path:
     """Return a path that ends early up to where a beam that does not stretch is pulled straight: there forces soar."""
-    rigid = ~path.network.elements.axial.any(axis=1)
+    rigid = ~path.mesh.elements.axial.any(axis=1)
     if path.status is PathStatus.COMPLETE or not len(path) or not rigid.any():
         return path
     locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)

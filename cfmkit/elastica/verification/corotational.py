@@ -74,10 +74,10 @@ def recheck(path: Path, points: Any = None, elements: int = 48) -> Recheck:
     cfmkit.errors.InputError
         If the network has pins, springs or loads, or is driven by a load.
     """
-    net = path.net
+    net = path.network
     joints = {joint for beam in net.beams.values() for joint in (beam.start_joint, beam.end_joint)}
     pinned = "pin" in joints or not all(link.turns for link in net.links)
-    if isinstance(path.given, Loading) or pinned or net.springs or net.loads or path.given.loads:
+    if isinstance(path.load_case, Loading) or pinned or net.springs or net.loads or path.load_case.loads:
         raise InputError("the check by elements is for beams, links and supports under a displacement or rotation only")
     chosen = path.at_requested if points is None else np.asarray(points)
     meshes = [_Elements(path, elements, split) for split in (1, 2)]
@@ -104,9 +104,9 @@ class _Elements:
 
     def __init__(self, path: Path, count: int, split: int) -> None:
         """Cut the beams at corners, stations and evenly between, and every element into `split`."""
-        self.path, self.net, self.fits, self.split = path, path.net, path.fits, split
+        self.path, self.network, self.fits, self.split = path, path.network, path.fits, split
         total = sum(float(np.real(fit.length)) for fit in self.fits.values())
-        self.first = {name: 3 * k for k, name in enumerate(path.network.bodies)}
+        self.first = {name: 3 * k for k, name in enumerate(path.mesh.bodies)}
         self.size = 3 * len(self.first)
         dofs: list[tuple[int, int]] = []
         arms: list[tuple[Any, Any]] = []
@@ -130,7 +130,7 @@ class _Elements:
 
     def _marks(self, name: str, longest: float) -> list[float]:
         """Return the parameters of a beam's nodes."""
-        fit, section = self.fits[name], self.net.beams[name].section
+        fit, section = self.fits[name], self.network.beams[name].section
         stations = [fit.parameter(float(u)) for u in section.stations[1:-1]]
         breaks = np.unique(np.round(np.concatenate([fit.course.breaks, stations]), 13))
         marks = [0.0]
@@ -142,17 +142,17 @@ class _Elements:
 
     def _end(self, name: str, side: int) -> tuple[int, FloatArray]:
         """Return the first degree of freedom of the node that moves a beam's end, and the arm between them."""
-        beam = self.net.beams[name]
-        master = self.net.master_of((beam.start, beam.end)[side])
-        (x, y), node = beam_end_at(self.net, name, side), self.net.nodes[master]
+        beam = self.network.beams[name]
+        master = self.network.master_of((beam.start, beam.end)[side])
+        (x, y), node = beam_end_at(self.network, name, side), self.network.nodes[master]
         return self.first[master], np.array([x - node.x, y - node.y], dtype=float)
 
     def _sections(self, places: list[tuple[int, float, float]]) -> None:
         """Set reference chords, rigidities at mid-length and thicknesses at the ends of the elements."""
-        names = list(self.net.beams)
+        names = list(self.network.beams)
         rows = []
         for number, a, b in places:
-            fit, section = self.fits[names[number]], self.net.beams[names[number]].section
+            fit, section = self.fits[names[number]], self.network.beams[names[number]].section
             t, weight = 0.5 * (a + b) + 0.5 * (b - a) * _GAUSS[0], 0.5 * (b - a) * _GAUSS[1]
             middle = 0.5 * (a + b)
             run, angle = np.real(fit.speed(t, middle)) * weight, np.real(fit.angle(t, middle))
@@ -263,7 +263,7 @@ class _Elements:
         turn, free = lil_array((self.size, self.size)), np.ones(self.size, dtype=bool)
         driven = 0, 0.0
         turn.setdiag(1.0)
-        arrays = self.path.network
+        arrays = self.path.mesh
         for name, unknowns in arrays.bodies.items():
             first, (c, s) = self.first[name], arrays.attachments.frame[arrays.nodes[name]]
             turn[first : first + 2, first : first + 2] = np.array([[c, -s], [s, c]])
@@ -278,13 +278,13 @@ class _Elements:
         u = np.zeros(self.size)
         for name, first in self.first.items():
             u[first : first + 3] = path.motion(name)[index]
-        names, at, share = list(self.net.beams), path.take(np.array([index])).at, np.linspace(0.0, 1.0, N_PLACES)
+        names, at, share = list(self.network.beams), path.take(np.array([index])).at, np.linspace(0.0, 1.0, N_PLACES)
         moved = {}
         for number in {beam for beam, _ in self.inner}:
-            name, cuts = names[number], path.network.elements.cuts
-            own = beam_states.elements_of(path.network, name)
-            now = beam_states.states(self.net, at, name, share)
-            rest = beam_states.unloaded(self.net, at, name, share)
+            name, cuts = names[number], path.mesh.elements.cuts
+            own = beam_states.elements_of(path.mesh, name)
+            now = beam_states.states(self.network, at, name, share)
+            rest = beam_states.unloaded(self.network, at, name, share)
             known = np.concatenate([cuts[k, 0] + (cuts[k, 1] - cuts[k, 0]) * share for k in own])
             moved[number] = known, (now.x[0] - rest[:, 0], now.y[0] - rest[:, 1], now.turn[0])
         first = 3 * len(self.first)

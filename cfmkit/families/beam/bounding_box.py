@@ -67,7 +67,7 @@ def _bent(solution: Solution) -> list[tuple[FloatArray, float]]:
     That is half its largest thickness; all in m.
     """
     chosen = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))
-    halves = {name: 0.5 * thickest_of(beam.section) for name, beam in solution.path.net.beams.items()}
+    halves = {name: 0.5 * thickest_of(beam.section) for name, beam in solution.path.network.beams.items()}
     poses = [int(solution.keep[one]) for one in chosen]
     lines = [(solution.path.shape(name, pose), half) for pose in poses for name, half in halves.items()]
     axis = mirror_axis(solution.assembly)

@@ -167,7 +167,7 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     """Mark where the stress is largest, on the unbent beam: there a reader finds the place on the part."""
     name, share = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
     path = solution.path
-    found = np.concatenate([strip.points for strip in strips(path.net, path.fits, name)])
+    found = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(found, axis=0).T))])
     x, y = (float(np.interp(share * way[-1], way, found[:, k])) for k in (0, 1))
     ax.plot(*parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE, zorder=5, gid="peak")
@@ -177,20 +177,20 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
 def _names(solution: Solution) -> list[Label]:
     """Return the names of the beams as cut."""
     path, found = solution.path, []
-    for name in list(path.net.beams)[: 2 * MOST_BEAMS]:
-        points = np.concatenate([strip.points for strip in strips(path.net, path.fits, name)])
+    for name in list(path.network.beams)[: 2 * MOST_BEAMS]:
+        points = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
         found.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), INK))
     return found
 
 
 def _lines(solution: Solution, point: int) -> list[FloatArray]:
     """Return the bent centre lines at a point of the path, those of a mirrored half included [m]."""
-    return _both(solution, [bent(solution.path, name, point) for name in solution.path.net.beams])
+    return _both(solution, [bent(solution.path, name, point) for name in solution.path.network.beams])
 
 
 def _plates(solution: Solution) -> list[FloatArray]:
     path = solution.path
-    found = [strip.polygon for name in path.net.beams for strip in strips(path.net, path.fits, name)]
+    found = [strip.polygon for name in path.network.beams for strip in strips(path.network, path.fits, name)]
     return _both(solution, found)
 
 
@@ -216,7 +216,7 @@ def _box(outlines: list[FloatArray]) -> tuple[float, float, float, float]:
 def _supports(solution: Solution, ax: Axes) -> None:
     """Mark the nodes by their support: squares where the rotation is held, else circles; hollow where they slide."""
     axis = mirror_axis(solution.assembly)
-    for name, node in solution.path.net.nodes.items():
+    for name, node in solution.path.network.nodes.items():
         support = node.support
         if not (support.along or support.across or support.rotation) and name != solution.assembly.driven:
             continue
@@ -236,7 +236,7 @@ def reactions(result: Result) -> Figure:
     names = ("to the right", "upwards") if turned else ("against the drive", "across")
     angle = np.pi if turned else solution.assembly.direction
     c, s = np.cos(angle), np.sin(angle)
-    forces = {name: solution.beam_force(name) for name in solution.path.net.beams}
+    forces = {name: solution.beam_force(name) for name in solution.path.network.beams}
     # against the drive: what holds the load counts as positive
     along = {name: -(force[:, 0] * c + force[:, 1] * s) for name, force in forces.items()}
     across = {name: (force[:, 1] * c - force[:, 0] * s) * (-1 if turned else 1) for name, force in forces.items()}
@@ -356,14 +356,14 @@ _NEAR = 1e-9  # of the size: parts shorter than this are not there
 
 def bent(path: Path, beam: str, point: int) -> FloatArray:
     """Return the centre line of a beam at a point of the path, (n, 2) [m]."""
-    found = states(path.net, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _PLACES))
+    found = states(path.network, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _PLACES))
     line = np.stack([found.x[0], found.y[0]], axis=-1)
     return np.asarray(line[np.append(True, np.diff(found.place) > 0)])
 
 
 def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:
     """Return links and the arms beside nodes as lines (2, 2) [m], at a point of the path or before any load."""
-    network = path.net
+    network = path.network
     found = [np.array([place(path, one.master, point), place(path, one.node, point)]) for one in network.links]
     for beam in network.beams.values():
         for node, arm in ((beam.start, beam.start_offset), (beam.end, beam.end_offset)):
@@ -371,13 +371,13 @@ def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:
             angle = 0.0 if point is None else float(path.motion(node)[point, 2])
             turned = complex(*map(float, np.real(arm))) * np.exp(1j * angle)
             found.append(np.array([at, at + np.array([turned.real, turned.imag])]))
-    return [line for line in found if np.hypot(*(line[1] - line[0])) > _NEAR * path.network.scales.length]
+    return [line for line in found if np.hypot(*(line[1] - line[0])) > _NEAR * path.mesh.scales.length]
 
 
 def spring_lines(path: Path) -> list[FloatArray]:
     """Return the springs between two places as lines (2, 2) [m], before any load."""
     found = []
-    for spring in path.net.springs:
+    for spring in path.network.springs:
         if isinstance(spring, LineSpring):
             ground = np.array([float(np.real(x)) for x in spring.ground])
             other = ground if spring.end is None else place(path, spring.end, None)
@@ -387,5 +387,5 @@ def spring_lines(path: Path) -> list[FloatArray]:
 
 def place(path: Path, node: str, point: int | None) -> FloatArray:
     """Return where a node is at a point of the path, or before any load [m]."""
-    at = np.real([path.net.nodes[node].x, path.net.nodes[node].y])
+    at = np.real([path.network.nodes[node].x, path.network.nodes[node].y])
     return at if point is None else at + path.motion(node)[point, :2]

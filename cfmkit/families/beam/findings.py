@@ -170,7 +170,7 @@ def _over_determined(solution: Solution) -> list[str]:
 
     They are what the null vectors of the tangent have, where these move nothing.
     """
-    arrays = discretise(solution.path.net, solution.path.given)
+    arrays = discretise(solution.path.network, solution.path.load_case)
     arrays = without_floor(arrays, np.flatnonzero(arrays.floored))
     tangent = equations(arrays).linearise(np.zeros(len(arrays.free)), 0.0).tangent
     _, sizes, rows = np.linalg.svd(tangent)
@@ -233,7 +233,7 @@ def _closure(solution: Solution) -> Iterator[Finding]:
         guided = [one.split(" ")[0] for one in moved if nodes[one.split(" ")[0]].support in ("guided", "roller")]
         if guided:
             yield finding("closure_adjusted", f"the guides of moved nodes were moved with them: {', '.join(guided)}")
-    beams = solution.path.net.beams
+    beams = solution.path.network.beams
     fits = {
         name: one
         for name, one in solution.path.fits.items()
@@ -267,10 +267,10 @@ def _moved(solution: Solution) -> list[str]:
     """Return the nodes that the closure "chain" moved, each with how far."""
     if solution.spec.mechanism.closure != "chain":
         return []
-    network, found = solution.path.net, []
+    network, found = solution.path.network, []
     for name, node in solution.spec.mechanism.nodes.items():
         way = float(np.hypot(*(np.real([network.nodes[name].x, network.nodes[name].y]) - node.at)))
-        if way > NEGLIGIBLE * solution.path.network.scales.length:
+        if way > NEGLIGIBLE * solution.path.mesh.scales.length:
             found.append(f"{name} by {format_short(way, 'length')}")
     return found
 
@@ -350,7 +350,7 @@ def _imperfection(solution: Solution) -> Iterator[Finding]:
 def _stress(solution: Solution) -> Iterator[Finding]:
     """Say where the stress in the window is too large, between points, too; of the beams whose strength is known."""
     known = known_allowable_stresses(solution.spec)
-    beams = list(solution.path.net.beams)
+    beams = list(solution.path.network.beams)
     names = [name for name in beams if name.split(".")[0] in known]
     if not names or len(solution.keep) < 2:
         return
@@ -377,7 +377,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
 
 
 def _slenderness(solution: Solution) -> Iterator[Finding]:
-    beams, fits = solution.path.net.beams, solution.path.fits
+    beams, fits = solution.path.network.beams, solution.path.fits
     for name, beam in beams.items():
         thickest = thickest_of(beam.section)
         length = float(np.real(fits[name].length))
@@ -422,7 +422,7 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
         )
     made = (part.process and part.process.thinnest) or 0.0
     made = max(made, part.min_feature)
-    for name, beam in solution.path.net.beams.items():
+    for name, beam in solution.path.network.beams.items():
         thinnest = thinnest_of(beam.section)
         if thinnest < made * (1 - NEGLIGIBLE):
             yield finding(

@@ -88,7 +88,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
         slopes = gradient(path, build, np.array([spec.at(one) for one in known]), at)
         axial = spec.stress == "total"
         stress, by_stress = [], []
-        for name in path.net.beams:
+        for name in path.network.beams:
             extremes = path.stress_extremes(name, axial).value[at].reshape(len(at), 4)
             worst = np.abs(extremes).argmax(axis=1)
             pick = np.arange(len(at)), worst

@@ -187,7 +187,7 @@ def _curve(solution: Solution) -> Curve:
         "stress_place": Column(solution.stress_at[1], "ratio"),
         "path": Column(_branches(solution), "text"),
     }
-    for name in path.net.beams:
+    for name in path.network.beams:
         x, y, moment = solution.beam_force(name).T
         extra |= {
             f"{name}_force_x": Column(x, "force"),

@@ -302,7 +302,7 @@ def _swept(assembly: Assembly, places: tuple[HeldPlace, ...]) -> Any:
     points = [int(solution.keep[one]) for one in chosen] if len(solution.keep) else []
     rest = list(itertools.chain.from_iterable(_strips(assembly).values()))
     lines = [one.points for one in rest]
-    lines += [path.shape(name, point) for point in points for name in path.net.beams]
+    lines += [path.shape(name, point) for point in points for name in path.network.beams]
     shapes = []
     for place in places:
         motion = path.motion(place.node)

@@ -206,8 +206,8 @@ def strict_start(x: FloatArray, force: FloatArray, end: float, band: float = BAN
 
 def _closure(solution: Solution) -> dict[str, float | None]:
     fits = solution.path.fits
-    own = [name for name, beam in solution.path.net.beams.items() if getattr(beam.shape, "length", None)]
-    beams = solution.path.net.beams
+    own = [name for name, beam in solution.path.network.beams.items() if getattr(beam.shape, "length", None)]
+    beams = solution.path.network.beams
     return {
         "closure_rotation_max": max((abs(float(np.real(fits[name].rotation))) for name in own), default=0.0),
         "closure_scale_max": max((abs(float(np.real(fits[name].scale)) - 1) for name in own), default=0.0),

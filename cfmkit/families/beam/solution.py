@@ -145,7 +145,7 @@ class Solution(ShortRepr):
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         """Of each beam, the largest stress [Pa] and its place, at every point of the curve."""
         axial, keep = self.spec.stress == "total", self.keep
-        rows = zip(self.path.net.beams, *self.path.beam_stresses(axial), strict=True)
+        rows = zip(self.path.network.beams, *self.path.beam_stresses(axial), strict=True)
         return Named({name: Several((value[keep], place[keep])) for name, value, place in rows})
 
     @cached_property
@@ -215,7 +215,7 @@ class Solution(ShortRepr):
         return found[0], moving
 
     def _gap(self, point: int) -> BeamGap | None:
-        network = self.path.net
+        network = self.path.network
         lines = {name: self.path.shape(name, point) for name in network.beams}
         halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}
         axis = mirror_axis(self.assembly)

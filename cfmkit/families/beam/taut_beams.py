@@ -34,7 +34,7 @@ def taut_beams(path: Path, last: int) -> list[str]:
 
 def _pulled(path: Path, last: int) -> Iterator[str]:
     """Yield the beams that are straight and pulled hard."""
-    for name, beam in path.net.beams.items():
+    for name, beam in path.network.beams.items():
         line = path.shape(name, last)
         chord = line[-1] - line[0]
         way, length = float(np.hypot(*chord)), float(np.real(path.fits[name].length))
@@ -48,7 +48,7 @@ def _pulled(path: Path, last: int) -> Iterator[str]:
 
 def _in_line(path: Path, last: int) -> Iterator[str]:
     """Yield the supports that the driven node has moved away from by nearly the whole way along the beams."""
-    network, drive = path.net, path.given
+    network, drive = path.network, path.load_case
     if not isinstance(drive, Displacement):
         return
     lengths = {
@@ -69,7 +69,7 @@ def _apart(path: Path, one: str, other: str, point: int) -> float:
     """Return how far two nodes are apart at a point of a path [m]."""
     places = [
         np.array([node.x, node.y]) + path.motion(name)[point, :2]
-        for name, node in ((name, path.net.nodes[name]) for name in (one, other))
+        for name, node in ((name, path.network.nodes[name]) for name in (one, other))
     ]
     return math.hypot(*(places[1] - places[0]))
 

@@ -153,7 +153,7 @@ class Response:
     @cached_property
     def _beams_by_cuts(self) -> list[dict[str, list[int]]]:
         """Elements of each beam; those that are cut into as many elements together."""
-        network = self.path.network
+        network = self.path.mesh
         elements = {name: beam_states.elements_of(network, name) for name in network.fits}
         counts = sorted({len(own) for own in elements.values()})
         return [{name: own for name, own in elements.items() if len(own) == count} for count in counts]
@@ -168,13 +168,13 @@ class Response:
             for k, name in enumerate(alike):
                 own = slice(k * width, (k + 1) * width)
                 columns[name] = type(together)(*(part[..., own] for part in together))
-        return {name: columns[name] for name in self.path.net.beams}
+        return {name: columns[name] for name in self.path.network.beams}
 
     @cached_property
     def states(self) -> dict[str, beam_states.BeamStates]:
         """States at all rows of every beam at the poses."""
         path = self.path.take(self.keep)
-        return self._compute_along_beams(partial(beam_states.states_of_elements, path.net, path.at))
+        return self._compute_along_beams(partial(beam_states.states_of_elements, path.network, path.at))
 
     @cached_property
     def state(self) -> NetworkAtPoses:
@@ -182,7 +182,7 @@ class Response:
         lines = {}
         for name, at in self.rows.items():
             states = self.states[name]
-            sections = beam_states.sections(self.path.net, name, states)
+            sections = beam_states.sections(self.path.network, name, states)
             pull = sections.axial_stress[:, at.row] if self.variables.task.total_stress else None
             bending = sections.bending_stress[:, at.row]
             lines[name] = BeamAtPoses(at.place, states.x[:, at.row], states.y[:, at.row], bending, pull)

@@ -158,7 +158,7 @@ def _unloaded_samples(path: Path) -> FloatArray:
 
     The strip passes a kink on a chord, and a little off the crank pin: motions are those of its own points.
     """
-    line = np.asarray(path.net.beams[STRIP].shape.points)  # type: ignore[union-attr]
+    line = np.asarray(path.network.beams[STRIP].shape.points)  # type: ignore[union-attr]
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     place = path.places(STRIP) * marks[-1]
     return np.column_stack([np.interp(place, marks, line[:, 0]), np.interp(place, marks, line[:, 1])])

@@ -279,7 +279,7 @@ def _from_its_limit(path: Path, missing: FloatArray) -> Path:
 
 def _followed_back(path: Path) -> list[MarchState]:
     """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
-    own, y, drive = equations(path.network), path.free[0], float(path.at.drive[0])
+    own, y, drive = equations(path.mesh), path.free[0], float(path.at.drive[0])
     beside = own.solve(y, drive * (1.0 + BESIDE))  # tells the slope
     if beside is None:
         return []
@@ -343,7 +343,7 @@ def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
 
 def _line(path: Path, index: int) -> FloatArray:
     """Return the line of a chain from its anchor to its slider, (n, 2) [m]."""
-    shapes = [path.shape(name, index) for name in path.net.beams]
+    shapes = [path.shape(name, index) for name in path.network.beams]
     line: FloatArray = np.concatenate(shapes)
     return line
 

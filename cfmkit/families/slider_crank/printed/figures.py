@@ -132,10 +132,10 @@ def _shapes_in_box(
 def _shapes(solution: Solution, index: int) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield centre lines and half thicknesses from the ground to the slider at one point of the path [m]."""
     path = solution.pressed.path
-    names, last = list(path.net.beams), None
+    names, last = list(path.network.beams), None
     for name in names:
         points = path.shape(name, index)
-        thickness = path.net.beams[name].section.thickness
+        thickness = path.network.beams[name].section.thickness
         place = path.places(name)
         if isinstance(thickness, float):
             half = np.full(len(points), 0.5 * thickness)
@@ -161,7 +161,7 @@ def _body(ax: Axes, points: FloatArray, half: FloatArray, solid: bool) -> None:
 
 def _place(solution: Solution, shape: list[tuple[FloatArray, FloatArray]], along: float) -> FloatArray:
     """Return the point of a drawn shape at a length along the unloaded part [m]."""
-    names = list(solution.pressed.path.net.beams)
+    names = list(solution.pressed.path.network.beams)
     if names == [STRIP]:
         points = shape[0][0]
         return np.asarray(points[round(along / _length(solution.chain.points) * (len(points) - 1))])

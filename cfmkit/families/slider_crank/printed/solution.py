@@ -227,7 +227,7 @@ class Solution(ShortRepr):
         """Return places on beams as lengths along the chain [m]."""
         points = self.chain.points
         marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        names = list(self.pressed.path.net.beams)
+        names = list(self.pressed.path.network.beams)
         if names == [STRIP]:
             return np.asarray(shares * marks[-1])
         first = {name: (marks[2 * k], marks[2 * k + 1]) for k, name in enumerate(names)}
@@ -275,7 +275,7 @@ class Solution(ShortRepr):
     def width_ratio(self) -> float:
         """Smallest width over thickness."""
         ratios = []
-        for beam in self.pressed.path.net.beams.values():
+        for beam in self.pressed.path.network.beams.values():
             section = beam.section
             thickest = float(
                 np.max(section.thickness if isinstance(section.thickness, float) else section.thickness.values)
@@ -287,7 +287,7 @@ class Solution(ShortRepr):
     def thinnest(self) -> float:
         """Smallest thickness [m]."""
         values = []
-        for beam in self.pressed.path.net.beams.values():
+        for beam in self.pressed.path.network.beams.values():
             given = beam.section.thickness
             values.append(float(np.min(given if isinstance(given, float) else given.values)))
         return min(values)

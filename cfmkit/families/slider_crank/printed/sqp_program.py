@@ -394,7 +394,7 @@ def watched(path: Path, spots: FloatArray) -> Watched:
         Places of these points in a variable in which the stress is smooth.
     """
     sections, last = path.sections(STRIP), path.at_requested[-LAST:]
-    beam = path.net.beams[STRIP]
+    beam = path.network.beams[STRIP]
     breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-12)]
     place = sections.place[0].reshape(-1, N_PLACES)
