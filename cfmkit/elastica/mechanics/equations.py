@@ -111,6 +111,10 @@ class NumpyEquations:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.mesh))
 
+    def rebase(self, base: FloatArray) -> NumpyEquations:
+        """Return the equations with other values of the unknowns that are held, (size,)."""
+        return replace(self, mesh=replace(self.mesh, base=base))
+
     def stiffen(self, mesh: Discretisation) -> NumpyEquations:
         """Return the equations of the same network with another flexibility along its beams."""
         return replace(self, mesh=mesh)

@@ -115,12 +115,20 @@ class CompiledEquations(NumpyEquations):
 
     def stiffen(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with another flexibility along its beams."""
-        stiff, axial = copy(self), np.ascontiguousarray(mesh.elements.axial, float)
-        object.__setattr__(stiff, "network", mesh)
-        object.__setattr__(stiff, "arrays", {**self.arrays, "axial": axial})
-        object.__setattr__(stiff, "row", self.row.copy())
-        self.code.place(stiff.row, len(COUNTS) + ADDRESSES.index("axial"), (axial,))
-        return stiff
+        return self._exchange(mesh, "axial", mesh.elements.axial)
+
+    def rebase(self, base: FloatArray) -> CompiledEquations:
+        """Return the equations with other values of the unknowns that are held, (size,)."""
+        return self._exchange(replace(self.mesh, base=base), "base", base)
+
+    def _exchange(self, mesh: Discretisation, name: str, values: FloatArray) -> CompiledEquations:
+        """Return the equations of a mesh that differs in one array."""
+        other, array = copy(self), np.ascontiguousarray(values, float)
+        object.__setattr__(other, "mesh", mesh)
+        object.__setattr__(other, "arrays", {**self.arrays, name: array})
+        object.__setattr__(other, "row", self.row.copy())
+        self.code.place(other.row, len(COUNTS) + ADDRESSES.index(name), (array,))
+        return other
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""

@@ -18,11 +18,10 @@ from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.march import equations
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.equations import NumpyEquations
     from cfmkit.elastica.results.path import EquilibriumPath
 
 LARGEST = 1e13  # motion or force, dimensionless, that follows a unit motion: beyond it the tangent may be singular
@@ -51,7 +50,7 @@ def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: 
     """
     chosen = slice(None) if points is None else np.asarray(points, dtype=np.int64)
     scales = path.mesh.scales
-    return read_only(_condensed_along(path, node, direction)[0][chosen] * scales.force / scales.length)
+    return read_only(_along(path, node, direction)[0][chosen] * scales.force / scales.length)
 
 
 def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool_]:
@@ -60,61 +59,58 @@ def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool
     It is the quotient of two determinants, of which that of the held node is below: where only the latter changes its
     sign, one mode of the part with its node held across passes neutral stability, and the stiffness has a pole.
     """
-    value, held = _condensed_along(path, node, direction)
+    value, held = _along(path, node, direction)
     return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
 
 
-def _condensed_along(path: EquilibriumPath, node: str, direction: float) -> tuple[FloatArray, FloatArray]:
-    """Return the dimensionless stiffness at every point, and the sign of the determinant of all that follows, (p,)."""
-    known = path.condensed
-    if (node, direction) not in known:
-        across, coupled, kept = (np.array(each) for each in zip(*_blocks(path, node, direction), strict=True))
-        row, column = coupled[:, 0], coupled[:, 1]
-        value = np.full(len(across), np.nan)
-        with contextlib.suppress(np.linalg.LinAlgError):
-            follow = np.linalg.solve(kept, column[..., None])[..., 0]
-            plain = np.abs(follow).max(axis=1, initial=0.0) < LARGEST
-            value[plain] = (across - (row * follow).sum(axis=1))[plain]
-        for k in np.flatnonzero(np.isnan(value)):
-            value[k] = _condensed(float(across[k]), coupled[k], kept[k])
-        known[node, direction] = value, np.linalg.slogdet(kept)[0]
-    return known[node, direction]
-
-
-def _blocks(path: EquilibriumPath, node: str, direction: float) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-    """Yield the stiffness across, its coupling (2, k) to what follows, by row and by column, and that of those (k, k).
+def _along(path: EquilibriumPath, node: str, direction: float) -> tuple[FloatArray, FloatArray]:
+    """Return the dimensionless stiffness at every point, and the sign of the determinant of all that follows, (p,).
 
     The network is the same but for the node, whose axes are turned along the direction and which nothing guides.
     """
-    network = path.mesh
-    x, y, _ = network.bodies[node]
-    frame = network.attachments.frame.copy()
-    place = network.attachments.unknowns[:, 0] == x
-    old = network.attachments.frame[network.nodes[node]]
-    frame[place] = np.cos(direction), np.sin(direction)
-    loose = replace(network, attachments=network.attachments._replace(frame=frame))
-    loose = without_floor(loose, np.flatnonzero(network.floored))
-    cos, sin = frame[place][0] @ old, old[0] * frame[place][0][1] - old[1] * frame[place][0][0]
-    kept = network.free[(network.free != x) & (network.free != y)]
-    own = equations(loose)
-    for k, state in enumerate(path.at.z):
+    if (node, direction) in path.condensed:
+        return path.condensed[node, direction]
+    mesh = path.mesh
+    x, y, _ = mesh.bodies[node]
+    frame = mesh.attachments.frame.copy()
+    place = mesh.attachments.unknowns[:, 0] == x
+    old, new = mesh.attachments.frame[mesh.nodes[node]], np.array([np.cos(direction), np.sin(direction)])
+    frame[place] = new
+    kept = mesh.free[(mesh.free != x) & (mesh.free != y)]
+    loose = replace(mesh, attachments=mesh.attachments._replace(frame=frame), free=np.sort(np.append(kept, y)))
+    loose = without_floor(loose, np.flatnonzero(mesh.floored))
+    own, cos, sin = equations(loose), new @ old, old[0] * new[1] - old[1] * new[0]
+    found = np.empty((len(path), 2))
+    for k, (state, drive) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
         z = state.copy()
         z[x], z[y] = cos * z[x] + sin * z[y], cos * z[y] - sin * z[x]
-        _, hessian = own.evaluate(z, float(path.at.drive[k]))
-        yield hessian[y, y], np.stack([hessian[y, kept], hessian[kept, y]]), hessian[np.ix_(kept, kept)]
+        found[k] = _condensed(own.rebase(z - drive * mesh.rate), z, drive, y)
+    path.condensed[node, direction] = read_only(found[:, 0]), read_only(found[:, 1])
+    return path.condensed[node, direction]
 
 
-def _condensed(across: float, coupled: FloatArray, kept: FloatArray) -> float:
-    """Return the stiffness of one unknown while others follow it; nan where a force is open.
+def _condensed(own: NumpyEquations, z: FloatArray, drive: float, across: int) -> tuple[float, float]:
+    """Return the stiffness of one unknown while all others follow it, and the sign of the determinant of those.
 
-    So is that along a straight beam that cannot stretch and is held at both ends.
+    nan where a force is open, as that along a straight beam that cannot stretch and is held at both ends.
     """
-    row, column = coupled
+    free = own.mesh.free
+    push = (free == across).astype(float)
+    if not own.follows:  # else no directions are counted
+        with contextlib.suppress(np.linalg.LinAlgError):
+            (moved,), unstable = own.resolve(z[free], drive, push[None])
+            give = float(push @ moved)
+            if np.abs(moved).max() < LARGEST * abs(give):
+                return 1.0 / give, (-1.0) ** (unstable - (give < 0))
+    rest = push == 0
+    tangent = own.linearise(z[free], drive).tangent
+    (row,), column, kept = tangent[~rest][:, rest], tangent[rest][:, ~rest][:, 0], tangent[np.ix_(rest, rest)]
+    stiffness, sign = float(tangent[~rest, ~rest][0]), float(np.linalg.slogdet(kept)[0])
     with contextlib.suppress(np.linalg.LinAlgError):
         follow = np.linalg.solve(kept, column)
         if np.abs(follow).max(initial=0.0) < LARGEST:
-            return float(across - row @ follow)
+            return stiffness - float(row @ follow), sign
     follow, _, _, _ = np.linalg.lstsq(kept, column, RANK)
     left = np.abs(kept @ follow - column).max(initial=0.0)
     is_open = left > OPEN_FORCE * max(1.0, float(np.abs(column).max(initial=0.0)))
-    return float("nan") if is_open else float(across - row @ follow)
+    return float("nan") if is_open else stiffness - float(row @ follow), sign

@@ -86,16 +86,13 @@ def largest_member_efforts(
 def _ways(path: EquilibriumPath) -> tuple[FloatArray, FloatArray]:
     """Return the directions of a path at its points, (n, free) and (n,): their largest motion or drive is one."""
     own, moves = equations(path.mesh), path.mesh.free < path.mesh.n_motions
-    free, drive = np.empty_like(path.free), np.empty(len(path))
-    for k, (y, at) in enumerate(zip(path.free, path.at.drive.tolist(), strict=True)):
-        equation = own.linearise(y, at)
-        try:
-            rate = np.linalg.solve(equation.tangent, -equation.change)
-        except np.linalg.LinAlgError:  # at a bifurcation, or where a force is open
-            rate = np.linalg.lstsq(equation.tangent, -equation.change)[0]
-        size = max(1.0, float(np.abs(rate[moves]).max(initial=0.0)))
-        free[k], drive[k] = rate / size, 1.0 / size
-    return free, drive
+    solved = own.solve_each(path.free, path.at.drive, quick=True)
+    rates = solved.rate.copy()
+    for k in np.flatnonzero(~solved.converged):  # at a bifurcation, or where a force is open
+        equation = own.linearise(path.free[k], float(path.at.drive[k]))
+        rates[k] = np.linalg.lstsq(equation.tangent, -equation.change)[0]
+    size = np.maximum(1.0, np.abs(rates[:, moves]).max(axis=1, initial=0.0))
+    return rates / size[:, None], 1.0 / size
 
 
 def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatArray:

@@ -235,7 +235,10 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str,
             a, b = _away(a, i, 2 * NEAR * halves[one]), _away(b, j, 2 * NEAR * half)
     if len(a) < 2 or len(b) < 2:
         return None
-    return BeamGap(_distance(a, b) - halves[one] - half, one, other)
+    import shapely
+
+    distance = float(shapely.distance(shapely.LineString(a), shapely.LineString(b)))
+    return BeamGap(distance - halves[one] - half, one, other)
 
 
 def _away(line: FloatArray, end: int, length: float) -> FloatArray:
@@ -249,29 +252,3 @@ def _away(line: FloatArray, end: int, length: float) -> FloatArray:
     first = [np.interp(length, way, column) for column in ordered.T]
     kept = np.vstack([first, ordered[way > length]])
     return kept if end == 0 else kept[::-1]
-
-
-def _distance(a: FloatArray, b: FloatArray) -> float:
-    """Return the smallest distance of the points of `a` from the chords of `b`; zero where the lines cross."""
-    if _cross(a, b):
-        return 0.0
-    return min(_to_chords(a, b), _to_chords(b, a))
-
-
-def _to_chords(points: FloatArray, line: FloatArray) -> float:
-    start, along = line[:-1], np.diff(line, axis=0)
-    rise = points[:, None] - start
-    share = np.clip((rise * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
-    return float(np.sqrt(((rise - share[..., None] * along) ** 2).sum(-1).min()))
-
-
-def _cross(a: FloatArray, b: FloatArray) -> bool:
-    """Return True if two chains of points cross."""
-    p, r = a[:-1, None], np.diff(a, axis=0)[:, None]
-    q, s = b[None, :-1], np.diff(b, axis=0)[None]
-    cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    d = q - p
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / cross
-        u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / cross
-    return bool(((t > 0) & (t < 1) & (u > 0) & (u < 1)).any())
