@@ -107,7 +107,7 @@ class Discretisation:
 
     @cached_property
     def known(self) -> dict[Any, Any]:
-        """What was made of these arrays, by what made it; it does not go to other processes."""
+        """Cache of objects made of these arrays, by their maker; it does not go to other processes."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:

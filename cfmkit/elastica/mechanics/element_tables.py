@@ -1,4 +1,4 @@
-"""What elements are at their Gauss points: angle, rigidity, compliances, arc length; dimensionless, (e, q) each.
+"""Properties of elements at their Gauss points: angle, rigidity, compliances, arc length; dimensionless, (e, q) each.
 
 Most beams have a polynomial angle and one thickness: their tables are made together. The others' are made for all
 elements of a smooth part at once.

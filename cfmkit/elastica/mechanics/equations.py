@@ -68,7 +68,7 @@ class MarchState(NamedTuple):
 
 
 class SolvedStates(NamedTuple):
-    """What Newton's method found near k guesses."""
+    """Equilibria that Newton's method finds near k guesses."""
 
     converged: Any  # (k,)
     free: FloatArray  # (k, n)

@@ -1,4 +1,4 @@
-"""Where the attachments of a network are: X = origin + R(frame) (x, y) + R(rotation) arm."""
+"""Places of the attachments of a network: X = origin + R(frame) (x, y) + R(rotation) arm."""
 
 from __future__ import annotations
 

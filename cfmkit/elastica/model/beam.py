@@ -84,7 +84,7 @@ class Beam:
 
 @dataclass(frozen=True)
 class Fit:
-    """How a shape was fitted between its ends."""
+    """Rotation and scale that fit a shape between its ends."""
 
     rotation: Any  # turn of the shape [rad]; as given plus this is as used
     scale: Any  # factor on the shape's size [1]

@@ -1,4 +1,4 @@
-"""How the beams of a network are fitted between their nodes."""
+"""Beams of a network fitted between their nodes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def beam_end_at(network: Network, name: str, side: int) -> tuple[Any, Any]:
 
 
 class BeamFits(Mapping[str, Fit]):
-    """How each beam is fitted between its nodes, by its name, as they are requested."""
+    """Fits of the beams between their nodes by name, made when they are requested."""
 
     def __init__(self, network: Network) -> None:
         """Fit the plain beams, all at once."""

@@ -1,4 +1,4 @@
-"""What is done to a network: one quantity that is taken through given values.
+"""Load cases of a network: one quantity that is taken through given values.
 
 Every drive has `points`, the values at which results are wanted, in the order in which they are passed, starting
 from rest (zero, which need not be among them). The values may turn round (up, and down again): what was passed is then
@@ -77,7 +77,7 @@ Drive = Displacement | Rotation | Loading
 
 @dataclass(frozen=True)
 class Control:
-    """How a path is followed and how accurate it must be.
+    """Options of path following, and the accuracy of a path.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a planar network of slender beams is: nodes with their supports, beams, rigid links, springs, constant loads.
+"""Planar networks of slender beams: nodes with their supports, beams, rigid links, springs, constant loads.
 
 Values only, in SI; what is done to a network is a `cfmkit.elastica.model.drive`, what comes out a
 `cfmkit.elastica.results.path.EquilibriumPath`.

@@ -37,8 +37,8 @@ ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
 
 STRAY, LEAST = 0.5, 1e-3
-"""How far a pose may be from its first guess, as a share of the change between the two points around it, and at least
-[rad or mean beam lengths]: beyond that another branch was found."""
+"""Largest distance of a pose from its first guess: as a share of the change between the two points around it, and at
+least [rad or mean beam lengths]. Beyond that another branch was found."""
 
 ASIDE = 1e-6
 """Share of the drive's range by which the knots next to a corner are beside it: no cubic goes across it but there."""
@@ -105,7 +105,7 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def _points(self) -> FloatArray:
-        """Where the path has points, increasing [m or rad]."""
+        """Places of the points of the path, increasing [m or rad]."""
         return read_only(self._motion[self._order])
 
     @cached_property
@@ -118,13 +118,13 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def peaks(self) -> FloatArray:
-        """Where the effort has an extreme between two points, or a corner, (m,) [m or rad]."""
+        """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
         beside = {*self._beside[:, [0, 2]].ravel().tolist()}
         return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
 
     @cached_property
     def corners(self) -> FloatArray:
-        """Where the path changes to another branch, so that the effort has a kink, (m,) [m or rad]."""
+        """Places at which the path changes to another branch, so that the effort has a kink, (m,) [m or rad]."""
         return read_only(self._scale * np.array([corner.drive for corner in self._corners.values()]))
 
     @cached_property
@@ -310,7 +310,7 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def _events(self) -> FloatArray:
-        """Where the path bifurcates, dimensionless, increasing."""
+        """Bifurcations of the path, dimensionless, increasing."""
         scale = self.path.mesh.scales.drive
         return np.sort([one.drive / scale for one in self.path.events if one.kind == "bifurcation"])
 

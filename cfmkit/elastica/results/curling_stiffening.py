@@ -28,7 +28,7 @@ _STEP = 1e-30
 
 @dataclass(frozen=True)
 class HinderedCurling:
-    """What beams that are wide, but solved as narrow ones, are too soft by."""
+    """Share by which beams that are wide, but solved as narrow ones, are too soft."""
 
     share: FloatArray  # (n,): of the strain energy of bending of all beams, at every point [1]
     beam: Any  # (n,): the beam that is too soft by most of that

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class Observed(Protocol):
-    """What is looked at on a path."""
+    """Observed values of a path."""
 
     @property
     def motion(self) -> FloatArray:
@@ -104,7 +104,7 @@ class AlongTheWay:
 
     @cached_property
     def _known(self) -> dict[bytes, list[FloatArray]]:
-        """What was requested: every metric asks for the same places."""
+        """Solved places, for every metric asks for the same ones."""
         return {}
 
     def stress(self, ways: FloatArray) -> FloatArray:
@@ -147,7 +147,7 @@ class AlongTheWay:
 
     @cached_property
     def _metric(self) -> FloatArray:
-        """What the square of each unknown and of the drive counts for: the ranges of both count alike, (free + 1,)."""
+        """Weight of the square of each unknown and of the drive: the ranges of both count alike, (free + 1,)."""
         reach = np.ptp(self._places, axis=0)
         weights = np.ones(len(reach))
         weights[-1] = (reach[:-1] @ reach[:-1]) / reach[-1] ** 2 if reach[-1] else 1.0

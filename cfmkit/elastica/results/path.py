@@ -36,7 +36,7 @@ TIED = 1e-9  # share by which stresses of two beams differ that are one but for 
 
 
 class PathStatus(Enum):
-    """How a path ended."""
+    """End of a path."""
 
     COMPLETE = "all requested points were reached"
     LIMIT_POINT = "the drive cannot go further: a limit point"

@@ -1,4 +1,4 @@
-"""Where the stress along a beam is largest: the extreme of the polynomial through places of each element.
+"""Largest stresses along beams and their places: the extreme of the polynomial through places of each element.
 
 On an element the bending moment is a polynomial and the normal force as smooth as its rotation, so that a polynomial
 through as many places as the element resolves has the stress to the element's own accuracy; its extreme is found by

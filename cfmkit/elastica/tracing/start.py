@@ -32,7 +32,7 @@ FLOOR_STRAIN = 1e-7  # of a beam that does not stretch, from which on the drive 
 
 
 class DriveStart(NamedTuple):
-    """Where a path begins."""
+    """Start of a path."""
 
     problem: NetworkProblem  # along the drive
     at: PathEquilibrium | None  # None: nothing to begin at

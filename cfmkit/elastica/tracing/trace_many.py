@@ -30,7 +30,7 @@ _CHUNK, _AHEAD = 128, 2  # networks set up at once; chunks for each process that
 
 @dataclass(frozen=True)
 class NetworkOutcome:
-    """What came of one network."""
+    """Status and collected value of one network."""
 
     # status, message: name and sentence of the path's status; ``INVALID`` and the reason where the network cannot exist
     status: str

@@ -48,7 +48,7 @@ _GAUSS = np.polynomial.legendre.leggauss(8)
 
 @dataclass(frozen=True)
 class Recheck:
-    """What the elements say at points of a path."""
+    """Efforts and stresses of corotational elements at points of a path."""
 
     # (p,): force or moment of the drive [N or N m], extrapolated; NaN where no equilibrium was found
     effort: FloatArray

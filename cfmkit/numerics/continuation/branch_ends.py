@@ -1,4 +1,4 @@
-"""Where a branch ends: it joins a path that becomes stable there."""
+"""End of a branch: it joins a path that becomes stable there."""
 
 from __future__ import annotations
 

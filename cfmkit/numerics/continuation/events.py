@@ -31,7 +31,7 @@ ONE_LOSS = 1e-4  # share of the way from the piece's begin below which several l
 
 
 class Located(NamedTuple):
-    """Where a function of an equilibrium vanishes between two."""
+    """Zero of a function of equilibria, between two of them."""
 
     x: FloatArray
     drive: float

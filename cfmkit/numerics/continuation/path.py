@@ -103,7 +103,7 @@ class MarchedSteps(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """Where the follower stands: the last equilibria of one smooth piece, the next step and value."""
+    """State of the follower: the last equilibria of one smooth piece, the next step and value."""
 
     problem: ContinuationProblem
     options: Options
