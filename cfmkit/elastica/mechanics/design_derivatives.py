@@ -111,16 +111,16 @@ def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArra
     rates : (p, n) array, optional
         Slopes of the free unknowns along the path: they are w unless loads grow with the drive, or follow.
     """
-    network = at.mesh
-    loads = [load for load in network.loads if load.grows or load.item.follows]
-    found = np.tile(network.rate, (len(at.z), 1))
-    if rates is not None and not loads and not network.elements.line[:, 1].any():
-        found[:, network.free] = rates
+    mesh = at.mesh
+    loads = [load for load in mesh.loads if load.grows or load.item.follows]
+    found = np.tile(mesh.rate, (len(at.z), 1))
+    if rates is not None and not loads and not mesh.elements.line[:, 1].any():
+        found[:, mesh.free] = rates
         return found
-    chosen = network.free
+    chosen = mesh.free
     for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
-        tangent = energy.hessian(network, z, drive)
-        right = network.rate @ tangent[:, chosen]
+        tangent = energy.hessian(mesh, z, drive)
+        right = mesh.rate @ tangent[:, chosen]
         found[k, chosen] = -np.linalg.solve(tangent[np.ix_(chosen, chosen)].T, right)
     return found
 
@@ -137,16 +137,16 @@ def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | N
     rates : (p, n) array, optional
         Slopes of the free unknowns along the path, if they are known.
     """
-    network, motions = at.mesh, effort_motions(at, rates)
+    mesh, motions = at.mesh, effort_motions(at, rates)
     stepped = at.z + 1j * COMPLEX_STEP * motions
-    known = {name: value.imag / COMPLEX_STEP for name, value in partials(network, stepped, at.drive).items()}
+    known = {name: value.imag / COMPLEX_STEP for name, value in partials(mesh, stepped, at.drive).items()}
     total = _contracted(known, designs)
     for k, pair in enumerate(_changed_terms(designs)):
         for own in pair:
             total[:, k] += _term_slopes(own, at, motions)
     if designs.base is not None:
         total += _held_forces(at, motions) @ (np.imag(designs.base) / COMPLEX_STEP).T
-    return np.asarray(total * network.scales.moment / network.scales.drive)
+    return np.asarray(total * mesh.scales.moment / mesh.scales.drive)
 
 
 def _contracted(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
@@ -198,10 +198,10 @@ def _term_slopes(own: tuple[Discretisation, Attached], at: Equilibria, motions: 
 
 def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
     """Return the derivatives of the effort by the values of held unknowns, (p, size); zero at free ones."""
-    network, found = at.mesh, np.zeros(at.z.shape)
-    held = np.setdiff1d(np.arange(network.size), network.free)
+    mesh, found = at.mesh, np.zeros(at.z.shape)
+    held = np.setdiff1d(np.arange(mesh.size), mesh.free)
     for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
-        tangent = energy.hessian(network, z, drive)
+        tangent = energy.hessian(mesh, z, drive)
         found[k, held] = motions[k] @ tangent[:, held]
     return found
 
@@ -214,9 +214,9 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     numpy.linalg.LinAlgError
         If a tangent is singular.
     """
-    network, chosen = at.mesh, at.mesh.free
-    own, forces = equations(network), _force_slopes(at, designs)
-    found = np.zeros((len(at.z), designs.count, network.size))
+    mesh, chosen = at.mesh, at.mesh.free
+    own, forces = equations(mesh), _force_slopes(at, designs)
+    found = np.zeros((len(at.z), designs.count, mesh.size))
     if designs.base is not None:
         found += np.imag(designs.base) / COMPLEX_STEP
     for k, (z, drive) in enumerate(zip(at.z, at.drive.tolist(), strict=True)):
@@ -231,14 +231,14 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
 
     Held ones move with their support, to which every spring and load at them answers.
     """
-    network, unknowns = at.mesh, at.mesh.elements.unknowns
+    mesh, unknowns = at.mesh, at.mesh.elements.unknowns
     moved: Any = at.z
     stepped, held = dual_arrays(designs), None
     if designs.base is not None:
         held = np.imag(designs.base) / COMPLEX_STEP
         moved = DualArray(at.z, held[:, None])
-    found = np.zeros((len(at.z), designs.count, network.size))
-    together = max(1, MAX_TOGETHER // (designs.count * network.elements.angle.size))
+    found = np.zeros((len(at.z), designs.count, mesh.size))
+    together = max(1, MAX_TOGETHER // (designs.count * mesh.elements.angle.size))
     for first in range(0, len(at.z), together):
         some = slice(first, first + together)
         for columns, force in energy.element_forces(stepped, moved[some], at.drive[some], 1.0):

@@ -429,12 +429,12 @@ def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
     return [*refined, 1.0]
 
 
-def without_floor(discretisation: Discretisation, elements: Any) -> Discretisation:
+def without_floor(mesh: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
-    axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
+    axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
     axial[elements], floored[elements] = 0.0, False
-    stiff = replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
-    stiff.known.update((key, made.stiffen(stiff)) for key, made in discretisation.known.items())
+    stiff = replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)
+    stiff.known.update((key, made.stiffen(stiff)) for key, made in mesh.known.items())
     return stiff
 
 

@@ -327,16 +327,16 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     """Return the arrays of a `Model` in C order."""
-    network = of.mesh
-    e, a = network.elements, network.attachments
-    slot = np.full(network.size, -1, np.int64)
-    slot[network.free] = np.arange(len(network.free))
-    bend = (e.weight * e.rigidity) @ slope_products(network.degree)
-    springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
+    mesh = of.mesh
+    e, a = mesh.elements, mesh.attachments
+    slot = np.full(mesh.size, -1, np.int64)
+    slot[mesh.free] = np.arange(len(mesh.free))
+    bend = (e.weight * e.rigidity) @ slope_products(mesh.degree)
+    springs, loads = [_spring(mesh, s) for s in mesh.springs], [_load(mesh, load) for load in mesh.loads]
     given: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
     given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
-    given |= _shape_tables(network.degree) | {"base": network.base, "rate": network.rate}
-    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network), "unit": of.unit}
+    given |= _shape_tables(mesh.degree) | {"base": mesh.base, "rate": mesh.rate}
+    given |= {"bend": bend, "slot": slot, "leaves": _leaves(mesh), "unit": of.unit}
     given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
     return {

@@ -161,20 +161,20 @@ def _rest_of_designs(
 
 def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> BeamStates:
     """Return states at k fractions of m elements, (p, m, k); dual if the equilibria are."""
-    network, scales, whole = at.mesh, at.mesh.scales, at.mesh.elements
-    rule, own = basis(network.degree), at.z[..., whole.unknowns[elements]]
+    mesh, scales, whole = at.mesh, at.mesh.scales, at.mesh.elements
+    rule, own = basis(mesh.degree), at.z[..., whole.unknowns[elements]]
     tables = {name: getattr(whole, name) for name in ON_POINTS}
     picked = {name: table[elements] for name, table in tables.items() if table is not None}
     e = whole._replace(**picked, length=whole.length[elements])
-    load = energy.line_load(network, at.drive)[..., elements, :]
-    rotation, end = own[..., energy.rotation_columns(network.degree)], own[..., -2:]
-    speed, reached = e.weight / rule.weights, _matrices(network.degree, tuple(given.tolist()))
+    load = energy.line_load(mesh, at.drive)[..., elements, :]
+    rotation, end = own[..., energy.rotation_columns(mesh.degree)], own[..., -2:]
+    speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(given.tolist()))
     upto = reached.integrals.T
     fields = _fields(e, end, load, rotation @ rule.values.T)
     first = e.weight * bending(e, rotation @ rule.slopes.T).moment
     moment = -(first @ rule.slopes[:, 0] - (e.weight * fields.turning) @ rule.values[:, 0])[..., None]
     if e.curl is None:  # rotations from moments, and once more
-        inside = integrals_to_points(network.degree).T
+        inside = integrals_to_points(mesh.degree).T
         curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
         fields = _fields(e, end, load, rotation[..., :1] + curvature @ inside + missed * rule.places)
         curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
@@ -182,7 +182,7 @@ def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
     else:
         turn = rotation @ reached.values.T
     ahead = e.length[..., None] - speed @ upto
-    start = poses(network.attachments, at.z, whole.ends[elements, 0]).place
+    start = poses(mesh.attachments, at.z, whole.ends[elements, 0]).place
     return BeamStates(
         rest.place,
         (start[..., :1] + (fields.slope_x * speed) @ upto) * scales.length,

@@ -273,8 +273,8 @@ class BetweenPoints(ShortRepr):
 
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of a motion in each of some changes of the unknowns, (n,)."""
-        network = self.path.mesh
-        return np.asarray(np.abs(changes[:, network.free < network.n_motions]).max(axis=1, initial=0.0))
+        mesh = self.path.mesh
+        return np.asarray(np.abs(changes[:, mesh.free < mesh.n_motions]).max(axis=1, initial=0.0))
 
     def _counts(self, near: int, _left: int) -> tuple[int, ...]:
         """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
@@ -445,18 +445,18 @@ def between_loads(
     allowed : float or None
         Stress [Pa]; where it is passed is solved for.
     """
-    network = path.mesh
-    if len(path) < FEWEST or not np.all(path.accurate) or (along is not None and node not in network.bodies):
+    mesh = path.mesh
+    if len(path) < FEWEST or not np.all(path.accurate) or (along is not None and node not in mesh.bodies):
         return None
-    place = network.nodes[node]
-    unknowns, frame = network.attachments.unknowns[place], network.attachments.frame[place]
+    place = mesh.nodes[node]
+    unknowns, frame = mesh.attachments.unknowns[place], mesh.attachments.frame[place]
     if along is None:
         parts, scale = {int(unknowns[3]): 1.0}, 1.0
     else:
         cos, sin = np.cos(along), np.sin(along)
         shares = cos * frame[0] + sin * frame[1], sin * frame[0] - cos * frame[1]
-        parts, scale = dict(zip(unknowns[:2].tolist(), shares, strict=True)), network.scales.length
-    row, slots = np.zeros(len(network.free) + 1), {unknown: k for k, unknown in enumerate(network.free.tolist())}
+        parts, scale = dict(zip(unknowns[:2].tolist(), shares, strict=True)), mesh.scales.length
+    row, slots = np.zeros(len(mesh.free) + 1), {unknown: k for k, unknown in enumerate(mesh.free.tolist())}
     for unknown, share in parts.items():
         if unknown in slots:
             row[slots[unknown]] += share

@@ -40,18 +40,18 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
     To first order that is the share of the force that is missing, too. Beams that are solved as wide strips miss
     nothing.
     """
-    network, names = path.mesh, list(path.network.beams)
-    places = basis(network.degree).places
+    mesh, names = path.mesh, list(path.network.beams)
+    places = basis(mesh.degree).places
     energies, lost = (np.zeros((len(names), len(path))) for _ in range(2))
     for number, name in enumerate(names):
-        section, fitted = path.network.beams[name].section, network.fits[name]
-        for element in elements_of(network, name):
+        section, fitted = path.network.beams[name].section, mesh.fits[name]
+        for element in elements_of(mesh, name):
             found = states_of_elements(path.network, path.at, [element], places)
-            left, right = network.elements.cuts[element]
+            left, right = mesh.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = np.imag(fitted.angle(t + 1j * _STEP, inside)) / _STEP / np.real(fitted.speed(t, inside))
             rigidity = section.youngs_modulus * section.width * found.thickness**3 / 12
-            weights = network.elements.weight[element] * network.scales.length
+            weights = mesh.elements.weight[element] * mesh.scales.length
             density = 0.5 * found.moment**2 / rigidity * weights
             energies[number] += density.sum(axis=1)
             if not section.wide:

@@ -179,8 +179,8 @@ class AlongTheWay:
 
 def _largest(path: EquilibriumPath, change: FloatArray) -> float:
     """Return the largest change of positions and rotations in a change of the unknowns."""
-    network = path.mesh
-    return float(np.abs(change[network.free < network.n_motions]).max(initial=0.0))
+    mesh = path.mesh
+    return float(np.abs(change[mesh.free < mesh.n_motions]).max(initial=0.0))
 
 
 def along_the_way(path: EquilibriumPath, observe: Callable[[EquilibriumPath], Observed]) -> AlongTheWay | None:

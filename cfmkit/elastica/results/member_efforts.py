@@ -100,15 +100,15 @@ def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatA
 
     The gradient of a member's own energy times the motion of its ends: inside a beam it is in equilibrium.
     """
-    network, names = path.mesh, list(path.network.beams)
-    z = drive[:, None] * network.rate
-    z[:, network.free] = free
-    found = np.zeros((len(names) + len(network.springs), len(path)))
-    beam = np.array([names.index(name) for name in network.elements.beam])
+    mesh, names = path.mesh, list(path.network.beams)
+    z = drive[:, None] * mesh.rate
+    z[:, mesh.free] = free
+    found = np.zeros((len(names) + len(mesh.springs), len(path)))
+    beam = np.array([names.index(name) for name in mesh.elements.beam])
     for k, (state, at) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
-        own, _ = energy.element_gradients(network, state, at, 1.0)
-        np.add.at(found[:, k], beam, (own * z[k][network.elements.unknowns]).sum(axis=1))
-        for number, spring in enumerate(network.springs):
-            part = TERMS[type(spring.item)](network, spring, state, 1.0, at)
+        own, _ = energy.element_gradients(mesh, state, at, 1.0)
+        np.add.at(found[:, k], beam, (own * z[k][mesh.elements.unknowns]).sum(axis=1))
+        for number, spring in enumerate(mesh.springs):
+            part = TERMS[type(spring.item)](mesh, spring, state, 1.0, at)
             found[len(names) + number, k] = part.gradient @ z[k][part.unknowns]
-    return found * network.scales.moment
+    return found * mesh.scales.moment

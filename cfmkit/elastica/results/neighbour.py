@@ -104,13 +104,13 @@ def drive_slope(path: EquilibriumPath, indices: Any = None) -> FloatArray:
     """
     if isinstance(path.load_case, Loading):
         raise InputError("the slope of the effort needs a displacement or a rotation as the drive")
-    network, slopes = path.mesh, []
-    own, unit = equations(network), network.scales.moment / network.scales.drive**2
+    mesh, slopes = path.mesh, []
+    own, unit = equations(mesh), mesh.scales.moment / mesh.scales.drive**2
     for index in (path.at_requested if indices is None else np.asarray(indices)).tolist():
         drive = float(path.at.drive[index])
         state = own.solve(path.free[index], drive)
         if state is None:
             raise InputError("the slope of the effort needs converged points")
         moved = state.free + 1j * COMPLEX_STEP * state.rate
-        slopes.append(float(own.gradient(moved, drive + 1j * COMPLEX_STEP).imag @ network.rate) / COMPLEX_STEP)
+        slopes.append(float(own.gradient(moved, drive + 1j * COMPLEX_STEP).imag @ mesh.rate) / COMPLEX_STEP)
     return read_only(np.array(slopes) * unit)

@@ -144,13 +144,13 @@ class EquilibriumPath(ShortRepr):
         accurate : (m,) array of bool
             False where there is no equilibrium.
         """
-        network = self.mesh
-        z = network.base + drive[:, None] * network.rate
-        z[:, network.free] = free
+        mesh = self.mesh
+        z = mesh.base + drive[:, None] * mesh.rate
+        z[:, mesh.free] = free
         count = len(drive)
         return replace(
             self,
-            at=Equilibria(network, z, drive),
+            at=Equilibria(mesh, z, drive),
             unstable=self.unstable[near],
             requested=read_only(np.full(count, -1), np.int64),
             branch=self.branch[near],
@@ -314,27 +314,27 @@ def most_stressed(values: FloatArray, places: FloatArray) -> Any:
 
 def node_motion(at: Equilibria, node: str) -> Any:
     """Return displacement and rotation of a node, (p, 3) [m, m, rad]."""
-    network = at.mesh
-    here = poses(network.attachments, at.z, [network.nodes[node]])
-    rest = (network.attachments.origin + network.attachments.arm)[network.nodes[node]]
-    moved = (here.place[:, 0] - rest) * network.scales.length
+    mesh = at.mesh
+    here = poses(mesh.attachments, at.z, [mesh.nodes[node]])
+    rest = (mesh.attachments.origin + mesh.attachments.arm)[mesh.nodes[node]]
+    moved = (here.place[:, 0] - rest) * mesh.scales.length
     return np.concatenate([moved, at.z[:, here.unknowns[0, 3:]]], axis=1)
 
 
 def node_reaction(at: Equilibria, node: str, residual: Any) -> Any:
     """Return force and moment on a node from the gradient at all unknowns, (p, 3) [N, N, N m]."""
-    network, scales = at.mesh, at.mesh.scales
-    if node not in network.bodies:
+    mesh, scales = at.mesh, at.mesh.scales
+    if node not in mesh.bodies:
         raise InputError(f"{node!r} is moved by a link: it has no support of its own")
-    cos, sin = network.attachments.frame[network.nodes[node]]
-    along, across, moment = (residual[:, unknown] for unknown in network.bodies[node])
+    cos, sin = mesh.attachments.frame[mesh.nodes[node]]
+    along, across, moment = (residual[:, unknown] for unknown in mesh.bodies[node])
     force = np.stack([cos * along - sin * across, sin * along + cos * across], axis=-1) * scales.force
     return np.concatenate([force, moment[:, None] * scales.moment], axis=1)
 
 
 def load_displacement(at: Equilibria, drive: Loading) -> Any:
     """Return the work-conjugate displacement of a drive by loads, (p,) [J]."""
-    network, scales = at.mesh, at.mesh.scales
+    mesh, scales = at.mesh, at.mesh.scales
     total: Any = 0.0
     for load in drive.loads:
         if not isinstance(load, PointLoad):
@@ -345,10 +345,10 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
             cos, sin = np.cos(moved[:, 2]), np.sin(moved[:, 2])
             fx, fy = cos * load.fx - sin * load.fy, sin * load.fx + cos * load.fy
         total = total + fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
-    line = network.elements.line[:, 1]
+    line = mesh.elements.line[:, 1]
     if line.any():
-        rest = partials(network, np.zeros((1, network.size)), np.zeros(1))["line"]
-        moved = rest[:, :, 0] - partials(network, at.z, at.drive)["line"][:, :, 0]
+        rest = partials(mesh, np.zeros((1, mesh.size)), np.zeros(1))["line"]
+        moved = rest[:, :, 0] - partials(mesh, at.z, at.drive)["line"][:, :, 0]
         total = total + (moved * line).sum(axis=(1, 2)) * scales.moment / scales.drive
     return total + np.zeros(len(at.z))
 
@@ -368,8 +368,8 @@ def strain_energy(at: Equilibria) -> Any:
 
 def largest_force(at: Equilibria) -> float:
     """Return the largest force or moment in a beam at any state, dimensionless."""
-    network, e = at.mesh, at.mesh.elements
+    mesh, e = at.mesh, at.mesh.elements
     own = at.z[:, e.unknowns]
-    curvature = own[..., energy.rotation_columns(network.degree)] @ basis(network.degree).slopes.T
+    curvature = own[..., energy.rotation_columns(mesh.degree)] @ basis(mesh.degree).slopes.T
     moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)
     return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))

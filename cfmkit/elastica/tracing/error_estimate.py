@@ -83,12 +83,12 @@ def polish(path: Path) -> Path:
     A march leaves it when the next correction would be small if it converged quadratically: beside a bifurcation it
     does not.
     """
-    network, z = path.mesh, path.at.z.copy()
-    own = z[:, network.free]
-    solved = NetworkProblem(network).equations.solve_each(own, path.at.drive)
-    count = int((network.free < network.n_motions).sum())
+    mesh, z = path.mesh, path.at.z.copy()
+    own = z[:, mesh.free]
+    solved = NetworkProblem(mesh).equations.solve_each(own, path.at.drive)
+    count = int((mesh.free < mesh.n_motions).sum())
     near = solved.converged & (np.abs(solved.free[:, :count] - own[:, :count]).max(axis=1, initial=0.0) < SAME_POINT)
-    z[:, network.free] = np.where(near[:, None], solved.free, own)
+    z[:, mesh.free] = np.where(near[:, None], solved.free, own)
     return replace(path, at=replace(path.at, z=z))
 
 

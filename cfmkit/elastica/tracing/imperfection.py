@@ -69,33 +69,33 @@ def _where(drive: Drive, buckling: Buckling) -> str:
     if what:
         return f"under {100 * event.drive:.4g} % of the {what}"
     place = event.drive * problem.mesh.scales.drive
-    network, near = problem.mesh, event.near
-    if near is not None and network.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
-        residual = energy.gradient(network, problem.values(near.x, near.drive), near.drive)
-        force = float(residual @ network.rate) * network.scales.moment / network.scales.drive
+    mesh, near = problem.mesh, event.near
+    if near is not None and mesh.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
+        residual = energy.gradient(mesh, problem.values(near.x, near.drive), near.drive)
+        force = float(residual @ mesh.rate) * mesh.scales.moment / mesh.scales.drive
         return f"under {abs(force):.4g} {'N' if isinstance(drive, Displacement) else 'N m'}"
     return f"at {place:.6g}"
 
 
 def _node_motion(problem: NetworkProblem, name: str, change: FloatArray) -> tuple[FloatArray, float]:
     """Return displacement [m] and rotation [rad] of a node, to first order from rest."""
-    network = problem.mesh
-    at = poses(network.attachments, np.zeros(network.size), [network.nodes[name]])
-    moved = at.jacobian[0] @ change[at.unknowns[0, :3]] * network.scales.length
+    mesh = problem.mesh
+    at = poses(mesh.attachments, np.zeros(mesh.size), [mesh.nodes[name]])
+    moved = at.jacobian[0] @ change[at.unknowns[0, :3]] * mesh.scales.length
     return moved, float(change[at.unknowns[0, 3]])
 
 
 def _rotations(problem: NetworkProblem, beam: str, mode: FloatArray) -> Chebyshev:
     """Return the rotations of a beam's sections in a mode, over the parameter of its shape [rad]."""
-    network, places, values = problem.mesh, [], []
+    mesh, places, values = problem.mesh, [], []
     shares = (1 - np.cos(np.pi * np.arange(PLACES) / (PLACES - 1))) / 2
-    shapes, _ = shape_functions(network.degree, shares)
-    columns = energy.rotation_columns(network.degree)
-    for number, name in enumerate(network.elements.beam):
+    shapes, _ = shape_functions(mesh.degree, shares)
+    columns = energy.rotation_columns(mesh.degree)
+    for number, name in enumerate(mesh.elements.beam):
         if name == beam:
-            left, right = network.elements.cuts[number]
+            left, right = mesh.elements.cuts[number]
             places.append(left + (right - left) * shares)
-            values.append(shapes @ mode[network.elements.unknowns[number, columns]])
+            values.append(shapes @ mode[mesh.elements.unknowns[number, columns]])
     return Chebyshev.fit(np.concatenate(places), np.concatenate(values), DEGREE, domain=[0.0, 1.0])
 
 

@@ -122,25 +122,25 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
 
     Left in, nearly rigid networks of thin straight beams have errors of 1e-5 and more.
     """
-    network = problem.mesh
-    elements = np.flatnonzero(network.floored)
+    mesh = problem.mesh
+    elements = np.flatnonzero(mesh.floored)
     if not elements.size:
         return problem, at
-    slot = np.full(network.size, -1)
-    slot[network.free] = np.arange(len(network.free))
-    rows = slot[network.elements.unknowns[elements, -2:]]
-    unit = np.zeros((rows.size, len(network.free)))
+    slot = np.full(mesh.size, -1)
+    slot[mesh.free] = np.arange(len(mesh.free))
+    rows = slot[mesh.elements.unknowns[elements, -2:]]
+    unit = np.zeros((rows.size, len(mesh.free)))
     unit[np.arange(rows.size), rows.ravel()] = 1.0
     try:
         inverse, _ = problem.equations.resolve(at.x, at.drive, unit)
     except np.linalg.LinAlgError:
         return problem, at
     share = np.abs(inverse[np.arange(rows.size), rows.ravel()]).reshape(rows.shape).max(axis=1)
-    share *= network.elements.axial[elements].max(axis=1) * network.elements.length[elements]
+    share *= mesh.elements.axial[elements].max(axis=1) * mesh.elements.length[elements]
     needless = elements[share < FLOOR_SHARE]
     if not needless.size:
         return problem, at
-    stiff = replace(problem, mesh=without_floor(network, needless))
+    stiff = replace(problem, mesh=without_floor(mesh, needless))
     return stiff, correct(stiff, at.x, at.drive) or at
 
 

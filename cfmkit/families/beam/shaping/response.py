@@ -153,8 +153,8 @@ class Response:
     @cached_property
     def _beams_by_cuts(self) -> list[dict[str, list[int]]]:
         """Elements of each beam; those that are cut into as many elements together."""
-        network = self.path.mesh
-        elements = {name: beam_states.elements_of(network, name) for name in network.fits}
+        mesh = self.path.mesh
+        elements = {name: beam_states.elements_of(mesh, name) for name in mesh.fits}
         counts = sorted({len(own) for own in elements.values()})
         return [{name: own for name, own in elements.items() if len(own) == count} for count in counts]
 
