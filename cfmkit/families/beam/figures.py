@@ -146,7 +146,7 @@ def _colors(count: int) -> list[str]:
 
 def _key(solution: Solution, poses: list[int]) -> list[tuple[str, str]]:
     """Return what the motion is in each pose, and its colour."""
-    kind = "angle" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
+    kind = "angle" if solution.spec.mechanism.drive.turns else "length"
     reported = (value_text(float(solution.motion[pose]), kind) for pose in poses)
     return list(zip(reported, _colors(len(poses)), strict=True))
 
@@ -232,7 +232,7 @@ def _supports(solution: Solution, ax: Axes) -> None:
 def reactions(result: Result) -> Figure:
     """Return the force that each beam exerts on its last node, along the drive and across it [Lan, Fig. 8]."""
     solution: Solution = result.state
-    turned = solution.spec.mechanism.drive.kind in ("rotation", "moment")
+    turned = solution.spec.mechanism.drive.turns
     names = ("to the right", "upwards") if turned else ("against the drive", "across")
     angle = np.pi if turned else solution.assembly.direction
     c, s = np.cos(angle), np.sin(angle)

@@ -76,7 +76,6 @@ finding = finder(FINDINGS)
 _NUMBER = r"(-?\d[\d.]*(?:e[+-]?\d+)?)"
 _PLACE = re.compile(rf"\b(at|near) {_NUMBER}(?![\d.e]| of )")  # not a share: "lost at 0.4 of the constant loads"
 _LENGTH = re.compile(rf"{_NUMBER} m\b")
-_DIMENSIONS = {"displacement": "length", "rotation": "angle", "force": "force", "moment": "torque"}
 
 
 def percent(share: float) -> str:
@@ -92,11 +91,7 @@ def percent(share: float) -> str:
 
 def drive_text(assembly: Assembly, value: float) -> str:
     """Return a value of the drive [SI, of one copy] as the user reads it, of all copies together."""
-    kind = assembly.spec.mechanism.drive.kind
-    if kind == "loads":
-        return f"{value:.5g} times the loads"
-    unit = assembly.parallel if kind in ("force", "moment") else 1
-    return format_short(unit * value, _DIMENSIONS[kind])
+    return assembly.spec.mechanism.drive.text(value, assembly.parallel)
 
 
 def in_units(assembly: Assembly, text: str) -> str:
@@ -276,7 +271,7 @@ def _moved(solution: Solution) -> list[str]:
 
 
 def _effort(solution: Solution) -> str:
-    return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
+    return "torque" if solution.spec.mechanism.drive.turns else "force"
 
 
 def _events(solution: Solution) -> Iterator[Finding]:

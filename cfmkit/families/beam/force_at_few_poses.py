@@ -106,7 +106,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
 
 def _followed(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:
     """Return a mechanism, its path from rest, and the path's points at places; None if it does not get there."""
-    if spec.mechanism.drive.kind != "displacement" or spec.fidelity == "solid" or spec.analysis.through_folds:
+    if not spec.mechanism.drive.is_displacement or spec.fidelity == "solid" or spec.analysis.through_folds:
         return None
     if places[0] < 0 < places[-1]:
         return None

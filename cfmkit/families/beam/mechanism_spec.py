@@ -16,6 +16,7 @@ from cfmkit.families.beam.network_elements_spec import (
     Copies,
     DriveSpec,
     LinkSpec,
+    LoadsDrive,
     LoadSpec,
     MaterialField,
     MemberSpec,
@@ -89,7 +90,7 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
         for key in ("start", "end", "node"):
             if (node := getattr(spring, key, None)) is not None:
                 yield ("springs", name, spring.kind, key), "node", node
-    driving = mechanism.drive.loads if mechanism.drive.kind == "loads" else ()
+    driving = mechanism.drive.loads if isinstance(mechanism.drive, LoadsDrive) else ()
     for place, loads in ((("loads",), mechanism.loads), (("drive", "loads", "loads"), driving)):
         for index, load in enumerate(loads):
             what = "node" if load.kind == "point" else "beam"
@@ -165,7 +166,7 @@ def _loose_nodes(mechanism: Mechanism) -> Iterator[Fault]:
 
 
 def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
-    drive = mechanism.drive
+    drive: Any = mechanism.drive
     at = ("drive", drive.kind, "node")
     leader = next((link.master for link in mechanism.links if link.node == drive.node), None)
     if leader is not None:
@@ -173,11 +174,11 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
         return
     node = mechanism.nodes[drive.node]
     along, across, rotation = HELD[node.support]
-    if drive.kind == "rotation" or drive.kind == "moment":
+    if drive.turns:
         if rotation:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}; 'pinned' lets it turn"
         return
-    if drive.kind == "loads" and not any(map(_acts, drive.loads)):
+    if isinstance(drive, LoadsDrive) and not any(map(_acts, drive.loads)):
         yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism"
     if along and across:
         way = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
@@ -206,12 +207,12 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
     copies, drive = mechanism.copies, mechanism.drive
     if copies is None:
         return
-    if copies.mirror is not None and drive.kind in ("rotation", "moment"):
+    if copies.mirror is not None and drive.turns:
         yield ("copies", "mirror"), f"two halves have no common {drive.kind}: drive them by a displacement or a force"
     if copies.layers == 1:
         return
     place = ("copies", "layers")
-    if drive.kind != "displacement" or mechanism.nodes[drive.node].support != "guided":
+    if not drive.is_displacement or mechanism.nodes[drive.node].support != "guided":
         yield place, "stages in series need a displacement as the drive, of a node that is 'guided'"
     if mechanism.springs or mechanism.loads:
         yield place, "stages in series may have beams and links only: no springs and no loads"

@@ -25,6 +25,7 @@ from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
 from cfmkit.families.beam.curve_along_its_motion import travel_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
+from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, target_of, values_of
@@ -94,7 +95,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         winding=solution.winding,
         ends=_ends(solution, stressed),
         effort_error=solution.effort_error,
-        part_efforts=None if spec.mechanism.drive.kind == "loads" else solution.part_efforts,
+        part_efforts=None if isinstance(spec.mechanism.drive, LoadsDrive) else solution.part_efforts,
         state=solution,
     )
 
@@ -134,7 +135,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     """
     spec, network = assembly.spec, assembly.network
     drive, travel = spec.mechanism.drive, spec.analysis.travel
-    if drive.kind != "displacement" or travel is None:
+    if not drive.is_displacement or travel is None:
         return
     # each of several stages makes its share of the travel
     most = _TORN * (spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1)
@@ -164,7 +165,7 @@ def _kept(assembly: Assembly, path: Path) -> tuple[Any, Any]:
     The curve has those requested, or all where folds may make it many-valued.
     """
     spec = assembly.spec
-    if spec.analysis.through_folds or spec.mechanism.drive.kind not in ("displacement", "rotation"):
+    if spec.analysis.through_folds or not spec.mechanism.drive.by_motion:
         keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_requested
         return read_only(keep, np.int64), read_only(np.empty(0), np.int64)
     on_curve = assembly.on_curve[path.requested[path.at_requested]]
@@ -220,7 +221,7 @@ def _plain_curve(solution: Solution, stressed: bool) -> Curve:
 
 
 def _kind(solution: Solution) -> Kind:
-    return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
+    return "torque" if solution.spec.mechanism.drive.turns else "force"
 
 
 def _ends(solution: Solution, stressed: bool) -> Curve | None:
@@ -240,7 +241,7 @@ def _outputs(solution: Solution) -> dict[str, Column]:
     columns = output_columns(outputs, lambda name: path.motion(name)[keep], lambda name: path.reaction(name)[keep])
     if outputs.cross_stiffness:
         columns["cross_stiffness"] = Column(solution.cross_stiffness, "stiffness")
-    if solution.spec.mechanism.drive.kind == "loads":
+    if isinstance(solution.spec.mechanism.drive, LoadsDrive):
         columns["load_factor"] = Column(path.drive[keep], "factor")
     return columns
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -20,6 +20,7 @@ from cfmkit.specs.units import (
     RotationalStiffness,
     Stiffness,
     Torque,
+    format_short,
 )
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PaddedPart, material_input
 from cfmkit.stock.materials import material
@@ -273,23 +274,51 @@ class LineLoadSpec(Model):
 LoadSpec = Annotated[PointLoadSpec | LineLoadSpec, Field(discriminator="kind")]
 
 
-class DisplacementDrive(Model):
+class Drive(Model):
+    """Base of the kinds of drives, which differ in these values; nothing else compares the name of a kind.
+
+    `cfmkit.families.beam.network_from_spec` has the load case of each kind.
+    """
+
+    by_motion: ClassVar[bool] = False  # the motion is given; else it follows from loads
+    by_load: ClassVar[bool] = False  # one load on the node is given, shared by all copies
+    turns: ClassVar[bool] = False  # the curve runs over the rotation of the node; else over its displacement
+    extent: ClassVar[str]  # key of `analysis` that says how far it goes
+    dimension: ClassVar[str]  # of that
+
+    @property
+    def is_displacement(self) -> bool:
+        """Whether a displacement is given."""
+        return self.by_motion and not self.turns
+
+    def text(self, value: float, copies: int) -> str:
+        """Return a value of the drive on one copy [SI] as a reader wants it, of all copies together."""
+        return format_short((copies if self.by_load else 1) * value, self.dimension)
+
+
+class DisplacementDrive(Drive):
     """A node is moved along a direction by `analysis.travel`; the force is the one along it."""
+
+    by_motion, extent, dimension = True, "travel", "length"
 
     kind: Literal["displacement"]
     node: str = Field(description="node that is moved")
     direction: Angle = Field(description="from the x axis; the displacement and the force count along it")
 
 
-class RotationDrive(Model):
+class RotationDrive(Drive):
     """A node is turned by `analysis.travel`; the effort is the torque."""
+
+    by_motion, turns, extent, dimension = True, True, "travel", "angle"
 
     kind: Literal["rotation"]
     node: str = Field(description="node that is turned")
 
 
-class ForceDrive(Model):
+class ForceDrive(Drive):
     """A force that grows to `analysis.force`; the displacement is the node's along the direction."""
+
+    by_load, extent, dimension = True, "force", "force"
 
     kind: Literal["force"]
     node: str = Field(description="node that is pushed")
@@ -297,18 +326,22 @@ class ForceDrive(Model):
     follows: bool = Field(False, description="whether the force turns with the node")
 
 
-class MomentDrive(Model):
+class MomentDrive(Drive):
     """A moment that grows to `analysis.moment`; the angle is the node's rotation."""
+
+    by_load, turns, extent, dimension = True, True, "moment", "torque"
 
     kind: Literal["moment"]
     node: str = Field(description="node that is twisted")
 
 
-class LoadsDrive(Model):
+class LoadsDrive(Drive):
     """Several loads that grow together, in proportion, to `analysis.factor` times what is given here.
 
     The curve runs over the displacement of one node; its force is the reference times the factor.
     """
+
+    extent, dimension = "factor", "ratio"
 
     kind: Literal["loads"]
     node: str = Field(description="node whose displacement along `direction` is the abscissa of the curve")
@@ -319,6 +352,10 @@ class LoadsDrive(Model):
     reference: Annotated[Force, Field(gt=0)] = Field(
         1.0, description="force that the curve shows where the factor is one"
     )
+
+    def text(self, value: float, copies: int) -> str:
+        """Return a value of the drive on one copy as a reader wants it."""
+        return f"{value:.5g} times the loads"
 
 
 DriveSpec = Annotated[

@@ -27,7 +27,14 @@ from cfmkit import elastica as engine
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.families.beam.network_elements_spec import HELD
+from cfmkit.families.beam.network_elements_spec import (
+    HELD,
+    DisplacementDrive,
+    ForceDrive,
+    LoadsDrive,
+    MomentDrive,
+    RotationDrive,
+)
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -100,26 +107,26 @@ class Assembly(ShortRepr):
     def drive(self) -> engine.Displacement | engine.Rotation | engine.Loading:
         """Return what is done to the network, from rest to the end: at even steps, and where windows end between."""
         spec, drive = self.spec, self.spec.mechanism.drive
-        points = self.places if drive.kind in ("displacement", "rotation") else self._even
-        if drive.kind == "displacement":
-            return engine.Displacement(self.driven, self.direction, points, self.growing(spec.extent))
-        if drive.kind == "rotation":
-            return engine.Rotation(self.driven, points, self.growing(spec.extent))
-        if drive.kind == "loads":
-            return engine.Loading((*map(_load, drive.loads), *self.growing(spec.extent)), points)
-        x, y = math.cos(self.direction), math.sin(self.direction)
-        own = (
-            engine.PointLoad(self.driven, moment=1.0)
-            if drive.kind == "moment"
-            else engine.PointLoad(self.driven, x, y, follows=drive.follows)
-        )
+        points = self.places if drive.by_motion else self._even
+        match drive:
+            case DisplacementDrive():
+                return engine.Displacement(self.driven, self.direction, points, self.growing(spec.extent))
+            case RotationDrive():
+                return engine.Rotation(self.driven, points, self.growing(spec.extent))
+            case LoadsDrive():
+                return engine.Loading((*map(_load, drive.loads), *self.growing(spec.extent)), points)
+            case MomentDrive():
+                own = engine.PointLoad(self.driven, moment=1.0)
+            case ForceDrive():
+                x, y = math.cos(self.direction), math.sin(self.direction)
+                own = engine.PointLoad(self.driven, x, y, follows=drive.follows)
         return engine.Loading((own, *self.growing(spec.extent / self.parallel)), points / self.parallel)
 
     @property
     def effort_unit(self) -> float:
         """Force or moment of all copies for one of the engine; of a drive by loads its reference [N]."""
         drive = self.spec.mechanism.drive
-        return drive.reference if drive.kind == "loads" else float(self.parallel)
+        return drive.reference if isinstance(drive, LoadsDrive) else float(self.parallel)
 
     def masses(self) -> NetworkMasses | None:
         """Return what the parts weigh; None if a density is not known."""
@@ -137,8 +144,7 @@ class Assembly(ShortRepr):
 
     def hold(self) -> tuple[str, float | None]:
         """Return what stands still while the drive is held: a node, along a direction [rad] or turned (None)."""
-        turned = self.spec.mechanism.drive.kind in ("rotation", "moment")
-        return self.driven, None if turned else self.direction
+        return self.driven, None if self.spec.mechanism.drive.turns else self.direction
 
     def growing(self, end: float) -> tuple[LoadOn, ...]:
         """Return the constant loads per unit of the drive, where they grow with it and are whole at its end."""

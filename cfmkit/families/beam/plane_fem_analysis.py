@@ -347,7 +347,7 @@ def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArr
     driven = np.zeros(3)
     along, across, turn = about.along, about.across, about.rotation
     if place.node == assembly.driven:
-        if assembly.spec.mechanism.drive.kind == "rotation":
+        if assembly.spec.mechanism.drive.turns:
             driven[2], turn = (-1.0 if flip else 1.0), True
         else:
             direction, along = assembly.direction, True
@@ -384,7 +384,7 @@ def _ended(solution: SolidSolution) -> str:
 
 
 def _turns(spec: BeamSpec) -> bool:
-    return spec.mechanism.drive.kind == "rotation"
+    return spec.mechanism.drive.turns
 
 
 def _curve(solution: SolidSolution) -> Curve:

@@ -94,10 +94,10 @@ def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
         **(_across(solution) if run.wants(ACROSS) else {}),
         **_swings(solution),
     }
-    if solution.spec.mechanism.drive.kind in ("displacement", "force", "loads"):
+    if not solution.spec.mechanism.drive.turns:
         numbers["travel_end"] = float(solution.motion[-1])
         numbers |= extremes(solution) | _events(solution)
-    if solution.spec.mechanism.drive.kind == "displacement":
+    if solution.spec.mechanism.drive.is_displacement:
         numbers |= ranges(solution)
     return quantities(DEFINITIONS, numbers) | unknown_to_beams()
 
@@ -227,13 +227,14 @@ def _across(solution: Solution) -> dict[str, float | None]:
 
     Of drives that turn it, only the stress.
     """
-    drive, window, node = solution.spec.mechanism.drive, window_of(solution), solution.assembly.driven
+    drive: Any = solution.spec.mechanism.drive
+    window, node = window_of(solution), solution.assembly.driven
 
     def stresses(path: Path) -> FloatArray:
         return path.beam_stresses()[0]
 
     total = {"stress_total_max": largest(solution, stresses, window)}
-    if drive.kind not in ("displacement", "force", "loads"):
+    if drive.turns:
         return total
 
     def across(path: Path) -> FloatArray:
@@ -282,7 +283,7 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
     Such is the stiffness across the drive of a node that is guided, where the part buckles under its guide.
     """
     law = solution.everywhere
-    if law is None or solution.spec.mechanism.drive.kind != "displacement":
+    if law is None or not solution.spec.mechanism.drive.is_displacement:
         return False
     for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
         if window[0] <= place <= window[1]:
@@ -297,7 +298,7 @@ def natural(solution: Solution) -> dict[str, FloatArray]:
     found = solution.frequencies
     if found is None:
         return {}
-    by_motion = solution.spec.mechanism.drive.kind in ("displacement", "rotation")
+    by_motion = solution.spec.mechanism.drive.by_motion
     held = found.held if not by_motion else np.where(solution.stable[:, None], found.held, np.nan)
     free = np.where(solution.stable[:, None], found.free, np.nan)
     return {"held": np.where(solution.accurate[:, None], held, np.nan), "free": free}
@@ -363,7 +364,7 @@ def _turn(along: AlongMotion, found: tuple[float, float] | None) -> tuple[float,
 
 def _events(solution: Solution) -> dict[str, float | None]:
     """Return where the drive has its first limit point and its first bifurcation."""
-    kind = "displacement" if solution.spec.mechanism.drive.kind == "displacement" else "force"
+    kind = "displacement" if solution.spec.mechanism.drive.is_displacement else "force"
     unit = solution.assembly.effort_unit if kind == "force" else 1
     found: dict[str, float | None] = {}
     for name, event in (("limit", "limit point"), ("bifurcation", "bifurcation")):

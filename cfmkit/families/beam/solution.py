@@ -55,11 +55,11 @@ class Solution(ShortRepr):
     @cached_property
     def motion(self) -> FloatArray:
         """Displacement or rotation of the driven node along the drive [m or rad]."""
-        kind = self.spec.mechanism.drive.kind
-        if kind in ("displacement", "rotation"):
+        drive = self.spec.mechanism.drive
+        if drive.by_motion:
             return read_only(self.path.drive[self.keep])
         moved = self.path.motion(self.assembly.driven)[self.keep]
-        if kind == "moment":
+        if drive.turns:
             return read_only(moved[:, 2])
         angle = self.assembly.direction
         along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
@@ -68,15 +68,15 @@ class Solution(ShortRepr):
     @property
     def motion_dimension(self) -> str:
         """The dimension of the motion: "length" or "angle"."""
-        return "angle" if self.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
+        return "angle" if self.spec.mechanism.drive.turns else "length"
 
     @cached_property
     def everywhere(self) -> BetweenPoints | None:
         """The equilibria between the points of the path; None of paths whose motion turns back."""
-        kind, axial = self.spec.mechanism.drive.kind, self.spec.stress == "total"
+        drive, axial = self.spec.mechanism.drive, self.spec.stress == "total"
         unit, allowed = self.assembly.effort_unit, self.assembly.allowable_stress
-        if kind not in ("displacement", "rotation"):
-            along = None if kind == "moment" else self.assembly.direction
+        if not drive.by_motion:
+            along = None if drive.turns else self.assembly.direction
             return between_loads(self.path, self.assembly.driven, along, unit, axial, allowed)
         return between_points(self.path, unit, axial, allowed)
 
@@ -96,14 +96,13 @@ class Solution(ShortRepr):
     @cached_property
     def effort(self) -> FloatArray:
         """Force [N] or torque [N m] of all copies; none where the tolerance is not reached."""
-        by_motion = self.spec.mechanism.drive.kind in ("displacement", "rotation")
-        effort = self.path.effort if by_motion else self.path.drive
+        effort = self.path.effort if self.spec.mechanism.drive.by_motion else self.path.drive
         return read_only(np.where(self.accurate, self.assembly.effort_unit * effort[self.keep], np.nan))
 
     @cached_property
     def effort_error(self) -> float | None:
         """Numerical error of the effort [N or N m]; None under a load, which is the effort itself."""
-        if self.spec.mechanism.drive.kind not in ("displacement", "rotation"):
+        if not self.spec.mechanism.drive.by_motion:
             return None
         return self.assembly.effort_unit * effort_error(self.path, self.spec.analysis.tolerance)
 
@@ -198,7 +197,7 @@ class Solution(ShortRepr):
 
         nan where nothing gives way, where the tolerance is not reached, and of drives that turn.
         """
-        if self.spec.mechanism.drive.kind in ("rotation", "moment") or not len(self.keep):
+        if self.spec.mechanism.drive.turns or not len(self.keep):
             return read_only(np.full(len(self.keep), np.nan))
         from cfmkit.elastica.results.cross_stiffness import cross_stiffness
 

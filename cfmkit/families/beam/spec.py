@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.beam.mechanism_spec import Mechanism
-from cfmkit.families.beam.network_elements_spec import BeamMaterial, MaterialField
+from cfmkit.families.beam.network_elements_spec import BeamMaterial, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
@@ -21,7 +21,7 @@ from cfmkit.specs.units.fields import LARGEST
 from cfmkit.stock.material_and_part_spec import sheet_faults, sheet_of
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
-_EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}
+EXTENTS = tuple(dict.fromkeys(kind.extent for kind in Drive.__subclasses__()))
 
 
 class FileProfile(Model):
@@ -322,32 +322,31 @@ class BeamSpec(Spec):
     @property
     def motion(self) -> Literal["length", "angle"]:
         """What the curve runs over: the displacement or the angle of the driven node."""
-        return "angle" if self.mechanism.drive.kind in ("rotation", "moment") else "length"
+        return "angle" if self.mechanism.drive.turns else "length"
 
     @property
     def extent(self) -> float:
         """How far the drive goes: the travel [m or rad], the force [N] or the moment [N m]."""
-        value: float = getattr(self.analysis, _EXTENT[self.mechanism.drive.kind])
+        value: float = getattr(self.analysis, self.mechanism.drive.extent)
         return float(value)
 
 
 def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield what is wrong with how far the drive is to go."""
-    kind, analysis = spec.mechanism.drive.kind, spec.analysis
-    wanted = _EXTENT[kind]
-    others = [name for name in _EXTENT.values() if name != wanted and getattr(analysis, name) is not None]
-    for name in dict.fromkeys(others):
+    drive, analysis = spec.mechanism.drive, spec.analysis
+    kind, wanted = drive.kind, drive.extent
+    others = [name for name in EXTENTS if name != wanted and getattr(analysis, name) is not None]
+    for name in others:
         yield (name,), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
     value = getattr(analysis, wanted)
     if value is None and not others:
         yield (), f"the key {wanted!r} is missing: how far a drive of kind {kind!r} goes"
     if value == 0:
         yield (wanted,), "must not be 0: the drive has to do something"
-    if analysis.surface is not None and kind != "displacement":
+    if analysis.surface is not None and not drive.is_displacement:
         yield ("surface",), "a surface needs a drive of kind 'displacement'"
-    dimension = {"displacement": "length", "rotation": "angle"}.get(kind)
-    if value is not None and dimension and value.dimension != dimension:
-        yield (wanted,), f"must be {DIMENSIONS[dimension].phrase} for a drive of kind {kind!r}"
+    if value is not None and drive.by_motion and value.dimension != drive.dimension:
+        yield (wanted,), f"must be {DIMENSIONS[drive.dimension].phrase} for a drive of kind {kind!r}"
 
 
 def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -363,7 +362,7 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
                 yield (group, number), f"a link moves {name!r}: what is held is its master, {moved[name]!r}"
             elif group == "reactions" and not (mechanism.nodes[name].support != "free" or name == mechanism.drive.node):
                 yield (group, number), f"nothing holds {name!r}: it has no support and is not driven"
-    if outputs.cross_stiffness and mechanism.drive.kind in ("rotation", "moment"):
+    if outputs.cross_stiffness and mechanism.drive.turns:
         yield (
             ("cross_stiffness",),
             f"a drive of kind {mechanism.drive.kind!r} has no direction, and so no stiffness across it",
@@ -377,7 +376,7 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     """Yield what the model of the part as a solid cannot do: the key, and why."""
     mechanism, analysis, beams = spec.mechanism, spec.analysis, spec.mechanism.beams
-    by_load = mechanism.drive.kind in ("force", "moment")
+    by_load = mechanism.drive.by_load
     moved = [f"mechanism.nodes.{name}.moved" for name, node in mechanism.nodes.items() if node.moved is not None]
     pins = [
         f"mechanism.beams.{name}.{joint}"
@@ -388,7 +387,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     things: tuple[tuple[str, object, str], ...] = (
         (
             "mechanism.drive",
-            mechanism.drive.kind == "loads",
+            isinstance(mechanism.drive, LoadsDrive),
             "one node is moved or loaded, and no path of loads followed",
         ),
         ("mechanism.drive.follows", getattr(mechanism.drive, "follows", False), "its loads keep their direction"),
@@ -456,7 +455,7 @@ def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
     if spec.design is None or spec.design.rescale is None:
         return
     mechanism = spec.mechanism
-    if mechanism.drive.kind != "displacement":
+    if not mechanism.drive.is_displacement:
         yield "needs a drive of kind 'displacement': the force at the end of its window is scaled"
     moved = any(node.moved is not None for node in mechanism.nodes.values())
     if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection:

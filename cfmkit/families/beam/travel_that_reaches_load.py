@@ -23,13 +23,13 @@ UNBENT = 1e-3
 
 def driven_by_load(spec: BeamSpec) -> bool:
     """Return True if a force or a moment drives a mechanism."""
-    return spec.mechanism.drive.kind in ("force", "moment")
+    return spec.mechanism.drive.by_load
 
 
 def moved_by(spec: BeamSpec, travel: float) -> BeamSpec:
     """Return a mechanism that a load drives with its node moved by that load's motion instead [m or rad]."""
     drive: Any = spec.mechanism.drive
-    if drive.kind == "moment":
+    if drive.turns:
         given, extent = {"kind": "rotation", "node": drive.node}, f"{travel!r} rad"
     else:
         given = {"kind": "displacement", "node": drive.node, "direction": drive.direction}

@@ -150,7 +150,7 @@ class Optimise(Model):
 
 def optimise_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Yield what keeps the block from making sense with its mechanism, each with its place below the block."""
-    if mechanism.drive.kind != "displacement":
+    if not mechanism.drive.is_displacement:
         yield (), f"needs a drive of kind 'displacement', not {mechanism.drive.kind!r}"
     for name, node in wanted.free.items():
         if name not in mechanism.nodes:
