@@ -161,8 +161,9 @@ def test_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsy
     check_mutants(quiet_folder, 30, 1, capsys)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.slow if seed < 5 else pytest.mark.long) for seed in range(10)]
+)
 def test_ten_thousand_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys, seed):
     check_mutants(quiet_folder, 1000, seed, capsys)
 

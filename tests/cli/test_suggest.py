@@ -18,7 +18,7 @@ from cfmkit.cli.verbs.suggest import _page
 WISHES = Path(__file__).parents[1] / "wishes"
 FEASIBLE = sorted(path.stem for path in (WISHES / "sources").glob("*.yaml"))
 UNREACHABLE = sorted(path.stem for path in WISHES.glob("unreachable-*.yaml"))
-SLOW = "cam-six-springs", "vcfm-ding", "unreachable-torque-of-a-coin"
+SLOW = "cam-six-springs", "unreachable-torque-of-a-coin"
 CONTRADICTIONS = sorted(path.stem for path in WISHES.glob("contradiction-*.yaml"))
 
 

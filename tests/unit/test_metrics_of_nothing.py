@@ -1,5 +1,7 @@
 """Efforts that are zero up to rounding: what is relative to them has no value; `static_balance` judges balancers."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from metrics_support import curve
@@ -108,6 +110,13 @@ def test_static_balance_of_a_spring_balancer(tmp_path, rate, balance):
     if rate == 0.5:
         assert "static_balance" in found["torque_ripple"].reason
         assert found["usable_stroke"].value is None
+
+
+def test_a_bifurcation_on_the_way_makes_no_balancer():
+    """Just there a path has two directions, and the effort of a member came out a hundred times as large."""
+    spec = cfmkit.load(Path(__file__).parents[2] / "configs" / "beam_v_bifurcation.yaml")
+    found = cfmkit.analyze(spec.replace({"analysis.points": 81}))
+    assert found.metrics["static_balance"].value > 1.0
 
 
 def test_a_truss_that_ends_without_force_misses_its_range(tmp_path, monkeypatch, capsys):

@@ -119,7 +119,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def peaks(self) -> FloatArray:
         """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
-        beside = {*self._beside[:, [0, 2]].ravel().tolist()}
+        beside = {*self.beside[:, [0, 2]].ravel().tolist()}
         return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
 
     @cached_property
@@ -128,7 +128,7 @@ class BetweenPoints(ShortRepr):
         return read_only(self._scale * np.array([corner.drive for corner in self._corners.values()]))
 
     @cached_property
-    def _beside(self) -> FloatArray:
+    def beside(self) -> FloatArray:
         """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
         found, points = np.empty((len(self.corners), 3)), self._points
         for number, corner in enumerate(self.corners):
@@ -143,11 +143,11 @@ class BetweenPoints(ShortRepr):
         """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
         x, effort = self._points, self._efforts
         if len(self.corners):
-            beside = np.setdiff1d(self._beside, x)
+            beside = np.setdiff1d(self.beside, x)
             x, effort = inserted(x, effort, beside, self.effort("", beside))
         for _ in range(ROUNDS):
             more = inner_extremes(x, effort)
-            for low, _, high in self._beside.tolist():
+            for low, _, high in self.beside.tolist():
                 more = more[(more < low) | (more > high)]
             if not len(more):
                 break

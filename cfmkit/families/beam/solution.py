@@ -34,6 +34,7 @@ _NOTHING = 1e-15
 """Share of the largest displacement: a few units in the last place, as of the cosine of 90 deg."""
 
 _POSES = 7
+AT_CORNER = 1e-9  # share of the travel within which a place is that of a corner
 _FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
 
 
@@ -121,6 +122,17 @@ class Solution(ShortRepr):
         return np.asarray(np.where((at >= low) & (at <= high), between, 0.0).max(axis=1))
 
     def _part_efforts_at(self, places: FloatArray) -> FloatArray:
+        assert self.everywhere is not None
+        found, near = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
+        for corner, *sides in self.everywhere.beside[:, [1, 0, 2]].tolist():
+            here = np.abs(places - corner) <= near
+            if here.any():  # the path has two directions: along one it may grow without bound, along the other it goes on
+                steps = np.array([side - corner for side in sides if side != corner])
+                one, two = (self._solved_part_efforts(corner + count * steps) for count in (1, 2))
+                found[here] = (2 * one - two)[one.argmin()]
+        return found
+
+    def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
         assert self.everywhere is not None
         there = self.everywhere.at(places)
         alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
