@@ -126,7 +126,7 @@ class Solution(ShortRepr):
         found, near = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
         for corner, *sides in self.everywhere.beside[:, [1, 0, 2]].tolist():
             here = np.abs(places - corner) <= near
-            if here.any():  # the path has two directions: along one it may grow without bound, along the other it goes on
+            if here.any():  # the path has two directions: along one it may be unbounded, along the other it goes on
                 steps = np.array([side - corner for side in sides if side != corner])
                 one, two = (self._solved_part_efforts(corner + count * steps) for count in (1, 2))
                 found[here] = (2 * one - two)[one.argmin()]
