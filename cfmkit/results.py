@@ -61,7 +61,7 @@ def round_off(parts: FloatArray) -> float:
 
 
 class Status(Enum):
-    """How a solve ended."""
+    """End of a solve."""
 
     COMPLETE = "solved over everything that was requested"
     PARTIAL = "solved in part: the curve ends early, or some points failed"

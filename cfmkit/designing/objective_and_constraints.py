@@ -71,7 +71,7 @@ def held(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class SeenPoint:
-    """What is known at a point: the objective with its derivatives (k,), if they were requested, and all rows."""
+    """Values at a point: the objective with its derivatives (k,), if they were requested, and all rows."""
 
     objective: float
     slope: FloatArray | None

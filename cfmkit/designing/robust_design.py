@@ -60,7 +60,7 @@ FLOOR = 1e-2
 
 
 class SeenPart(Protocol):
-    """What a family sees of a part."""
+    """Numbers of a part by its family."""
 
     def __call__(self, x: FloatArray, errors: FloatArray, /) -> FloatArray | None:
         """Return the numbers of a part (q,) whose design has the values x (n,) and whose errors are (d,); or None."""
@@ -75,7 +75,7 @@ class PartSlopes:
 
 
 class SlopedPart(Protocol):
-    """What a family knows of the derivatives of a part's numbers."""
+    """Derivatives of a part's numbers by its family."""
 
     def __call__(self, x: FloatArray, errors: FloatArray, /) -> PartSlopes | None:
         """Return the derivatives at the values x (n,) and errors (d,); None if none is known."""
@@ -97,7 +97,7 @@ def unheard(_share: float, _steps: int) -> None:
 
 @dataclass(frozen=True)
 class RobustProblem:
-    """What may vary, what errors there are, and what must hold."""
+    """Variables, errors of manufacture, and constraints."""
 
     # numbers of a part: its design's values (n,) and its errors (d,) in, (q,) out; None if it has none
     seen: SeenPart
@@ -155,7 +155,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class RobustResult:
-    """Where the steps ended."""
+    """End of the steps."""
 
     x: FloatArray  # (n,): values of the design
     share: float  # of good parts, estimated to first order, even where drawn parts were solved themselves

@@ -27,7 +27,7 @@ KEY_DIGITS = 32
 
 
 class Notes(Protocol):
-    """Where a long run notes what it has finished, for the run after it: `cfmkit.studies.journal.Journal`."""
+    """Notes of a long run on what it has finished, for the run after it: `cfmkit.studies.journal.Journal`."""
 
     def find(self, key: str, /) -> int:
         """Return where the record of a key (32 hexadecimal digits) lies; -1 if there is none."""
@@ -40,7 +40,7 @@ class Notes(Protocol):
 
 
 class Means(Protocol):
-    """What starts are done with: the processes, and the notes."""
+    """Processes and notes that starts use."""
 
     @property
     def executor(self) -> Callable[..., Iterator[tuple[Any, Any]]]:
@@ -78,7 +78,7 @@ NEVER = Clock()
 
 @dataclass(frozen=True)
 class OneStart:
-    """What a process does: from the number of a start to the record of what it led to."""
+    """Work of a process: from the number of a start to the record of what it led to."""
 
     # from the number to a dataclass of numbers, words and arrays; None: nothing. It is sent to other processes
     search: Callable[[int], Any]
@@ -117,7 +117,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Done:
-    """What the jobs of a stage led to."""
+    """Results of the jobs of a stage."""
 
     records: Mapping[int, dict[str, Any]]  # number of the job -> its record; those that were not done are left out
     reused: int  # how many were noted by a run before

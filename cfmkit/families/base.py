@@ -47,7 +47,7 @@ class Block:
 
 @dataclass(frozen=True)
 class BlockAnswer:
-    """What a vectorised model knows about a block."""
+    """Answer of a vectorised model about a block."""
 
     done: NDArray[Any]  # (n,): the variants that it solved completely; all others are analysed one by one
     # for each measure: branch -> (n,) array of SI values, NaN where undefined. What is no matter of one branch stands
@@ -284,7 +284,7 @@ class Family:
 
     @property
     def leading(self) -> tuple[str, ...]:
-        """What pages show first: the headline, and how far a curve is from the one that was to be followed."""
+        """Values that pages show first: the headline, and how far a curve is from the one that was to be followed."""
         return (*self.headline, "deviation_from_curve")
 
     @property

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Executor(Protocol):
-    """How independent jobs get done: see `cfmkit.studies.serial_and_cluster_executors` and `cfmkit.studies.pool`."""
+    """Executor of independent jobs: see `cfmkit.studies.serial_and_cluster_executors` and `cfmkit.studies.pool`."""
 
     def __call__(
         self, work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
@@ -107,7 +107,7 @@ def read_time(time: str | float | None, name: str = "time_budget") -> float | No
 
 @dataclass(frozen=True)
 class Run:
-    """How a function is to be run.
+    """Options of one run of a function.
 
     Attributes
     ----------

@@ -45,7 +45,7 @@ STATED_ERROR = 1e-12
 
 @dataclass(frozen=True)
 class MeasuringFrame:
-    """What a curve is measured against."""
+    """References that a curve is measured against."""
 
     target: float | None = None  # the force or torque it should have [N or N m]
     reference: float | None = None  # motion of the reference pose [m or rad]; default: the centre of the window
@@ -211,7 +211,7 @@ class Branch:
 
     @property
     def inside_beside(self) -> tuple[BranchTrace, ...]:
-        """What lies in the window of the other load cases, as far as each of them goes."""
+        """Parts in the window of the other load cases, as far as each of them goes."""
         if self.window is None:
             return self.beside
         clipped = ((one, max(one.extent[0], self.window.lo), min(one.extent[1], self.window.hi)) for one in self.beside)

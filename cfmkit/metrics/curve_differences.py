@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """What one curve has more than another on one branch."""
+    """Difference of two curves on one branch."""
 
     values: FloatArray  # (n,): one less the other at each place [N or N m]; NaN where one of them has no value
     reason: str  # why they cannot be summed up, should one of them be NaN

@@ -78,7 +78,7 @@ class FatigueLaw:
 
 @dataclass(frozen=True)
 class RelaxationLaw:
-    """How the modulus falls at a constant strain."""
+    """Fall of the modulus at a constant strain."""
 
     # share and relaxation time [s] of each Prony term; empty where `points` are given
     terms: tuple[tuple[float, float], ...] = ()
@@ -104,7 +104,7 @@ class RelaxationLaw:
 
 @dataclass(frozen=True)
 class Durability:
-    """What is known of a material in use: its fatigue, its relaxation, and the holds [s] that are reported."""
+    """Durability of a material: its fatigue, its relaxation, and the holds [s] that are reported."""
 
     fatigue: FatigueLaw | None = None
     relaxation: RelaxationLaw | None = None

@@ -44,7 +44,7 @@ _WORDS = {"force": "displacement", "torque": "angle"}
 
 @dataclass(frozen=True)
 class Definition:
-    """What a metric is."""
+    """Definition of a metric."""
 
     name: str  # as requirements and tables call it
     dimension: str  # a name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve

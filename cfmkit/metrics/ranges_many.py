@@ -51,12 +51,12 @@ class ManyBranches:
 
     @property
     def reference(self) -> FloatArray:
-        """Where bands are taken, (d,)."""
+        """Places at which bands are taken, (d,)."""
         return (self.low + self.high) / 2 if self.pose is None else self.pose
 
     @cached_property
     def solved(self) -> tuple[FloatArray, FloatArray]:
-        """Where 95 % is first reached, (d,), and the widths of `BAND_RANGES`, (d, 3), of branches that are known."""
+        """Places at which 95 % is first reached, (d,), and widths of `BAND_RANGES`, (d, 3), of known branches."""
         return _solved(self)
 
     @cached_property

@@ -100,7 +100,7 @@ _MOTION = {"force": "length", "torque": "angle"}
 
 @dataclass(frozen=True, repr=False)
 class Outcome(ShortRepr):
-    """What became of one requirement; SI throughout."""
+    """Outcome of one requirement; SI throughout."""
 
     metric: str  # as written in the requirement
     dimension: str  # of the metric

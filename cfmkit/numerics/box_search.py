@@ -43,7 +43,7 @@ SMALLEST = 1e-6
 
 @dataclass(frozen=True)
 class Lowest:
-    """Where a function is smallest."""
+    """Smallest value found, and its place."""
 
     place: tuple[float, ...]  # the variables
     value: float  # the function there; infinite if it is so everywhere

@@ -49,7 +49,7 @@ class CurveFrame:
 
 
 class SmoothCurve(Protocol):
-    """What points can be registered to."""
+    """Curve that points can be registered to."""
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -61,7 +61,7 @@ class SmoothCurve(Protocol):
 
 @dataclass(frozen=True)
 class Registration:
-    """Where measured points lie on their curves."""
+    """Places of measured points on their curves."""
 
     angle: float  # of the motion from measured to registered points [rad]
     shift: FloatArray  # (2,): of the motion, after the turn

@@ -37,7 +37,7 @@ class SearchEnding(Enum):
 
 
 class Program(Protocol):
-    """What is minimised: an objective, and constraints that are to be at least zero, both of order one."""
+    """Program to minimise: an objective, and constraints that are to be at least zero, both of order one."""
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return the objective and the constraints (m,) at z (n,); None if the model has no answer."""
@@ -53,7 +53,7 @@ def _never() -> bool:
 
 @dataclass(frozen=True)
 class Effort:
-    """How long to try."""
+    """Limits of rounds and time."""
 
     steps: int = 60  # at most so many
     tolerance: float = 1e-6  # a change of the objective that is small

@@ -31,7 +31,7 @@ SKIPPED, LEFT = "skipped", "not run: an earlier specification failed"
 
 @dataclass(frozen=True)
 class Entry:
-    """What became of one specification."""
+    """Outcome of one specification."""
 
     spec: str  # the file, as it was named or found
     folder: str  # where its files are, below the output folder

@@ -86,13 +86,13 @@ class FidelityComparison:
 
     @property
     def shortfall(self) -> str:
-        """What is missing of the curves beside the nominal one, in one sentence; empty if nothing is."""
+        """Missing parts of the curves beside the nominal one, in one sentence; empty if nothing is."""
         failed = [item for item in self.variants[1:] if item.result.status is not Status.COMPLETE]
         return "; ".join(f"fidelity {item.name}: {item.result.message}" for item in failed)
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What is left out, and what the others warn of and the nominal one does not."""
+        """Left-out parts, and warnings of the others that the nominal one does not have."""
         reported = {item.name for item in self.variants[0].result.warnings}
         gone = [Finding("fidelity_left_out", f"{name!r} cannot run here: {why}") for name, why in self.left_out.items()]
         more = [
@@ -105,7 +105,7 @@ class FidelityComparison:
 
     @cached_property
     def windows(self) -> Mapping[str, Window]:
-        """Where each of the others can be compared: where both exist, inside `analysis.window`."""
+        """Ranges in which each of the others can be compared: where both exist, inside `analysis.window`."""
         found = {}
         for item in self.compared:
             if (window := self._window(item)) is not None:
@@ -146,7 +146,7 @@ class FidelityComparison:
 
     @property
     def kind(self) -> Kind:
-        """What the curves are; of a mechanism without any it does not matter."""
+        """Kind of the curves; of a mechanism without any it does not matter."""
         return self.curves[0].kind if self.curves else "force"
 
     def _measures(self, item: Variant) -> Mapping[str, Measure]:

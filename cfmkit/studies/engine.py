@@ -56,7 +56,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """What a worker needs to do any job of a study."""
+    """Everything a worker needs to do any job of a study."""
 
     study: Study
     plan: Plan
@@ -112,7 +112,7 @@ class Work:
 
 
 class Monitor(Protocol):
-    """Who is told how far a study is, and may stop it."""
+    """Progress callbacks of a study, which may stop it."""
 
     def total(self, points: int) -> None:
         """Take how many points there are."""

@@ -28,7 +28,7 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True)
 class Earlier:
-    """What an earlier batch found for one specification: how it ended, and its metrics as metrics.json has them."""
+    """Status and metrics of one specification in an earlier batch, as metrics.json has them."""
 
     status: str
     exit_code: int

@@ -65,7 +65,7 @@ class Plan:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """What varies."""
+        """Paths of the values that vary."""
         return tuple(item.path for item in self.variables)
 
     def point(self, index: int) -> tuple[Any, ...]:
@@ -150,7 +150,7 @@ def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
 
 @dataclass(frozen=True)
 class Draw:
-    """How points are drawn: a Latin hypercube or a scrambled Sobol sequence, of how many points, from which seed."""
+    """Draw of points: a Latin hypercube or a scrambled Sobol sequence, of how many points, from which seed."""
 
     method: Literal["lhs", "sobol"]
     count: int

@@ -66,7 +66,7 @@ class Metric:
 
 @dataclass(frozen=True)
 class Row:
-    """What became of one point."""
+    """Outcome of one point."""
 
     status: Status  # how its analysis ended
     values: tuple[float | None, ...] = ()  # one for each metric of the study [SI]; all None if nothing was solved

@@ -85,7 +85,7 @@ DIGITS = 6
 
 @dataclass
 class Sight:
-    """What is seen of a part: `cfmkit.designing.robust_design.SeenPart`."""
+    """Requirement values of one manufactured part: `cfmkit.designing.robust_design.SeenPart`."""
 
     spec: Spec  # the design that the search began with
     free: tuple[str, ...]  # paths of the values that may move

@@ -49,7 +49,7 @@ class DesignTolerances:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """What varies."""
+        """Paths of the values that vary."""
         return tuple(one.path for one in self.parameters)
 
     @property

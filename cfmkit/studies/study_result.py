@@ -79,7 +79,7 @@ class StudyResult:
 
     @property
     def figures(self) -> Mapping[str, Callable[[], Figure]]:
-        """What draws each picture of a study, by its name: ``study.figures["force_mean"]()``."""
+        """Functions that draw each picture of a study, by its name: ``study.figures["force_mean"]()``."""
         if self.findings is not None:
             from cfmkit.plots.sensitivity import figures
 

@@ -41,7 +41,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True)
 class Objective:
-    """What makes a point better than another: the column of a metric, and which of its values are better."""
+    """Order of points from best to worst: the column of a metric, and which of its values are better."""
 
     column: int  # of the study
     largest: bool  # whether more is better
@@ -206,7 +206,7 @@ class Summary:
 
     @property
     def message(self) -> str:
-        """How many points ended how, in one line."""
+        """Number of points of each status, in one line."""
         ends = ", ".join(f"{count} {status.key.replace('_', ' ')}" for status, count in self._ordered() if count)
         return f"{self.total} points: {ends}" if self.total else "no point was finished"
 

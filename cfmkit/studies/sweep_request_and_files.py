@@ -33,7 +33,7 @@ NOTHING = "nothing to vary: give --vary '{example}', or add a block 'sweep: {var
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What a sweep is asked to do; what is left out follows the specification's block `sweep`."""
+    """Options of a sweep; what is left out follows the specification's block `sweep`."""
 
     # what varies; none: as in the specification. What is given replaces all of that
     vary: tuple[WantedVariation, ...] = ()

@@ -48,7 +48,7 @@ class SolvedVariants:
 
     @cached_property
     def _travels(self) -> list[tuple[float, float]]:
-        """Where the motion of each starts, and where it ends."""
+        """Start and end of the motion of each."""
         curves = next(iter(self.solved.branches.values()))
         return list(zip(*(end.tolist() for end in curves.extent), strict=True))
 

@@ -26,7 +26,7 @@ LARGEST = 10**18
 
 @dataclass(frozen=True)
 class WantedVariation:
-    """What a user wants to vary, as it was written."""
+    """Variations as the user wrote them."""
 
     path: str  # dotted
     content: str | tuple[Any, ...]  # ``start:stop:n`` or a list of values

@@ -53,7 +53,7 @@ TRIED = 3
 
 @dataclass(frozen=True)
 class YieldShare:
-    """How many of some parts are good."""
+    """Share of good parts among some."""
 
     # good, failed, count: parts that meet everything, that have no complete result, and all
     good: int
@@ -250,7 +250,7 @@ def _window(result: Result) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Yields:
-    """What is known of many parts of a design."""
+    """Judgement of many parts of a design."""
 
     made: DesignTolerances  # on the design
     # after, trimmed: of its parts, as they are and after the trim

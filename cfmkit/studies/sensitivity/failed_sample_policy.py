@@ -81,7 +81,7 @@ def envelope(one: Analysis, other: Analysis) -> Analysis:
 
 @dataclass(frozen=True)
 class Blocks:
-    """What was evaluated."""
+    """Evaluated samples."""
 
     points: FloatArray  # (b, s, d): blocks of points
     outputs: FloatArray  # (b, s, m): NaN where there is no value

@@ -38,7 +38,7 @@ CLOSE = 1e-3
 
 @dataclass(frozen=True)
 class LimitsAlong:
-    """How limits move with the error of one parameter."""
+    """Changes of limits with the error of one parameter."""
 
     offsets: FloatArray  # (p,): errors at which that is known, increasing, 0 among them
     changes: FloatArray  # (p, m): of the limits there

@@ -58,7 +58,7 @@ class Findings:
 
     @property
     def unstated(self) -> int:
-        """How many indices need a value that is missing."""
+        """Number of indices that need a value that is missing."""
         return sum(line.value is None for line in self.lines if line.index not in OPTIONAL)
 
     @cached_property
@@ -72,7 +72,7 @@ class Findings:
 
     @property
     def lacking(self) -> int:
-        """How many indices are not stated because samples have no value, not because nothing varies."""
+        """Number of indices that are not stated because samples have no value, not because nothing varies."""
         gone = (line for line in self.lines if line.value is None and line.index not in OPTIONAL)
         return sum(line.metric not in self.constant for line in gone)
 

@@ -73,12 +73,12 @@ class Setup:
 
     @property
     def method(self) -> Method:
-        """How the indices or tolerances are computed."""
+        """Method by which the indices or tolerances are computed."""
         return self.block.method
 
     @property
     def policy(self) -> Policy:
-        """What becomes of failed samples."""
+        """Policy for failed samples."""
         return self.block.on_failure
 
     @property

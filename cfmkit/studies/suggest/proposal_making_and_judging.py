@@ -75,7 +75,7 @@ class ProposalJob:
 
 @dataclass(frozen=True)
 class Proposal:
-    """What became of a candidate: plain values, which a journal can keep."""
+    """Outcome of a candidate: plain values, which a journal can keep."""
 
     # family, variant: whose it is
     family: str
@@ -114,7 +114,7 @@ class Proposal:
 
     @property
     def open(self) -> tuple[str, ...]:
-        """What was not judged, each in a few words; empty if all was."""
+        """Requirements that were not judged, each in a few words; empty if all was."""
         not_run = (f"{self.model} model; {self.pending} not run",) if self.pending else ()
         return (*not_run, *self.unjudged)
 

@@ -84,7 +84,7 @@ class _Times:
 
 @dataclass(frozen=True)
 class Answered:
-    """What one family had to say: how many candidates it named and how many were made, or why there are none.
+    """Candidates of one family: how many it named and how many were made, or why there are none.
 
     Where no family has a mechanism, `nearest` says with which values of a key it would have one.
     """
@@ -97,7 +97,7 @@ class Answered:
 
 @dataclass(frozen=True)
 class Suggestions:
-    """What came of a wish."""
+    """Outcome of a wish."""
 
     wish: Wish
     # those that do all that is wished, judged by the finest model of their family, the best first
@@ -113,7 +113,7 @@ class Suggestions:
 
     @property
     def listed(self) -> tuple[Proposal, ...]:
-        """What has a folder: what meets the wish, then what was not judged in full."""
+        """Proposals that have a folder: what meets the wish, then what was not judged in full."""
         return (*self.proposals, *self.unjudged)
 
 

@@ -36,7 +36,7 @@ Prefer = Literal["size", "ripple", "parts", "stress", "depth"]
 
 
 class WishBlock(Model):
-    """What somebody wants of a mechanism. Force with travel, or torque with angle; every number is a hard limit."""
+    """Wish for a mechanism. Force with travel, or torque with angle; every number is a hard limit."""
 
     force: PositiveForce | tuple[PositiveForce, PositiveForce] | None = Field(
         None, description="force to keep constant; or a band that contains every force: [19 N, 21 N]"

@@ -57,7 +57,7 @@ OUT_OF_TIME = "the time budget ended before its manufactured parts were evaluate
 
 @dataclass(frozen=True)
 class GoodParts:
-    """What is known of a proposal's made parts."""
+    """Yield of a proposal's made parts, and its assumptions."""
 
     # of them that are good: of `PARTS`, or to first order where `missed` says so; None if nothing is known
     share: float | None
