@@ -23,13 +23,14 @@ from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
-from cfmkit.elastica.results.stress_between_points import inserted, stress_knots
+from cfmkit.elastica.results.stress_between_points import inserted, solve_extremes, solve_passes
 from cfmkit.numerics.cubic_interpolation import crossing, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.equations import MarchState, NumpyEquations
     from cfmkit.elastica.results.path import EquilibriumPath
+    from cfmkit.elastica.results.stress_between_points import Knots
 
 FEWEST = 4  # points of a path below which nothing is said of what lies between them: a cubic needs four
 
@@ -155,17 +156,31 @@ class BetweenPoints(ShortRepr):
         return Several((read_only(x), read_only(effort)))
 
     @cached_property
-    def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:
+    def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
         """Of each stretch between corners, and there of each beam, smooth variables and stresses.
 
-        They are those of the path and its corners, extremes between them that may be the largest, and where the
-        allowable stress is passed.
+        They are those of `_extremes`, and where the allowable stress is passed.
         """
-        corners = list(self._corners.values())
-        numbers = np.searchsorted([corner.drive for corner in corners], self._drive)
-        names = list(self.path.network.beams)
+        if self.allowed is None:
+            return self._extremes
+        numbers, found = self._stretch_numbers, []
+        for number, (stretch, knots) in enumerate(self._extremes):
+            points = stretch.smooth(self._drive[numbers == number])
+            solve = partial(self._solved_stress, stretch)
+            found.append((stretch, solve_passes(knots, points, solve, self.allowed)))
+        return tuple(found)
+
+    @cached_property
+    def _stretch_numbers(self) -> Any:
+        """Number of the stretch between corners that each point is on."""
+        return np.searchsorted([corner.drive for corner in self._corners.values()], self._drive)
+
+    @cached_property
+    def _extremes(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
+        """The same of the path and its corners, and extremes between them that may be the largest."""
+        corners, numbers = list(self._corners.values()), self._stretch_numbers
         at_points = self.path.beam_stresses(self.axial)[0][:, self._order]
-        at_corners = np.empty((0, len(names)))
+        at_corners = np.empty((0, len(at_points)))
         if corners:
             there = self.at(self.corners)
             at_corners = there.beam_stresses(self.axial)[0].T
@@ -176,7 +191,7 @@ class BetweenPoints(ShortRepr):
             ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
             x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
             solve = partial(self._solved_stress, stretch)
-            found.append((stretch, stress_knots(stretch.smooth(x), rows.T, solve, self.allowed)))
+            found.append((stretch, solve_extremes(stretch.smooth(x), rows.T, solve)))
         return tuple(found)
 
     def _solved_stress(self, stretch: SmoothStretch, t: FloatArray) -> tuple[FloatArray, Any]:
@@ -226,13 +241,14 @@ class BetweenPoints(ShortRepr):
         scale, ends = self._scale, np.array([low, high])
         there = self.at(ends)
         solved = there.beam_stresses(self.axial)[0].max(axis=0)
-        known = self.stress(branch, ends)
+        if not there.accurate.all():
+            solved = np.where(there.accurate, solved, self.stress(branch, ends))
         tops = [
             values[(places >= low) & (places <= high)]
-            for stretch, beams in self._stresses
+            for stretch, beams in self._extremes
             for places, values in ((scale * stretch.drive(t), own) for t, own in beams)
         ]
-        return float(np.max(np.concatenate([*tops, np.where(there.accurate, solved, known)])))
+        return float(np.max(np.concatenate([*tops, solved])))
 
     def at(self, places: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
     Knots = tuple[FloatArray, FloatArray]  # places, increasing, and stresses of one beam
+    Solve = Callable[[FloatArray], tuple[FloatArray, Any]]
 
 ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
@@ -25,12 +26,8 @@ NEARLY = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
 
-def stress_knots(
-    t: FloatArray, rows: FloatArray, solve: Callable[[FloatArray], tuple[FloatArray, Any]], allowed: float | None
-) -> tuple[Knots, ...]:
-    """Return places and stresses of each beam, with extremes that may be the largest, and where a stress is allowed.
-
-    The latter are those of the last of some rounds only: knots that nearly coincide spoil a cubic.
+def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots, ...]:
+    """Return places and stresses of each beam, with extremes that may be the largest of all.
 
     Parameters
     ----------
@@ -38,8 +35,6 @@ def stress_knots(
         Places of points, increasing, and the stress of each of b beams there [Pa].
     solve : callable
         From places (m,) to stresses (b, m) and whether they were found, (m,).
-    allowed : float or None
-        Stress whose passes are solved for [Pa].
     """
     largest = rows.max(axis=0)
     found = [(t, row) for row in rows]
@@ -48,12 +43,20 @@ def stress_knots(
         if not any(map(len, more)):
             break
         found = _solved(solve, found, found, more)
-    before = found
-    for _ in range(ROUNDS if allowed is not None else 0):
-        more = [_passes(knots, allowed or 0.0, t) for knots in found]
+    return tuple(found)
+
+
+def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed: float) -> tuple[Knots, ...]:
+    """Return knots of each beam with the places where its stress passes the allowable one [Pa].
+
+    They are those of the last of some rounds only: knots that nearly coincide spoil a cubic.
+    """
+    found = list(knots)
+    for _ in range(ROUNDS):
+        more = [_passes(own, allowed, t) for own in found]
         if not any(map(len, more)):
             break
-        found = _solved(solve, found, before, more)
+        found = _solved(solve, found, list(knots), more)
     return tuple(found)
 
 
@@ -71,7 +74,7 @@ def _passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
 
 
 def _solved(
-    solve: Callable[[FloatArray], tuple[FloatArray, Any]],
+    solve: Solve,
     cubics: list[Knots],
     knots: list[Knots],
     more: list[FloatArray],
