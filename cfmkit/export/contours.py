@@ -222,7 +222,7 @@ class Curve2D:
 
 @dataclass(frozen=True)
 class Region:
-    """Where a part is thicker or thinner than elsewhere: within a closed `polygon` (n, 2) [m], `thickness` [m]."""
+    """Region of another thickness than elsewhere: within a closed `polygon` (n, 2) [m], `thickness` [m]."""
 
     polygon: FloatArray
     thickness: float
@@ -230,7 +230,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Sheet:
-    """How thick parts are across the plane of the drawing."""
+    """Thickness of parts across the plane of the drawing."""
 
     thickness: float | None = None  # wherever no region says otherwise [m]; None if the specification does not tell
     regions: tuple[Region, ...] = ()  # where two overlap, the thicker one holds

@@ -29,7 +29,7 @@ DEEPER = 0.25
 
 @dataclass(frozen=True)
 class GroundFrame:
-    """What joins all that is held."""
+    """Frame that joins all that is held."""
 
     sides: tuple[FloatArray, ...]  # bars of the frame, which overlap at its corners [m]
     bars: tuple[FloatArray, ...]  # from pads to the frame [m]

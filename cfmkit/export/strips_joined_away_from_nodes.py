@@ -154,7 +154,7 @@ Candidates = tuple[str, str, "FloatArray", "FloatArray", "FloatArray"]
 
 
 class _Look:
-    """Where parts come so close that they may be joined."""
+    """Places at which parts come so close that they may be joined."""
 
     def __init__(self, strips: Sequence[DrawnStrip], nodes: NodesAndBodies, fillet: float) -> None:
         self.nodes, self.fillet = nodes, fillet

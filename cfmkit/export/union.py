@@ -48,7 +48,7 @@ CHUNK = 0.5 * math.pi
 
 @dataclass(frozen=True, eq=False)
 class OutlinePiece:
-    """What is united: an area, and the edges that may bound it."""
+    """Piece of a union: an area, and the edges that may bound it."""
 
     edges: tuple[Edge, ...]  # of its boundary, the material on their left
     # polygons that cover it together [m], whose corners are those of lines and the points of smooth edges; none where
@@ -276,7 +276,7 @@ def _ring(runs: Sequence[_Run], near: float) -> list[Edge]:
 
 @dataclass(frozen=True)
 class _Meeting:
-    """Where two runs meet: the place, and the parameters of both there."""
+    """Meeting of two runs: the place, and the parameters of both there."""
 
     at: complex
     first: float

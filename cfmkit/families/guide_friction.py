@@ -17,7 +17,7 @@ ROUNDS = 60
 
 @dataclass(frozen=True)
 class GuideFriction:
-    """What a guide takes."""
+    """Friction of a guide."""
 
     friction: float = 0.0  # coefficient of Coulomb friction mu
     drag: float = 0.0  # what it takes without load [N]

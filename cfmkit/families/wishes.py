@@ -47,7 +47,7 @@ class Wish:
 
     @property
     def depth(self) -> float | None:
-        """What there is out of the plane [m]; None if it does not matter."""
+        """Room out of the plane [m]; None if it does not matter."""
         return self.room[2] if len(self.room) > 2 else None
 
     @property
@@ -92,7 +92,7 @@ def called(variant: str, wish: Wish, block: MaterialBlock) -> str:
 
 @dataclass(frozen=True)
 class FamilyOffer:
-    """What a family could do with a wish."""
+    """Candidates of a family for a wish."""
 
     # worth being made, the most promising first; empty where the wish is out of reach
     candidates: tuple[Candidate, ...] = ()

@@ -67,7 +67,7 @@ BETWEEN_SHARE = 0.2
 
 @dataclass(frozen=True)
 class MeshError:
-    """How closely force and largest stress of a part are known."""
+    """Errors of force and largest stress of a part."""
 
     force_difference: float  # of the last two meshes, in parts of the largest force
     stress_difference: float  # the same of the largest stress
@@ -113,7 +113,7 @@ class MeshError:
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """Where a part leaves its path for another branch, and how closely that is known."""
+    """Place at which a part leaves its path for another branch, and its error."""
 
     travel: float  # [m or rad]
     effort: float  # [N or N m]

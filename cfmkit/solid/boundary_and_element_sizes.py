@@ -137,7 +137,7 @@ def _without_steps(ring: FloatArray, least: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Sizes:
-    """How long the sides of elements should be [m], anywhere in the part."""
+    """Wanted lengths of the sides of elements [m], anywhere in the part."""
 
     places: FloatArray  # (m, 2): along the boundary [m]
     sizes: FloatArray  # (m,): wanted there [m]; they grow from place to place by `GRADING` at most

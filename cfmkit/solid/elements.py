@@ -264,7 +264,7 @@ def equivalent(stress: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the entries of elements go in a sparse symmetric matrix."""
+    """Indices of the entries of elements in a sparse symmetric matrix."""
 
     slots: NDArray[np.int64]  # (k,): of each entry among the matrix's different pairs of row and column
     # pairs, indices, starts: the matrix in compressed columns: pair of each of its entries, rows, and where columns

@@ -98,7 +98,7 @@ class LinearisedPart:
 
 @dataclass(frozen=True)
 class Selection:
-    """Where the stiffnesses of loose nodes by each other stand among all, in an order in which factors stay sparse."""
+    """Indices of the stiffnesses of loose nodes by each other among all, in an order in which factors stay sparse."""
 
     order: NDArray[np.int64]  # (l,): of the loose displacements: minimum degree
     # entries, indices, starts: which entries of the whole matrix, and the pattern of what they make

@@ -73,7 +73,7 @@ RING = 2e-5
 
 @dataclass(frozen=True)
 class HeldOrDriven:
-    """Where a part is held or driven, and moves as one rigid piece."""
+    """Region in which a part is held or driven, and moves as one rigid piece."""
 
     name: str  # for messages and decks; several places of one name are one support
     shapes: tuple[FloatArray, ...]  # polygons that it covers, or lines of two points [m]
@@ -87,7 +87,7 @@ class HeldOrDriven:
 
 @dataclass(frozen=True)
 class Part:
-    """What is solved."""
+    """Problem that is solved."""
 
     rings: tuple[Ring, ...]  # the boundary
     thinnest: float  # of what bends, in the plane [m]
@@ -102,7 +102,7 @@ class Part:
 
     @property
     def near(self) -> float:
-        """How far nodes of a pad or a hole may be from it [m]."""
+        """Largest distance of nodes of a pad or a hole from it [m]."""
         return ON * self.thinnest
 
     @cached_property

@@ -38,7 +38,7 @@ HALVINGS = 60
 
 
 class LoadEnd(enum.Enum):
-    """How far a path leads under a load."""
+    """Reach of a path under a load."""
 
     REACHED = "the load is reached"
     MAXIMUM = "the load has a maximum before: the part jumps there"
@@ -47,7 +47,7 @@ class LoadEnd(enum.Enum):
 
 @dataclass(frozen=True)
 class LoadPath:
-    """What a path says of a load."""
+    """Answer of a path about a load."""
 
     end: float  # travel at the load, at its first maximum, or at the end of the path [m or rad]
     effort: float  # the effort there [N or N m]

@@ -19,7 +19,7 @@ ROUNDS = 20
 
 
 class Law(Protocol):
-    """How a material answers to strain in its plane; at small strain it is that of Hooke."""
+    """Response of a material to strain in its plane; at small strain it is that of Hooke."""
 
     @property
     def youngs_modulus(self) -> float:

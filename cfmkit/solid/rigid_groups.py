@@ -145,7 +145,7 @@ class Supports:
 
 @dataclass(frozen=True)
 class Carried:
-    """What free motions of groups, and the travel behind them, do to the nodes."""
+    """Motions of nodes by free motions of groups and by the travel behind them."""
 
     loose: NDArray[np.int64]  # (l,): as of `Supports`
     # (2n, f + 1): derivatives of the nodes' displacements with respect to f free motions and the travel

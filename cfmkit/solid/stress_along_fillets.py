@@ -38,7 +38,7 @@ in radii."""
 
 @dataclass(frozen=True, eq=False)
 class FilletArc:
-    """Where a fillet is."""
+    """Place of a fillet."""
 
     ring: int  # number of the ring that it is on
     center: FloatArray  # (2,): of its circle, in the waste [m]

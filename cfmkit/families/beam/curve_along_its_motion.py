@@ -41,7 +41,7 @@ class AlongMotion:
 
     @cached_property
     def sense(self) -> float:
-        """What places and forces are multiplied by, 1 or -1: here, and to bring them back."""
+        """Factor of places and forces, 1 or -1: here, and to bring them back."""
         return 1.0 if self.solution.motion[-1] >= self.solution.motion[0] else -1.0
 
     @cached_property
@@ -76,7 +76,7 @@ class AlongMotion:
 
     @cached_property
     def corners(self) -> FloatArray | None:
-        """Where the effort has kinks [m or rad]; None if the model between the points is not known."""
+        """Places of kinks of the effort [m or rad]; None if the model between the points is not known."""
         law = self.solution.everywhere
         return None if law is None else np.asarray(self.sense * law.corners)
 

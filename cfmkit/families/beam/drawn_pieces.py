@@ -52,7 +52,7 @@ _CORNERS = 64
 
 @dataclass(frozen=True, eq=False)
 class BeamEnd:
-    """Where a beam begins or ends, seen from there."""
+    """End of a beam, seen from there."""
 
     beam: str
     strip: BeamStrip  # its outermost piece
@@ -87,7 +87,7 @@ class BeamEnd:
 
 @dataclass(frozen=True, eq=False)
 class DrawnParts:
-    """What a part is united from."""
+    """Pieces that a part is united from."""
 
     # pieces, holes: all that is united, and what is then cut out of eyes
     pieces: list[OutlinePiece]

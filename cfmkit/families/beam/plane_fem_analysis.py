@@ -69,7 +69,7 @@ class SolidSolution(ShortRepr):
 
     @property
     def end(self) -> float:
-        """Where the travel was to end, or a load's did [m or rad]."""
+        """Requested end of the travel, or the reached one of a load [m or rad]."""
         return self.spec.extent if self.reached is None else self.reached.end
 
     @property
@@ -79,7 +79,7 @@ class SolidSolution(ShortRepr):
 
     @property
     def copies(self) -> int:
-        """How many of the drawn part act side by side."""
+        """Number of drawn parts that act side by side."""
         copies = self.spec.mechanism.copies
         return copies.legs if copies is not None else 1
 
@@ -132,7 +132,7 @@ class SolidSolution(ShortRepr):
 
     @property
     def window(self) -> tuple[float, float]:
-        """Where stress is judged, from the smaller end on [m or rad]; without a window the whole travel."""
+        """Range in which stress is judged, from the smaller end on [m or rad]; without a window the whole travel."""
         end, window = self.end, self.spec.analysis.window
         low, high = sorted((0.0, end) if window is None else between(window, (0.0, end)))
         return low, high
@@ -154,7 +154,7 @@ class SolidSolution(ShortRepr):
 
     @cached_property
     def error(self) -> MeshError:
-        """How closely force and stress are known."""
+        """Errors of force and stress."""
         return self.solved.error
 
     @cached_property

@@ -240,7 +240,7 @@ class Solution(ShortRepr):
 
 
 class OnCurve(Observed, Protocol):
-    """What a solved mechanism of any model knows at the points of its curve; forces are those of all copies."""
+    """Values of a solved mechanism of any model at the points of its curve; forces are those of all copies."""
 
     @property
     def spec(self) -> BeamSpec:

@@ -83,7 +83,7 @@ class BeamStrip:
 
     @property
     def piece(self) -> OutlinePiece:
-        """What of the part it is."""
+        """Name of what it is of the part."""
         if self.straight:
             left, right = self.sides
             return OutlinePiece.polygon(np.array([right[0], right[-1], left[-1], left[0]]))
@@ -96,7 +96,7 @@ class BeamStrip:
 
     @property
     def sagitta(self) -> float:
-        """How far the edges and the centre line bulge out of the lines between neighbouring points, at most [m]."""
+        """Largest distance of the edges and the centre line from the lines between neighbouring points [m]."""
         turn = np.abs(np.diff(self.angle))
         chords = np.max([np.hypot(*np.diff(line, axis=0).T) for line in (self.points, *self.sides)], axis=0)
         return float((turn * (chords + turn * self.thickness[1:])).max(initial=0.0)) / 8.0

@@ -149,7 +149,7 @@ _NO_FORCE = 1e-9  # of the largest force: less is none
 
 @dataclass(frozen=True)
 class Ride:
-    """What happens along a surface, as far as the mechanism can follow it."""
+    """Forces and motions along a surface, as far as the mechanism can follow it."""
 
     # place, height, displacement, (n,): along the surface, of it, and of the mechanism [m]
     place: FloatArray

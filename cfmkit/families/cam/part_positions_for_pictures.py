@@ -76,7 +76,7 @@ def roller_path(solution: Solution) -> FloatArray:
 
 @dataclass(frozen=True)
 class Scene:
-    """What stays the same at every position, in metres: outlines of the plate, right flank and path, limits."""
+    """Shapes that stay the same at every position, in metres: outlines of the plate, right flank and path, limits."""
 
     plate: list[FloatArray]
     flank: FloatArray

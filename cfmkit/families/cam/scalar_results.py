@@ -321,7 +321,7 @@ def _bearing_turns(solution: Solution) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class FlankSamples:
-    """What rolls on the flank: the samples there, and before them the place at which the roller leaves the corner."""
+    """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
 
     solution: Solution  # the mechanism
     travel: FloatArray  # (n,): increasing [m]

@@ -64,7 +64,7 @@ class Losses:
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts on the rollers and the slider."""
+    """Loads on the rollers and the slider."""
 
     stiffness: float  # K, the sum of all parallel springs [N/m]
     rest_half_width: float  # half the distance of the roller axes at which the springs are at rest [m]

@@ -39,7 +39,7 @@ JOINTS = ("pivot", "crank_pin", "slider_pin", "slider")
 
 @dataclass(frozen=True, repr=False)
 class UnitCurves(ShortRepr):
-    """What a spring of rate 1 at each joint gives along the motion, n places.
+    """Efforts of a spring of rate 1 at each joint along the motion, n places.
 
     Rows are those of `JOINTS`; the last row has a length [m] in the place of an angle [rad].
     """

@@ -134,7 +134,7 @@ class Traced:
 
     @property
     def buckled_range(self) -> tuple[float, float]:
-        """Where another form than as made is taken, from and to [m]; NaN where none is."""
+        """Range in which another form than as made is taken, from and to [m]; NaN where none is."""
         found = np.flatnonzero(self.buckled)
         return (self.edges[found[0]], self.edges[found[-1] + 1]) if len(found) else (np.nan, np.nan)
 
@@ -209,7 +209,7 @@ class First:
 
 @dataclass
 class Route:
-    """What is traced, and by which tolerance that works."""
+    """Network that is traced, and the tolerance by which that works."""
 
     network: Network
     node: str

@@ -48,7 +48,7 @@ class Parts:
 
     @property
     def linear(self) -> tuple[Any, Any]:
-        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
+        """Range of constant negative stiffness, from and to [m]; NaN where it nowhere is."""
         return self.leaf.linear
 
     @property

@@ -152,7 +152,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def linear(self) -> Ends:
-        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
+        """Range of constant negative stiffness, from and to [m]; NaN where it nowhere is."""
         first, last = map(self.of_mechanisms, self.character.linear)
         return first, last
 
@@ -204,7 +204,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def window(self) -> Ends:
-        """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat part."""
+        """Range of forces to compare [m]: the analysis' window, else the linear range, else the longest flat part."""
         if self.spec.analysis.window is not None:
             starts = self.nominal.ends[0].tolist()
             stated = [
@@ -274,7 +274,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def least(self) -> Ends:
-        """Where and how small the nominal force becomes past the peak of the leaves [m, N]; NaN without one."""
+        """Place and value of the smallest nominal force past the peak of the leaves [m, N]; NaN without one."""
         curves, rows = self.nominal, np.arange(len(self))
         travel, (first, end) = curves.travel, curves.ends
         falls = (np.diff(curves.leaf_force, axis=1) < 0) & (travel[:, :-1] >= 0) & curves.there[:, 1:]

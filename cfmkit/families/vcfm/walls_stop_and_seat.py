@@ -20,7 +20,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class FrameSizes:
-    """Where walls, stop and ground are [m]; the as-made apex of the lowest leaves is the origin."""
+    """Places of walls, stop and ground [m]; the as-made apex of the lowest leaves is the origin."""
 
     # wall, out: faces of the right wall at the leaves and outside
     wall: float

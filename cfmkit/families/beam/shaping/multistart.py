@@ -51,7 +51,7 @@ _LASTS = {
 
 @dataclass(frozen=True)
 class Explored:
-    """What the starts led to."""
+    """Results of the starts."""
 
     found: dict[int, Found | None]  # number of the start -> the design, None if nothing could be followed
     reused: int  # starts that were noted by a run before
@@ -97,7 +97,7 @@ def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: s
 
 @dataclass
 class _Jobs:
-    """What does the stages of a search one after the other, tells how far it is, and keeps why processes died."""
+    """Stages of a search one after the other, with progress and why processes died."""
 
     task: Task
     plan: StartBudget

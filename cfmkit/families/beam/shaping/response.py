@@ -114,7 +114,7 @@ class NetworkAtPoses:
 
 @dataclass(frozen=True)
 class RowsOfBeam:
-    """How a beam is sampled by the engine, at r places."""
+    """Samples of a beam by the engine, at r places."""
 
     place: FloatArray  # (r,): fraction of the arc length
     # row, index, (r,): which of the beam's rows, and of all rows, they are
@@ -142,7 +142,7 @@ class Response:
 
     @cached_property
     def rows(self) -> dict[str, RowsOfBeam]:
-        """How each beam is sampled; the ends of elements occur twice there, and once here."""
+        """Samples of each beam; the ends of elements occur twice there, and once here."""
         found, first = {}, 0
         for name, states in self.states.items():
             once = np.flatnonzero(np.append(True, np.diff(states.place) > 0))
@@ -252,7 +252,7 @@ def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What the limits look at: the response at the poses of a window from `start`, with derivatives or without.
+    """Input of the limits: the response at the poses of a window from `start`, with derivatives or without.
 
     Derivatives are those of rows below `near`. kept: what was computed for either.
     """

@@ -63,7 +63,7 @@ _STEEP = 20.0  # what a half band beyond that counts against the violation of th
 
 @dataclass(frozen=True)
 class StartBudget:
-    """How much is tried at one start."""
+    """Effort at one start."""
 
     # drawn, tries: random networks that are looked at, and how many of the best are made to meet the limits until one
     # does

@@ -41,7 +41,7 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class TaskLimits:
-    """What must hold; None: not asked."""
+    """Limits that must hold; None: not asked."""
 
     stress: float | None = None  # largest stress at every pose [Pa]: by the margin `MARGIN` below the allowable one
     envelope: tuple[float, float, float, float] | None = None  # where the centre lines must lie before loading [m]

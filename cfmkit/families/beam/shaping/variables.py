@@ -43,7 +43,7 @@ class Variables:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of variables."""
         return len(self.task.coordinates) + self.order * len(self.task.shaped)
 
     @cached_property

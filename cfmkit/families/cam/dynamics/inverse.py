@@ -63,7 +63,7 @@ class Kinematics(NamedTuple):
 
 
 class MovingLoads(NamedTuple):
-    """What acts on rollers and braces beside the contact, each (2, n).
+    """Forces on rollers and braces beside the contact, each (2, n).
 
     `roller`, `middle`: acceleration of the roller's axis and of the brace's middle, weight
     counted as acceleration [m/s^2]; `turning`: angular acceleration of the brace [rad/s^2];

@@ -74,12 +74,12 @@ class SideChain:
 
     @property
     def columns(self) -> slice:
-        """Where this side's four coordinates are."""
+        """Indices of this side's four coordinates."""
         return slice(1, 5) if self.hand > 0 else slice(5, 9)
 
     @property
     def rows(self) -> tuple[int, int, int, int]:
-        """Where this side's constraints are: x and y of the closure, tangency, rolling."""
+        """Indices of this side's constraints: x and y of the closure, tangency, rolling."""
         return (0, 1, 2, 6) if self.hand > 0 else (3, 4, 5, 7)
 
     def posture(self, x: FloatArray, guess: Any) -> Posture:
@@ -139,7 +139,7 @@ class SideChain:
 
 @dataclass(frozen=True)
 class Scheme:
-    """How the equations are integrated."""
+    """Options of the integration."""
 
     steps: int = 4  # runge-Kutta steps between two points of output
     # baumgarte's beta times the duration of the motion; beta times a step must stay below 2.785
@@ -152,7 +152,7 @@ class CornerContact(ValueError):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the integration and the inverse dynamics give at n times."""
+    """Results of the integration and of the inverse dynamics at n times."""
 
     times: FloatArray  # (n,) [s]
     # coordinates, velocities, accelerations, (n, 9): s2, theta3, theta4, xi4, y4, theta5, theta6, xi6, y6 [m, rad, s]

@@ -219,7 +219,7 @@ NEWTON_STEPS = 5
 
 @dataclass(frozen=True)
 class SideParts:
-    """What one side is made of: SI units; the brace's centre of mass is at mid-length."""
+    """Dimensions and masses of one side: SI units; the brace's centre of mass is at mid-length."""
 
     brace_length: float
     brace_mass: float
@@ -230,7 +230,7 @@ class SideParts:
 
 
 class Stance(NamedTuple):
-    """Where a side is: roller centre [m], tangent and curvature [1/m] of its curve, on the corner or not; all (n,)."""
+    """Pose of a side: roller centre [m], tangent and curvature [1/m] of its curve, on the corner or not; all (n,)."""
 
     center: ComplexArray
     tangent: ComplexArray
@@ -262,7 +262,7 @@ class Side:
 
     @cached_property
     def turn(self) -> complex:
-        """What a point is multiplied by to be turned."""
+        """Factor that turns a point."""
         return cmath.exp(1j * self.angle)
 
     def turned(self, places: CurvePoints) -> CurvePoints:

@@ -54,7 +54,7 @@ def sign_changes(
 
 
 class Poses(NamedTuple):
-    """How rollers stand: x of the centre [m], slope of its track, path coordinate [m] and whether on the corner."""
+    """Positions of rollers: x of the centre [m], slope of its track, path coordinate [m] and whether on the corner."""
 
     x: FloatArray
     slope: FloatArray
@@ -84,7 +84,7 @@ class ManyTracks:
 
     @cached_property
     def shift(self) -> FloatArray:
-        """How much larger each roller is than the one that the cam is cut for, (d, 1)."""
+        """Difference of the radius of each roller from the one that the cam is cut for, (d, 1)."""
         return (self.radius - self.profile.roller_radius)[:, None]
 
     @cached_property
@@ -126,7 +126,7 @@ class ManyTracks:
 
     @cached_property
     def pivot(self) -> Pivot:
-        """How the rollers turn about the corner, (d, 1) each; a cam without one has a point that no roller touches."""
+        """Pivoting of the rollers about the corner, (d, 1) each; without one it is a point that no roller touches."""
         (xc, yc), law = self.profile.corner.point if self.profile.corner else (0.0, 0.0), self.profile.path.law
         low = float(np.arctan2(law.rest_half_width - xc, yc))
         high = float(np.arctan(law.slope(self.profile.start)))

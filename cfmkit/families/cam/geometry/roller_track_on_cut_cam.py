@@ -48,7 +48,7 @@ class NoTrack(ValueError):
 
 @dataclass(frozen=True, repr=False)
 class TrackStates(ShortRepr):
-    """Where the right roller is, for each requested slider position."""
+    """Positions of the right roller, for each requested slider position."""
 
     # x, y, (n,): roller centre [m]
     x: FloatArray

@@ -88,7 +88,7 @@ class Designs:
 
 
 class Pose(NamedTuple):
-    """How the rollers stand, (designs, points) each."""
+    """Positions of the rollers, (designs, points) each."""
 
     stretch: FloatArray  # of the springs on one side [m]
     slope: FloatArray  # of the roller's path
@@ -96,7 +96,7 @@ class Pose(NamedTuple):
 
 
 class Begin(NamedTuple):
-    """Where rollers leave a corner, (designs, 1) each: force on the way up and down [N], slope of the track, tangent.
+    """Rollers that leave a corner, (designs, 1) each: force on the way up and down [N], slope of the track, tangent.
 
     `there` tells which of them leave it on the travel.
     """
@@ -237,7 +237,7 @@ class Slab:
 
     @cached_property
     def flank(self) -> NDArray[np.bool_]:
-        """Where the roller runs on the flank, which broadcasts to (designs, points)."""
+        """Whether the roller runs on the flank, which broadcasts to (designs, points)."""
         return np.ones((1, 1), dtype=bool)
 
     @cached_property
@@ -247,7 +247,7 @@ class Slab:
 
     @cached_property
     def begin(self) -> Begin | None:
-        """Where rollers leave the corner; None if there is none."""
+        """States of rollers that leave the corner; None if there is none."""
         if not self.corner_travel.any():
             return None
         rows, corner = np.arange(len(self.designs)), self.corner_travel[:, None]
@@ -258,7 +258,7 @@ class Slab:
 
     @property
     def allowable_stress(self) -> float:
-        """What the stress of contacts is compared with [Pa]; NaN: nothing."""
+        """Allowed stress of contacts [Pa]; NaN: no limit."""
         return np.nan
 
     def stressed(self, _branch: str, _window: Any) -> FloatArray:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Exact = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
     Places = tuple[FloatArray, FloatArray] | None
-    """Where the window of each cam starts and ends, (d,) each [m]; None: the whole travel."""
+    """Start and end of the window of each cam, (d,) each [m]; None: the whole travel."""
 
 _SLACK = 1e-9
 """Share of a window: places that are so near to its ends are at them, but for rounding."""
@@ -59,7 +59,7 @@ class SampledBranch:
 
 
 class CutWindows(ManyWindows):
-    """What one branch of many cams has inside a window: each cam its own samples, those alike worked on together."""
+    """One branch of many cams inside a window: each cam its own samples, those alike worked on together."""
 
     def __init__(self, sampled: SampledBranch, window: Places) -> None:
         """Cut the window of each cam out."""

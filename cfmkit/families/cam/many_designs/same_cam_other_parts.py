@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """What is built around one cam: (d,) arrays."""
+    """Parts that are built around one cam: (d,) arrays."""
 
     cam: Assembly  # the cam, with the parts of the specification
     tracks: ManyTracks  # of the different pairs of roller and brace, (t,)
@@ -115,7 +115,7 @@ class BuiltSlab(Slab):
 
     @cached_property
     def _poses(self) -> Poses:
-        """How the rollers stand at all samples."""
+        """Positions of the rollers at all samples."""
         return self._of_kinds(np.linspace(0.0, self._reach, self.points, axis=1))
 
     def _poses_at(self, travel: FloatArray, rows: Rows) -> Poses:
@@ -141,7 +141,7 @@ class BuiltSlab(Slab):
 
     @property
     def flank(self) -> NDArray[np.bool_]:
-        """Where the roller runs on the flank."""
+        """Whether the roller runs on the flank."""
         return ~self._poses.on_corner
 
     @cached_property
@@ -343,7 +343,7 @@ class BuiltSlab(Slab):
 
     @property
     def allowable_stress(self) -> float:
-        """What the stress of contacts is compared with [Pa]; NaN: nothing."""
+        """Allowed stress of contacts [Pa]; NaN: no limit."""
         return np.nan if self._allowable is None else self._allowable
 
     def _pressure(self, poses: Poses, rows: Rows, contact: FloatArray) -> FloatArray:

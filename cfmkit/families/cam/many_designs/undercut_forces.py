@@ -109,7 +109,7 @@ class CornerSlab(Slab):
 
     @cached_property
     def flank(self) -> NDArray[np.bool_]:
-        """Where the roller runs on the flank."""
+        """Whether the roller runs on the flank."""
         return ~self._states("on_corner").astype(bool)
 
     @cached_property
@@ -152,7 +152,7 @@ class CornerSlab(Slab):
 
     @cached_property
     def begin(self) -> Begin:
-        """Where rollers leave the corner, as the tracks have it: next to a jam the last digits decide."""
+        """States of rollers that leave the corner, as the tracks have it: next to a jam the last digits decide."""
         x, slope = (np.array([getattr(one.begin, name)[0] for one in self.found]) for name in ("x", "slope"))
         x, slope = x[self.which, None], slope[self.which, None]
         tangent = brace_tangent(x, self.designs.brace[:, None])
@@ -162,7 +162,7 @@ class CornerSlab(Slab):
 
     @cached_property
     def pivots(self) -> Pivot:
-        """How the roller of each design pivots on its corner."""
+        """Pivoting of the roller of each design on its corner."""
         return Pivot(*np.array([one.track.pivot for one in self.found]).T[:, self.which])
 
     @cached_property

@@ -157,7 +157,7 @@ def _made(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> Desig
 
 @dataclass(frozen=True)
 class Reported:
-    """What the analysis of a finished strip says of it: what is reported of a design are these numbers."""
+    """Numbers of the analysis of a finished strip: what is reported of a design are these numbers."""
 
     spec: SliderCrankSpec  # with the strip
     # deviation, rms: over the window: as a share of the force, and in N; None if the analysis ends before it

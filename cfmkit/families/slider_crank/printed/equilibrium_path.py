@@ -62,7 +62,7 @@ BENT = 0.1
 
 
 class PressingEnd(Enum):
-    """How pressing a chain ended."""
+    """End of pressing a chain."""
 
     COMPLETE = "every requested point is a stable equilibrium on the requested branch"
     LIMIT_POINT = "there is no equilibrium for a further displacement of the slider: a limit point of the travel"
@@ -119,7 +119,7 @@ class Chain(ShortRepr):
 
     @property
     def reach(self) -> float:
-        """How far the slider pin could be from the pivot, the chain pulled straight [m]."""
+        """Distance of the slider pin from the pivot with the chain pulled straight [m]."""
         return max(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in (self.pins, self.points))
 
     def _reach(self, travel: FloatArray) -> FloatArray:

@@ -63,7 +63,7 @@ STRIP = "strip"
 
 @dataclass(frozen=True)
 class Elasticity:
-    """What the part is made of: modulus [Pa], Poisson ratio, largest stress allowed [Pa] (None: no limit).
+    """Material of the part: modulus [Pa], Poisson ratio, largest stress allowed [Pa] (None: no limit).
 
     `wide`: whether wide sections stiffen as their curling across the width is hindered.
     """

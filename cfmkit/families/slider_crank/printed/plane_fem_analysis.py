@@ -84,7 +84,7 @@ class SolidSolution(ShortRepr):
 
     @cached_property
     def error(self) -> MeshError:
-        """How closely force and stress are known."""
+        """Errors of force and stress."""
         return self.solved.error
 
     @cached_property
@@ -94,7 +94,7 @@ class SolidSolution(ShortRepr):
 
     @property
     def window(self) -> tuple[float, float]:
-        """Where metrics are taken [m]."""
+        """Window in which metrics are taken [m]."""
         ends = self.spec.analysis.travel or (0.0, 0.0)
         return ends if self.spec.analysis.window is None else between(self.spec.analysis.window, ends)
 

@@ -220,7 +220,7 @@ class Solution(ShortRepr):
 
     @property
     def place(self) -> FloatArray:
-        """Where the stress is largest: along the centre line from the clamped end [m]."""
+        """Place of the largest stress: along the centre line from the clamped end [m]."""
         return self._peak[1]
 
     def _along(self, beams: FloatArray, shares: FloatArray) -> FloatArray:
@@ -294,7 +294,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def recheck(self) -> SecondOpinion | None:
-        """What corotational elements say; None if they were not asked."""
+        """Results of corotational elements; None if they were not asked."""
         if not self.checked:
             return None
         moved = np.flatnonzero(self.travel > 0.0)

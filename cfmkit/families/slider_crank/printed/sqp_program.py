@@ -49,7 +49,7 @@ Goal = Literal["stroke", "ripple", "rms"]
 
 @dataclass(frozen=True)
 class StripTask:
-    """What the strip is to do."""
+    """Requirements on the strip."""
 
     corners: FloatArray  # (k, 2): its centre line [m]
     direction: float  # of the slider's travel [rad]
@@ -76,7 +76,7 @@ class StripTask:
 
 @dataclass(frozen=True)
 class Form:
-    """How a strip is described by numbers: thicknesses, then shares that place them, then the width."""
+    """Description of a strip by numbers: thicknesses, then shares that place them, then the width."""
 
     count: int  # thicknesses; 1: the same everywhere
     # how many stations each straight piece has where their shares vary; empty: evenly spaced, fixed
@@ -87,12 +87,12 @@ class Form:
 
     @property
     def placed(self) -> int:
-        """How many shares vary."""
+        """Number of shares that vary."""
         return sum(self.per_piece)
 
     @property
     def size(self) -> int:
-        """How many numbers describe the strip."""
+        """Number of numbers that describe the strip."""
         return self.count + self.placed + (self.width is None)
 
     def places(self, x: FloatArray, corners: FloatArray) -> FloatArray:

@@ -41,7 +41,7 @@ class Solved:
 
     @property
     def judged(self) -> tuple[float, float]:
-        """Where deviations are looked at [rad or m]: the window, its start left out where the force begins there."""
+        """Places of deviations [rad or m]: the window, its start left out where the force begins there."""
         places = self.task.places(self.window, self.places or None)
         return float(places[0]), float(places[-1])
 

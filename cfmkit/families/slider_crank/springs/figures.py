@@ -77,7 +77,7 @@ class KeyPosition:
 
 @dataclass(frozen=True)
 class PanelView:
-    """What all panels have in common."""
+    """Common data of all panels."""
 
     box: tuple[float, float, float, float]  # left, bottom, right, top [m]
     size: float  # of symbols [m]

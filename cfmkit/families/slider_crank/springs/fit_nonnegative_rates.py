@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RateGoal:
-    """What the springs are to add up to, in units of the target."""
+    """Sum that the springs are to have, in units of the target."""
 
     matrix: FloatArray  # (n, m): what a rate of 1 gives at each of n places, over the target
     wanted: FloatArray  # (n,): 1 for a constant; something sloping for a stiffness

@@ -67,7 +67,7 @@ class MotionExtremes(ShortRepr):
 
     @cached_property
     def units(self) -> UnitCurves:
-        """What unit springs do there."""
+        """Efforts of unit springs there."""
         return self.assembly.units(self.places)
 
     @cached_property

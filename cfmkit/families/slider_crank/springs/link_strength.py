@@ -52,7 +52,7 @@ DEFINITIONS = {
 
 @dataclass(frozen=True)
 class LinkLoads:
-    """What acts on crank and coupler of one leg, at n places of the motion; of m mechanisms as rows.
+    """Loads on crank and coupler of one leg, at n places of the motion; of m mechanisms as rows.
 
     Rows of every (2, ..., n) array are crank and coupler. Where forces are unbounded there are zeros.
     """

@@ -118,7 +118,7 @@ class Solution(ShortRepr):
 
     @property
     def drive(self) -> Kind:
-        """What the motion is: the crank's angle (``torque``) or the slider's travel (``force``)."""
+        """Kind of the motion: the crank's angle (``torque``) or the slider's travel (``force``)."""
         return self.assemblies[0].drive
 
     @property
@@ -152,12 +152,12 @@ class Solution(ShortRepr):
 
     @cached_property
     def legs(self) -> FloatArray:
-        """How many legs share the efforts."""
+        """Number of legs that share the efforts."""
         return self.settings(lambda spec: spec.mechanism.sets)
 
     @cached_property
     def rest(self) -> FloatArray:
-        """Where the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        """Place at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
         return self.column(lambda assembly: assembly.rest)
 
     @cached_property
@@ -172,7 +172,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def reference(self) -> FloatArray:
-        """Where the constant band is taken."""
+        """Place at which the constant band is taken."""
         pairs = zip(self.specs, self.assemblies, strict=True)
         return np.array([[reference_motion(spec, assembly)] for spec, assembly in pairs])
 
@@ -183,12 +183,12 @@ class Solution(ShortRepr):
 
     @cached_property
     def target(self) -> FloatArray:
-        """What the effort is to be [N m or N]; NaN if nothing is stated."""
+        """Requested effort [N m or N]; NaN if nothing is stated."""
         return self.settings(target_of)
 
     @cached_property
     def window(self) -> Ends | None:
-        """Where the effort is wanted constant; None if the analysis does not state it."""
+        """Window in which the effort is to be constant; None if the analysis does not state it."""
         if self.spec.analysis.window is None:
             return None
         found = np.array([window_of(*pair) for pair in zip(self.specs, self.assemblies, strict=True)], dtype=float)
@@ -203,7 +203,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def units(self) -> UnitCurves:
-        """What springs of rate 1 do along the motion."""
+        """Efforts of springs of rate 1 along the motion."""
         return self.assembly.units(self.motion)
 
     @cached_property

@@ -56,7 +56,7 @@ CLOSEST = 1e-6
 
 @dataclass(frozen=True)
 class Rubbing:
-    """What rubs in a slider-crank."""
+    """Friction in a slider-crank."""
 
     pin: float = 0.0  # friction couple per load of each pin, mu d/2 [m]
     guide: GuideFriction = FREE
@@ -99,7 +99,7 @@ class Assembly(ShortRepr):
 
     @property
     def tight(self) -> float:
-        """What the anchor adds to the deflection of the slider's spring, along the slider's path [m]."""
+        """Contribution of the anchor to the deflection of the slider's spring, along the slider's path [m]."""
         return -self.linkage.branch * self.anchor + 0.0  # no minus before a zero
 
     def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -148,7 +148,7 @@ class Assembly(ShortRepr):
 
     @property
     def motion_name(self) -> Literal["angle", "travel"]:
-        """What the motion is called in a specification and among the values."""
+        """Name of the motion in a specification and among the values."""
         return "angle" if self.drive == "torque" else "travel"
 
     @property
@@ -220,7 +220,7 @@ class Assembly(ShortRepr):
 
     @property
     def _ways(self) -> tuple[float, float]:
-        """How far the motion is from the unloaded position to the first, and to the last place of the reach.
+        """Distances of the motion from the unloaded position to the first, and to the last place of the reach.
 
         On the other side of the stretched position the slider gets to the folded one by way of the stretched one,
         the springs turned all the way, however near to it the unloaded position is.

@@ -72,7 +72,7 @@ class CosineLeaf(LeafLaw):
 
     @cached_property
     def linear(self) -> tuple[Any, Any]:
-        """Where the arch is buckled, from and to [m]; NaN where it never is.
+        """Range in which the arch is buckled, from and to [m]; NaN where it never is.
 
         At a given load the shortening is quadratic in the travel: where it fits the load of buckling, that begins.
         """

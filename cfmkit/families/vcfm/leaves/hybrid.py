@@ -112,7 +112,7 @@ class HybridLeaf(LeafLaw):
 
     @property
     def linear(self) -> tuple[Any, Any]:
-        """Where the negative stiffness is at least half of its largest, from and to [m]."""
+        """Range in which the negative stiffness is at least half of its largest, from and to [m]."""
         found: tuple[Any, Any] = self._steepest[1]
         return found
 

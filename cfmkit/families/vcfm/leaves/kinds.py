@@ -70,7 +70,7 @@ class LeafLaw(ABC):
 
     @property
     def linear(self) -> tuple[Any, Any]:
-        """Where the negative stiffness is constant, because the leaf is buckled, from and to [m]; NaN: nowhere."""
+        """Range of constant negative stiffness, because the leaf is buckled, from and to [m]; NaN: nowhere."""
         return np.nan, np.nan
 
     def buckled(self, travel: Any) -> Any:
@@ -191,7 +191,7 @@ class ProposedStructure:
 
 @dataclass(frozen=True)
 class StructureKind:
-    """What kinds of leaves and kinds of springs have in common."""
+    """Base of kinds of leaves and kinds of springs."""
 
     name: str  # in `structure` of its block
     description: str  # as the documentation of that key lists it

@@ -175,7 +175,7 @@ def axial_root(shortening: Any, turn: Any, stretch: Any) -> FloatArray:
 
 @dataclass(frozen=True)
 class Force:
-    """What a leaf does at a pose: force along the motion [E I/L^2], z, and the turn of its chord [rad]."""
+    """State of a leaf at a pose: force along the motion [E I/L^2], z, and the turn of its chord [rad]."""
 
     along: Any
     z: Any

@@ -146,7 +146,7 @@ class VBeam(LeafLaw):
 
     @cached_property
     def linear(self) -> tuple[Any, Any]:
-        """Where the leaf is buckled, from and to [m]: where the two laws cross; NaN where it never is."""
+        """Range in which the leaf is buckled, from and to [m]: where the two laws cross; NaN where it never is."""
         first, last = onset_and_exit(self.strip)
         span = last - first
         start, end = self._crossing(np.stack([first, last]), np.stack([-0.1 * span, 0.1 * span]))
