@@ -195,7 +195,7 @@ class _VibratingNetwork:
     """Stiffness and mass about one pose after another."""
 
     def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
-        self.net, self.fine, self.masses = path.network, fine, masses
+        self.network, self.fine, self.masses = path.network, fine, masses
         self.order = _order(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule
@@ -255,7 +255,7 @@ class _VibratingNetwork:
         ends = [poses(fine.attachments, z, e.ends[:, side]).jacobian for side in (0, 1)]
         rotations = e.unknowns[:, energy.rotation_columns(fine.degree)]
         for k, name in enumerate(e.beam):
-            section, fitted = self.net.beams[name].section, fine.fits[name]
+            section, fitted = self.network.beams[name].section, fine.fits[name]
             left, right = e.cuts[k]
             inside = float(np.real(fitted.arc(0.5 * (left + right))))
             thickness = section.thickness_at(fitted.arc(left + (right - left) * u), inside) + 0.0 * u

@@ -51,7 +51,7 @@ def _part(result: Result) -> Room:
     boxes = np.array([contour.extents for contour in drawing(spec).contours if contour.layer == "cut"])
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     chosen = np.unique(np.linspace(0, len(solution.travel) - 1, POSES).astype(int))
-    names = list(path.net.beams)
+    names = list(path.network.beams)
     poses = [np.concatenate([path.shape(name, int(path.at_requested[k])) for name in names]) for k in chosen]
     points, half = np.concatenate(poses), 0.5 * _thickest(spec)
     # the slider's pad moves with the end of the part

@@ -214,7 +214,7 @@ def _swept(spec: SliderCrankSpec, drawn: Drawing, slider: FloatArray) -> Any:
     way = np.array([np.cos(angle), np.sin(angle)])
     for k in np.unique(np.linspace(0, len(solution.travel) - 1, SWEPT).astype(int)):
         point = int(path.at_requested[k])
-        lines.append(np.concatenate([path.shape(name, point) for name in path.net.beams]))
+        lines.append(np.concatenate([path.shape(name, point) for name in path.network.beams]))
         shapes.append(slider + float(solution.travel[k]) * way)
     return swept(lines, half, shapes)
 
