@@ -70,8 +70,8 @@ class SeenPart(Protocol):
 class PartSlopes:
     """Exact derivatives of the numbers of a part; NaN where one is not known."""
 
-    by_x: FloatArray  # (q, n): by the values of its design
-    by_error: FloatArray  # (q, d): by its errors
+    by_x: FloatArray  # (q, n) by the values of its design
+    by_error: FloatArray  # (q, d) by its errors
 
 
 class SlopedPart(Protocol):
@@ -101,13 +101,13 @@ class RobustProblem:
 
     # numbers of a part: its design's values (n,) and its errors (d,) in, (q,) out; None if it has none
     seen: SeenPart
-    bounds: FloatArray  # (n, 2): of the values
-    errors: FloatArray  # (k, d): errors of drawn parts
-    deviations: FloatArray  # (d,): standard deviations of the errors
+    bounds: FloatArray  # (n, 2) of the values
+    errors: FloatArray  # (k, d) errors of drawn parts
+    deviations: FloatArray  # (d,) standard deviations of the errors
     # matrix, constant, (m, q), (m,): rows of the numbers, which must be at least zero: ``matrix @ numbers + constant``
     matrix: FloatArray
     constant: FloatArray
-    about: NDArray[np.int64]  # (m,): which limit each row belongs to
+    about: NDArray[np.int64]  # (m,) which limit each row belongs to
     share: float  # of parts that are to be good
     late: Callable[[], bool] = never  # tells whether the time is up
     tell: Callable[[float, int], None] = unheard  # takes the share estimated and the number of steps so far
@@ -134,10 +134,10 @@ class RobustProblem:
 class Linear:
     """A design to first order."""
 
-    x: FloatArray  # (n,): its values
-    rows: FloatArray  # (m,): limits of the perfect part
-    by_x: FloatArray  # (m, n): their derivatives by the values
-    by_error: FloatArray  # (m, d): by the errors
+    x: FloatArray  # (n,) its values
+    rows: FloatArray  # (m,) limits of the perfect part
+    by_x: FloatArray  # (m, n) their derivatives by the values
+    by_error: FloatArray  # (m, d) by the errors
 
     def parts(self, errors: FloatArray) -> FloatArray:
         """Return the limits of parts, (k, m)."""
@@ -157,7 +157,7 @@ class Linear:
 class RobustResult:
     """End of the steps."""
 
-    x: FloatArray  # (n,): values of the design
+    x: FloatArray  # (n,) values of the design
     share: float  # of good parts, estimated to first order, even where drawn parts were solved themselves
     began: float  # the same where the steps began
     # steps, seen: steps that gained something, and parts that were solved

@@ -89,7 +89,7 @@ class NetworkMasses:
 class Frequencies(ShortRepr):
     """Natural frequencies of a network about some equilibria."""
 
-    points: Any  # (p,): indices of the points of the path
+    points: Any  # (p,) indices of the points of the path
     # held, free, (p, n): the lowest ones with the drive held, and with it free, ascending [Hz]. Zero where a motion has
     # no stiffness; nan where the pose is unstable, and where a network has fewer
     held: FloatArray
@@ -188,7 +188,7 @@ class _Matrices:
     """Stiffness and the root of the mass, M = R R^T, of all unknowns: elements' insides behind the others; kg."""
 
     stiffness: FloatArray  # (n, n)
-    root: FloatArray  # (n, m): what the unknowns move a point by, times the root of its mass
+    root: FloatArray  # (n, m) what the unknowns move a point by, times the root of its mass
 
 
 class _VibratingNetwork:

@@ -55,7 +55,7 @@ class Stroke:
     branch: str  # ``load`` where the motion increases, ``unload`` where it decreases
     # from 1; a cycle is one way up and one way down. 0 for a short first stroke on the way to where cycles start
     cycle: int
-    points: NDArray[np.intp]  # (n,): indices into the recording, in its order, pauses left out
+    points: NDArray[np.intp]  # (n,) indices into the recording, in its order, pauses left out
     way: float  # what it covers of the motion [m or rad]
 
 

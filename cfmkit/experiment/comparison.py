@@ -51,9 +51,9 @@ class Samples:
     # motion, effort, (n,): as measured [m, N] or [rad, N m]
     motion: FloatArray
     effort: FloatArray
-    elapsed: FloatArray  # (n,): which part of the recording had passed, 0 to 1
-    weight: FloatArray  # (n,): the way that each stands for, over that of all on average
-    cycle: NDArray[np.intp]  # (n,): which cycle each is of, counted from 0
+    elapsed: FloatArray  # (n,) which part of the recording had passed, 0 to 1
+    weight: FloatArray  # (n,) the way that each stands for, over that of all on average
+    cycle: NDArray[np.intp]  # (n,) which cycle each is of, counted from 0
 
     def less(self, zeros: Zeros) -> Samples:
         """Return the samples with the errors of the zeros taken out."""

@@ -35,7 +35,7 @@ class Body:
     """A closed surface of triangles."""
 
     points: FloatArray  # (n, 3) [m]
-    triangles: NDArray[np.int64]  # (m, 3): counter-clockwise seen from outside
+    triangles: NDArray[np.int64]  # (m, 3) counter-clockwise seen from outside
 
     @property
     def corners(self) -> FloatArray:

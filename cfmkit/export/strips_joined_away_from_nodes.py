@@ -42,8 +42,8 @@ class DrawnStrip:
     """A beam as it is drawn."""
 
     name: str
-    points: FloatArray  # (n, 2): of its centre line [m]
-    thickness: FloatArray  # (n,): there [m]
+    points: FloatArray  # (n, 2) of its centre line [m]
+    thickness: FloatArray  # (n,) there [m]
     ends: tuple[str, str]  # nodes that it joins
 
     def sampled(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -61,7 +61,7 @@ class DrawnBlock:
 
     name: str  # in words, for messages
     nodes: tuple[str, ...]  # those that it holds together, of one rigid body
-    shape: FloatArray  # (n, 2): polygon [m]
+    shape: FloatArray  # (n, 2) polygon [m]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Join:
     # one, other: names
     one: str
     other: str
-    at: FloatArray  # (2,): where [m]
+    at: FloatArray  # (2,) where [m]
     gap: float  # between them before the outline was made [m]; negative where they overlap
 
 

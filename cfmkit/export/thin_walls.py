@@ -80,7 +80,7 @@ class EdgeLines:
     # ring, at, (n,): which outline each is of, and the way along it to where it begins [m]
     ring: NDArray[np.int64]
     at: FloatArray
-    around: FloatArray  # (r,): lengths of the outlines [m]
+    around: FloatArray  # (r,) lengths of the outlines [m]
 
     @classmethod
     def of(cls, contours: Sequence[Contour], sagitta: float) -> EdgeLines:

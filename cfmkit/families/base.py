@@ -49,11 +49,11 @@ class Block:
 class BlockAnswer:
     """Answer of a vectorised model about a block."""
 
-    done: NDArray[Any]  # (n,): the variants that it solved completely; all others are analysed one by one
+    done: NDArray[Any]  # (n,) the variants that it solved completely; all others are analysed one by one
     # for each measure: branch -> (n,) array of SI values, NaN where undefined. What is no matter of one branch stands
     # under the name "" alone
     values: tuple[Mapping[str, FloatArray], ...]
-    target: FloatArray | None = None  # (n,): force or torque that each curve should have [N or N m]
+    target: FloatArray | None = None  # (n,) force or torque that each curve should have [N or N m]
     kind: Kind | None = None  # whether the curves are of force or of torque; None: what the names of the metrics imply
     # name of a finding -> the variants whose analysis would warn of it; None: the model does not know
     warnings: Mapping[str, NDArray[Any]] | None = None
@@ -64,7 +64,7 @@ class Sampled:
     """Effort and stress of one part at p places of its motion."""
 
     effort: Mapping[str, FloatArray]  # branch -> force [N] or torque [N m]
-    # (s, p): stresses of s parts of the mechanism, or the largest alone [Pa]; s = 0 where there is none
+    # (s, p) stresses of s parts of the mechanism, or the largest alone [Pa]; s = 0 where there is none
     stress: FloatArray
 
 
@@ -82,7 +82,7 @@ class SampledSlopes:
 class MeasuredLoop:
     """Both branches of a measured loop at the same places."""
 
-    places: FloatArray  # (n,): displacement [m] or angle [rad], increasing, where the model exists
+    places: FloatArray  # (n,) displacement [m] or angle [rad], increasing, where the model exists
     # up, down, (n,): force [N] or torque [N m] on the way up and on the way back, mean of all cycles
     up: FloatArray
     down: FloatArray

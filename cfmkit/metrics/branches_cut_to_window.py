@@ -64,7 +64,7 @@ class BranchTrace:
     # motion, effort, (n,): displacement and force [m, N], or angle and torque [rad, N m]
     motion: FloatArray
     effort: FloatArray
-    stress: FloatArray | None = None  # (n,): the curve's column ``max_stress`` [Pa], if it has one
+    stress: FloatArray | None = None  # (n,) the curve's column ``max_stress`` [Pa], if it has one
 
     @cached_property
     def way(self) -> int:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 class Difference:
     """Difference of two curves on one branch."""
 
-    values: FloatArray  # (n,): one less the other at each place [N or N m]; NaN where one of them has no value
+    values: FloatArray  # (n,) one less the other at each place [N or N m]; NaN where one of them has no value
     reason: str  # why they cannot be summed up, should one of them be NaN
-    # (n,): how much each place counts, such as the way that it stands for; None: all alike
+    # (n,) how much each place counts, such as the way that it stands for; None: all alike
     weights: FloatArray | None = None
 
 

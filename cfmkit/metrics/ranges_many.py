@@ -45,8 +45,8 @@ class ManyBranches:
     # interpolated
     exact: Exact | None = None
     excess: Exact | None = None  # by what share the stress there exceeds what is allowed, likewise
-    pose: FloatArray | None = None  # (d,): where bands are taken; default: the middle of the window
-    # (d,): numerical error of the effort [N or N m]: an effort that is not above it is none to compare with
+    pose: FloatArray | None = None  # (d,) where bands are taken; default: the middle of the window
+    # (d,) numerical error of the effort [N or N m]: an effort that is not above it is none to compare with
     error: FloatArray | float = 0.0
 
     @property

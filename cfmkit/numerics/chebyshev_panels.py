@@ -40,10 +40,10 @@ _TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODE
 class ChebyshevPanels(ShortRepr):
     """A function that is one polynomial on each panel."""
 
-    ends: FloatArray  # (k + 1,): of the panels, increasing
-    # (k, 2): what each polynomial was made over: its panel, or the most of it where no value could be had at an end
+    ends: FloatArray  # (k + 1,) of the panels, increasing
+    # (k, 2) what each polynomial was made over: its panel, or the most of it where no value could be had at an end
     spans: FloatArray
-    coefficients: FloatArray  # (k, NODES): of the Chebyshev polynomials; NaN where a node is not known
+    coefficients: FloatArray  # (k, NODES) of the Chebyshev polynomials; NaN where a node is not known
 
     def at(self, x: FloatArray) -> FloatArray:
         """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""

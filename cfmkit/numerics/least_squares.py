@@ -47,7 +47,7 @@ class LeastSquares:
     start: FloatArray
     low: FloatArray
     high: FloatArray
-    size: FloatArray  # (p,): typical size of each parameter, positive
+    size: FloatArray  # (p,) typical size of each parameter, positive
     level: float  # typical size of the data, in the unit of the residuals
     # how many residuals count as one because they have unequal weights: the mean square of the weights over the square
     # of their mean (L. Kish, Survey Sampling, Wiley 1965, sec. 8.2)
@@ -80,13 +80,13 @@ class LeastSquares:
 class FittedValues:
     """The outcome of a fit."""
 
-    values: FloatArray  # (p,): best values
-    covariance: FloatArray  # (p, p): of the values, inflated by `inflation`
-    residuals: FloatArray  # (n,): at the best values
+    values: FloatArray  # (p,) best values
+    covariance: FloatArray  # (p, p) of the values, inflated by `inflation`
+    residuals: FloatArray  # (n,) at the best values
     noise: float  # standard deviation of the residuals, by their median absolute deviation under a robust loss
     # correlation time of the residuals in samples, times the effect of their weights: so many count as one
     inflation: float
-    at_bound: Any  # (p,): which values lie on a bound
+    at_bound: Any  # (p,) which values lie on a bound
     freedom: float  # degrees of freedom left
     converged: bool  # whether the solver says so
 

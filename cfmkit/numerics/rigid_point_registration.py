@@ -44,8 +44,8 @@ class CurveFrame:
     points: FloatArray
     tangents: FloatArray
     normals: FloatArray
-    speed: FloatArray  # (n,): length per parameter
-    curvature: FloatArray  # (n,): positive where the curve bends away from its normal (convex outside)
+    speed: FloatArray  # (n,) length per parameter
+    curvature: FloatArray  # (n,) positive where the curve bends away from its normal (convex outside)
 
 
 class SmoothCurve(Protocol):
@@ -64,13 +64,13 @@ class Registration:
     """Places of measured points on their curves."""
 
     angle: float  # of the motion from measured to registered points [rad]
-    shift: FloatArray  # (2,): of the motion, after the turn
+    shift: FloatArray  # (2,) of the motion, after the turn
     points: tuple[FloatArray, ...]  # registered points of each curve
     parameters: tuple[FloatArray, ...]  # of their feet
     errors: tuple[FloatArray, ...]  # distance from the curve along its normal; positive outside
     weights: tuple[FloatArray, ...]  # last weights; 0 for outliers and for points beyond the ends of their curve
-    covariance: FloatArray  # (3, 3): of angle and shift, inflated where successive residuals are alike
-    # (2,): shift, at the centre of the points, by which the registration would answer a part that is larger by one
+    covariance: FloatArray  # (3, 3) of angle and shift, inflated where successive residuals are alike
+    # (2,) shift, at the centre of the points, by which the registration would answer a part that is larger by one
     # along all normals: an error of width that it takes for a place. 0 where the width is fitted
     growth: FloatArray
     width: float = 0.0  # by how much the part is larger along all normals, as fitted; 0 where it was not

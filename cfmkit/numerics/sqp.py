@@ -72,7 +72,7 @@ class Effort:
 class Optimum:
     """The point that was found."""
 
-    z: FloatArray  # (n,): where
+    z: FloatArray  # (n,) where
     # objective, constraints: there; infinite and none where the model has no answer
     objective: float
     constraints: FloatArray

@@ -63,7 +63,7 @@ class Label:
     # text, color: what to write, and how
     text: str
     color: str
-    points: FloatArray  # (n, 2): the line that is named, in data coordinates
+    points: FloatArray  # (n, 2) the line that is named, in data coordinates
     prefer: float = 0.6  # where along the points the name should stand, 0 to 1
     toward: tuple[float, float] | None = None  # direction in which the name should stand from its line
     halo: bool = True  # whether to clear the background behind the name

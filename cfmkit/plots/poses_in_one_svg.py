@@ -39,7 +39,7 @@ _LINK = "http://www.w3.org/1999/xlink"
 class Moving:
     """What a family says about its mechanism in motion."""
 
-    motion: FloatArray  # (n,): displacement [m] or angle [rad] of each pose, as the curve has it
+    motion: FloatArray  # (n,) displacement [m] or angle [rad] of each pose, as the curve has it
     box: tuple[float, float, float, float]  # left, bottom, right and top of what all poses need [m]
     draw: Callable[[Axes, int], Any]  # ``draw(ax, number)`` draws one pose to scale
     # the same where `draw` has symbols that are not to scale: with the size of every part that takes room

@@ -76,7 +76,7 @@ class Scale:
 class Diagram:
     """Everything on one pair of axes."""
 
-    over: FloatArray  # (n,): what is on the horizontal axis [SI]
+    over: FloatArray  # (n,) what is on the horizontal axis [SI]
     # x, y: the axes
     x: Scale
     y: Scale

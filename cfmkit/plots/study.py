@@ -340,8 +340,8 @@ class MapPlaces:
     """The values of one parameter of a grid along an axis."""
 
     scale: DrawnScale  # the parameter
-    values: FloatArray  # (n,): increasing
-    order: NDArray[np.intp]  # (n,): which of the grid's levels they are
+    values: FloatArray  # (n,) increasing
+    order: NDArray[np.intp]  # (n,) which of the grid's levels they are
 
     @property
     def words(self) -> bool:

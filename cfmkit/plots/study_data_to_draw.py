@@ -31,7 +31,7 @@ class DrawnScale:
     # name, dimension: for its label
     name: str
     dimension: str
-    values: FloatArray  # (n,): one for each point; indices into `words` where those are given
+    values: FloatArray  # (n,) one for each point; indices into `words` where those are given
     words: tuple[str, ...] = ()  # of a parameter or a metric that is not a number
     short: str = ""  # what it is called beside others; the last part of the name where that is empty
     about: str = ""  # what it is, in a few words; for its axis
@@ -95,7 +95,7 @@ class StudyMarks:
     varied: tuple[DrawnScale, ...]
     metrics: tuple[DrawnScale, ...]
     shape: tuple[int, ...]  # numbers of values of the parameters of a grid; empty if the points are no grid
-    meets: NDArray[np.bool_]  # (n,): whether a point was solved and meets every requirement
+    meets: NDArray[np.bool_]  # (n,) whether a point was solved and meets every requirement
     best: int | None = None  # index of the best point
     name: str = ""  # whose study it is, for the heading
     best_words: str = ""  # what makes the best point the best, for the key

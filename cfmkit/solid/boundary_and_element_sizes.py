@@ -50,7 +50,7 @@ the rest of a part is a flaw of its drawing."""
 class Ring:
     """A closed chain of lines, the material on its left."""
 
-    points: FloatArray  # (n, 2): vertices, the first not repeated [m]
+    points: FloatArray  # (n, 2) vertices, the first not repeated [m]
 
     @classmethod
     def of(cls, points: FloatArray, hole: bool, step: float = 0.0) -> Ring:
@@ -139,8 +139,8 @@ def _without_steps(ring: FloatArray, least: float) -> FloatArray:
 class Sizes:
     """Wanted lengths of the sides of elements [m], anywhere in the part."""
 
-    places: FloatArray  # (m, 2): along the boundary [m]
-    sizes: FloatArray  # (m,): wanted there [m]; they grow from place to place by `GRADING` at most
+    places: FloatArray  # (m, 2) along the boundary [m]
+    sizes: FloatArray  # (m,) wanted there [m]; they grow from place to place by `GRADING` at most
     largest: float  # [m]
 
     @cached_property

@@ -54,7 +54,7 @@ class Elements:
 
     mesh: TriangleMesh
     law: Law
-    width: FloatArray  # (m,): out of the plane, by element [m]
+    width: FloatArray  # (m,) out of the plane, by element [m]
 
     def only(self, chosen: NDArray[np.bool_]) -> Elements:
         """Return some of the elements (m,), on all nodes."""
@@ -266,7 +266,7 @@ def equivalent(stress: FloatArray) -> FloatArray:
 class Pattern:
     """Indices of the entries of elements in a sparse symmetric matrix."""
 
-    slots: NDArray[np.int64]  # (k,): of each entry among the matrix's different pairs of row and column
+    slots: NDArray[np.int64]  # (k,) of each entry among the matrix's different pairs of row and column
     # pairs, indices, starts: the matrix in compressed columns: pair of each of its entries, rows, and where columns
     # start
     pairs: NDArray[np.int64]

@@ -49,7 +49,7 @@ class Balance:
     effort: float  # on the drive, along its motion [N or N m]
     stiffness: float  # derivative of the effort along the path [N/m or N m/rad]
     unstable: int  # number of directions in which the part moves on by itself, the drive held
-    slope: FloatArray  # (q,): of the unknowns along the path, per unit of travel
+    slope: FloatArray  # (q,) of the unknowns along the path, per unit of travel
     factors: Factors | None  # of the tangent
     solved: bool = True  # false if it is put together from poses that are
 
@@ -63,7 +63,7 @@ class Factors:
     """A factored symmetric matrix."""
 
     lower_upper: Any  # of scipy, of the matrix in another order
-    order: NDArray[np.int64]  # (q,): place of each row in that order
+    order: NDArray[np.int64]  # (q,) place of each row in that order
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution of a system."""
@@ -83,9 +83,9 @@ class LinearisedPart:
 
     matrix: csc_array  # the tangent (q, q), unknowns in the order of `order`
     order: NDArray[np.int64]  # (q,)
-    slope: FloatArray  # (q,): derivative of the residual with respect to the travel
-    residual: FloatArray  # (q,): what is out of balance [N or N m]
-    forces: FloatArray  # (n, 2): on the nodes [N]
+    slope: FloatArray  # (q,) derivative of the residual with respect to the travel
+    residual: FloatArray  # (q,) what is out of balance [N or N m]
+    forces: FloatArray  # (n, 2) on the nodes [N]
 
     @cached_property
     def factors(self) -> Factors:
@@ -100,7 +100,7 @@ class LinearisedPart:
 class Selection:
     """Indices of the stiffnesses of loose nodes by each other among all, in an order in which factors stay sparse."""
 
-    order: NDArray[np.int64]  # (l,): of the loose displacements: minimum degree
+    order: NDArray[np.int64]  # (l,) of the loose displacements: minimum degree
     # entries, indices, starts: which entries of the whole matrix, and the pattern of what they make
     entries: NDArray[np.int64]
     indices: NDArray[np.int32]

@@ -52,10 +52,10 @@ class TriangleMesh:
     """A part in six-node triangles."""
 
     nodes: FloatArray  # (n, 2) [m]; corners of triangles first
-    triangles: IntArray  # (m, 6): corners counter-clockwise, then the nodes on the sides 0-1, 1-2, 2-0
-    edges: IntArray  # (k, 3): boundary: first corner, last corner, node between; the material is on the left
-    rings: IntArray  # (k,): ring of each boundary edge
-    arcs: FloatArray  # (k, 2): arc lengths of its ends on that ring, increasing [m]
+    triangles: IntArray  # (m, 6) corners counter-clockwise, then the nodes on the sides 0-1, 1-2, 2-0
+    edges: IntArray  # (k, 3) boundary: first corner, last corner, node between; the material is on the left
+    rings: IntArray  # (k,) ring of each boundary edge
+    arcs: FloatArray  # (k, 2) arc lengths of its ends on that ring, increasing [m]
 
     @property
     def area(self) -> float:
@@ -336,7 +336,7 @@ class Spacing:
     """Keeps points away from the boundary and from seams."""
 
     field: Sizes
-    sewn: FloatArray  # (k, 2): points on seams [m]
+    sewn: FloatArray  # (k, 2) points on seams [m]
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return those of the points (k, 2) [m] that are far enough."""

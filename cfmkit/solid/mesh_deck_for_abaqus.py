@@ -185,7 +185,7 @@ class Hub:
     arm: tuple[int, FloatArray]  # (int, (2,): number of the node farthest from it, and from where to there [m]
     added: dict[int, FloatArray]  # nodes that are not of the part [m]
     spare: int  # the next number that is free
-    triangles: NDArray[np.int64]  # (m, 3): numbers of nodes, counter-clockwise
+    triangles: NDArray[np.int64]  # (m, 3) numbers of nodes, counter-clockwise
 
     @classmethod
     def on(cls, places: dict[int, FloatArray], center: FloatArray, spare: int) -> Hub:

@@ -77,12 +77,12 @@ class HeldOrDriven:
 
     name: str  # for messages and decks; several places of one name are one support
     shapes: tuple[FloatArray, ...]  # polygons that it covers, or lines of two points [m]
-    at: FloatArray  # (2,): about which it turns [m]
+    at: FloatArray  # (2,) about which it turns [m]
     # driven, free, (3,), (3, f): as of `Group`
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
     seams: tuple[FloatArray, ...] = ()  # lines at which it begins [m]
-    load: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,): constant, as of `Group`
+    load: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,) constant, as of `Group`
 
 
 @dataclass(frozen=True)
@@ -210,10 +210,10 @@ class Meshed:
 
     part: Part
     grid: TriangleMesh
-    held: NDArray[np.bool_]  # (n,): nodes that are held or driven
-    moving: NDArray[np.bool_]  # (m,): triangles that can strain: not all of their nodes move as one
+    held: NDArray[np.bool_]  # (n,) nodes that are held or driven
+    moving: NDArray[np.bool_]  # (m,) triangles that can strain: not all of their nodes move as one
     problem: SolidProblem  # of these triangles
-    # (n,): nodes whose stress is not read: they are held or driven, or at the end of a rigid piece
+    # (n,) nodes whose stress is not read: they are held or driven, or at the end of a rigid piece
     unjudged: NDArray[np.bool_]
 
     def refined(self, marked: NDArray[np.bool_] | None = None) -> tuple[Meshed, RefinedMesh]:
@@ -268,7 +268,7 @@ class MeshSolution:
     part: Part
     problem: SolidProblem
     course: PosePath
-    unjudged: NDArray[np.bool_]  # (n,): nodes whose stress is not read
+    unjudged: NDArray[np.bool_]  # (n,) nodes whose stress is not read
     # what the curve is off between poses, in parts of the largest effort; NaN where that was not looked at
     between: float = float("nan")
 

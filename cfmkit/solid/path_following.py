@@ -70,7 +70,7 @@ class PosePath:
     poses: tuple[Balance, ...]
     ending: PathEnd
     bifurcations: tuple[float, ...] = ()  # travels at which another branch was taken [m or rad]
-    # (2,): where the part touches itself just beyond the last pose, on the part as it is then [m]
+    # (2,) where the part touches itself just beyond the last pose, on the part as it is then [m]
     touching: FloatArray | None = None
 
     @property

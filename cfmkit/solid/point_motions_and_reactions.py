@@ -103,7 +103,7 @@ class MaterialPoint:
 
     nodes: NDArray[np.int64]  # (6,)
     shares: FloatArray  # (6,)
-    gradient: FloatArray  # (6, 2): slopes of the shares in the plane [1/m]
+    gradient: FloatArray  # (6, 2) slopes of the shares in the plane [1/m]
 
     @classmethod
     def at(cls, elements: Elements, place: FloatArray) -> MaterialPoint | None:

@@ -28,12 +28,12 @@ class Group:
 
     name: str  # for messages and results
     nodes: NDArray[np.int64]  # (k,)
-    center: FloatArray  # (2,): about which it turns [m]
-    # (3,): motion per unit of travel: x, y [m], turn [rad]
+    center: FloatArray  # (2,) about which it turns [m]
+    # (3,) motion per unit of travel: x, y [m], turn [rad]
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
-    # (3, f): orthonormal columns: motions that are left to equilibrium
+    # (3, f) orthonormal columns: motions that are left to equilibrium
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
-    # (3,): constant force x, y [N], which keeps its direction, and moment [N m] on it about its centre
+    # (3,) constant force x, y [N], which keeps its direction, and moment [N m] on it about its centre
     load: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
@@ -55,7 +55,7 @@ def turned(angle: float, derivative: int = 0) -> FloatArray:
 class Supports:
     """The unknowns of a held part: displacements of the nodes in no group, then the free motions of the groups."""
 
-    places: FloatArray  # (n, 2): nodes [m]
+    places: FloatArray  # (n, 2) nodes [m]
     groups: tuple[Group, ...]  # no node is in two of them
 
     @cached_property
@@ -147,10 +147,10 @@ class Supports:
 class Carried:
     """Motions of nodes by free motions of groups and by the travel behind them."""
 
-    loose: NDArray[np.int64]  # (l,): as of `Supports`
-    # (2n, f + 1): derivatives of the nodes' displacements with respect to f free motions and the travel
+    loose: NDArray[np.int64]  # (l,) as of `Supports`
+    # (2n, f + 1) derivatives of the nodes' displacements with respect to f free motions and the travel
     ways: FloatArray
-    curved: FloatArray  # (f + 1, f + 1): what the forces on the nodes add to the stiffness as groups turn [N m]
+    curved: FloatArray  # (f + 1, f + 1) what the forces on the nodes add to the stiffness as groups turn [N m]
 
     def borders(self, stiffness: csc_array) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         """Return the derivatives of the residual that are not those of loose nodes by each other, and the effort's.

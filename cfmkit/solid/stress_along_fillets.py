@@ -41,9 +41,9 @@ class FilletArc:
     """Place of a fillet."""
 
     ring: int  # number of the ring that it is on
-    center: FloatArray  # (2,): of its circle, in the waste [m]
+    center: FloatArray  # (2,) of its circle, in the waste [m]
     radius: float  # [m]
-    ends: FloatArray  # (2, 2): its first and last vertex, the material on the left [m]
+    ends: FloatArray  # (2, 2) its first and last vertex, the material on the left [m]
 
     @property
     def turn(self) -> float:
@@ -83,8 +83,8 @@ class FilletStress:
     """A fillet with its largest stress at every pose."""
 
     arc: FilletArc
-    travel: FloatArray  # (k,): of the poses, rising [m or rad]
-    stress: FloatArray  # (k,): along the edge, that of largest size, tension positive [Pa]
+    travel: FloatArray  # (k,) of the poses, rising [m or rad]
+    stress: FloatArray  # (k,) along the edge, that of largest size, tension positive [Pa]
 
     def largest(self, low: float, high: float) -> tuple[float, float] | None:
         """Return the largest stress of the poses from one travel to another [Pa], and the travel of it [m or rad].

@@ -44,7 +44,7 @@ NARROW = 0.02
 class RequirementRows:
     """Requirements as rows of what is seen of a part."""
 
-    places: FloatArray  # (p,): poses at which effort and stress are looked at [m or rad]
+    places: FloatArray  # (p,) poses at which effort and stress are looked at [m or rad]
     branches: tuple[str, ...]  # of the curve
     stresses: int  # rows of stress
     # matrix, constant, (m, q), (m,): ``matrix @ numbers + constant`` is at least zero where all requirements hold

@@ -31,8 +31,8 @@ _STATUS = {status.key: status for status in Status}
 class ResultRows:
     """Consecutive rows of a study."""
 
-    values: FloatArray  # (n, m): metrics [SI]; NaN where there is no value
-    met: NDArray[np.bool_]  # (n, r): requirements; False where nothing was solved
+    values: FloatArray  # (n, m) metrics [SI]; NaN where there is no value
+    met: NDArray[np.bool_]  # (n, r) requirements; False where nothing was solved
     # status and message of the rows that are not complete, or that have something to say
     odd: Mapping[int, tuple[Status, str]] = field(default_factory=dict)
     curves: Mapping[int, bytes] = field(default_factory=dict)  # curves as CSV, where they are kept

@@ -101,7 +101,7 @@ class Summary:
     study: Study  # whose rows they are
     shown: tuple[int, ...] = ()  # columns whose values are kept for pictures
     counts: Counter[Status] = field(default_factory=Counter)  # points by status
-    met: NDArray[np.int64] = field(init=False)  # (r,): how many points meet each requirement
+    met: NDArray[np.int64] = field(init=False)  # (r,) how many points meet each requirement
     all_met: int = 0  # how many solved ones meet them all
     # gapped, first_gap: complete points without a value over some window, and what the first of them says
     gapped: int = 0

@@ -83,12 +83,12 @@ class YieldShare:
 class JudgedParts:
     """Parts with what their analyses say."""
 
-    met: NDArray[np.bool_]  # (n, r): which requirement each part meets; false where it has no result
-    trimmed: NDArray[np.bool_]  # (n, r): the same after the trim
-    failed: NDArray[np.bool_]  # (n,): which parts have no result, or one that ends early
+    met: NDArray[np.bool_]  # (n, r) which requirement each part meets; false where it has no result
+    trimmed: NDArray[np.bool_]  # (n, r) the same after the trim
+    failed: NDArray[np.bool_]  # (n,) which parts have no result, or one that ends early
     why: str  # what became of the first of those
     lacking: tuple[int, str]  # how many others have no value for a requirement, and why the first has none
-    values: FloatArray  # (n, m): of the metrics that `_noted` says; nan where there is none
+    values: FloatArray  # (n, m) of the metrics that `_noted` says; nan where there is none
 
     def share(self, met: NDArray[np.bool_] | None = None) -> YieldShare:
         """Return the share of parts that meet every requirement."""

@@ -59,7 +59,7 @@ class BeamElements(NamedTuple):
     line: Any  # (e, 2, 2) line load: constant and growing with the drive; x, y
     gap: Any  # (e, 2) by which a prestressed beam misses its node at rest
     ends: Any  # (e, 2) attachments
-    unknowns: Any  # (e, degree + 9): those of both ends (x, y, body's and own rotation), bubbles, force
+    unknowns: Any  # (e, degree + 9) those of both ends (x, y, body's and own rotation), bubbles, force
     beam: tuple[str, ...]  # the beam each one is a piece of
     cuts: FloatArray  # (e, 2) where it begins and ends, parameter of the beam's shape
     rest: Any = None  # (e, q) curvature at rest by u; with curl and hindrance those of wide strips, None without any
@@ -70,7 +70,7 @@ class BeamElements(NamedTuple):
 class Attachments(NamedTuple):
     """Places where something acts on a body."""
 
-    unknowns: Any  # (k, 4): x, y, rotation of the body that carries it; its own rotation
+    unknowns: Any  # (k, 4) x, y, rotation of the body that carries it; its own rotation
     arm: Any  # (k, 2) from the body's node, as it lies at rest
     origin: Any  # (k, 2) the body's node at rest
     frame: Any  # (k, 2) cos and sin of the axes of the body's x and y

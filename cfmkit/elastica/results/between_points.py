@@ -23,7 +23,7 @@ from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
-from cfmkit.elastica.results.stress_between_points import inserted, solve_extremes, solve_passes
+from cfmkit.elastica.results.stress_between_points import insert_knots, solve_extremes, solve_passes
 from cfmkit.numerics.cubic_interpolation import crossing, inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def peaks(self) -> FloatArray:
         """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
-        beside = {*self.beside[:, [0, 2]].ravel().tolist()}
+        beside = {*self.beside_corners[:, [0, 2]].ravel().tolist()}
         return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
 
     @cached_property
@@ -129,7 +129,7 @@ class BetweenPoints(ShortRepr):
         return read_only(self._scale * np.array([corner.drive for corner in self._corners.values()]))
 
     @cached_property
-    def beside(self) -> FloatArray:
+    def beside_corners(self) -> FloatArray:
         """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
         found, points = np.empty((len(self.corners), 3)), self._points
         for number, corner in enumerate(self.corners):
@@ -144,15 +144,15 @@ class BetweenPoints(ShortRepr):
         """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
         x, effort = self._points, self._efforts
         if len(self.corners):
-            beside = np.setdiff1d(self.beside, x)
-            x, effort = inserted(x, effort, beside, self.effort("", beside))
+            beside = np.setdiff1d(self.beside_corners, x)
+            x, effort = insert_knots(x, effort, beside, self.effort("", beside))
         for _ in range(ROUNDS):
             more = inner_extremes(x, effort)
-            for low, _, high in self.beside.tolist():
+            for low, _, high in self.beside_corners.tolist():
                 more = more[(more < low) | (more > high)]
             if not len(more):
                 break
-            x, effort = inserted(x, effort, more, self.effort("", more))
+            x, effort = insert_knots(x, effort, more, self.effort("", more))
         return Several((read_only(x), read_only(effort)))
 
     @cached_property

@@ -50,7 +50,7 @@ def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: 
     """
     chosen = slice(None) if points is None else np.asarray(points, dtype=np.int64)
     scales = path.mesh.scales
-    return read_only(_along(path, node, direction)[0][chosen] * scales.force / scales.length)
+    return read_only(_compute_along_path(path, node, direction)[0][chosen] * scales.force / scales.length)
 
 
 def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool_]:
@@ -59,17 +59,17 @@ def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool
     It is the quotient of two determinants, of which that of the held node is below: where only the latter changes its
     sign, one mode of the part with its node held across passes neutral stability, and the stiffness has a pole.
     """
-    value, held = _along(path, node, direction)
+    value, held = _compute_along_path(path, node, direction)
     return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
 
 
-def _along(path: EquilibriumPath, node: str, direction: float) -> tuple[FloatArray, FloatArray]:
+def _compute_along_path(path: EquilibriumPath, node: str, direction: float) -> tuple[FloatArray, FloatArray]:
     """Return the dimensionless stiffness at every point, and the sign of the determinant of all that follows, (p,).
 
     The network is the same but for the node, whose axes are turned along the direction and which nothing guides.
     """
-    if (node, direction) in path.condensed:
-        return path.condensed[node, direction]
+    if (node, direction) in path.cross_stiffnesses:
+        return path.cross_stiffnesses[node, direction]
     mesh = path.mesh
     x, y, _ = mesh.bodies[node]
     frame = mesh.attachments.frame.copy()
@@ -84,12 +84,12 @@ def _along(path: EquilibriumPath, node: str, direction: float) -> tuple[FloatArr
     for k, (state, drive) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
         z = state.copy()
         z[x], z[y] = cos * z[x] + sin * z[y], cos * z[y] - sin * z[x]
-        found[k] = _condensed(own.rebase(z - drive * mesh.rate), z, drive, y)
-    path.condensed[node, direction] = read_only(found[:, 0]), read_only(found[:, 1])
-    return path.condensed[node, direction]
+        found[k] = _condense(own.rebase(z - drive * mesh.rate), z, drive, y)
+    path.cross_stiffnesses[node, direction] = read_only(found[:, 0]), read_only(found[:, 1])
+    return path.cross_stiffnesses[node, direction]
 
 
-def _condensed(own: NumpyEquations, z: FloatArray, drive: float, across: int) -> tuple[float, float]:
+def _condense(own: NumpyEquations, z: FloatArray, drive: float, across: int) -> tuple[float, float]:
     """Return the stiffness of one unknown while all others follow it, and the sign of the determinant of those.
 
     nan where a force is open, as that along a straight beam that cannot stretch and is held at both ends.

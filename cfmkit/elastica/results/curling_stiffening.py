@@ -30,8 +30,8 @@ _STEP = 1e-30
 class HinderedCurling:
     """Share by which beams that are wide, but solved as narrow ones, are too soft."""
 
-    share: FloatArray  # (n,): of the strain energy of bending of all beams, at every point [1]
-    beam: Any  # (n,): the beam that is too soft by most of that
+    share: FloatArray  # (n,) of the strain energy of bending of all beams, at every point [1]
+    beam: Any  # (n,) the beam that is too soft by most of that
 
 
 def hindered_curling(path: EquilibriumPath) -> HinderedCurling:

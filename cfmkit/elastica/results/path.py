@@ -283,8 +283,8 @@ class EquilibriumPath(ShortRepr):
         return {}
 
     @cached_property
-    def condensed(self) -> dict[tuple[str, float], tuple[FloatArray, FloatArray]]:
-        """Results of `cfmkit.elastica.results.cross_stiffness`, which asks for poles and values."""
+    def cross_stiffnesses(self) -> dict[tuple[str, float], tuple[FloatArray, FloatArray]]:
+        """Values and signs by node and direction that `cfmkit.elastica.results.cross_stiffness` has computed."""
         return {}
 
     def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:

@@ -20,7 +20,7 @@ class Corner:
     """A bifurcation between two points of a path."""
 
     drive: float  # where, dimensionless
-    y: FloatArray  # (unknowns,): the equilibrium there
+    y: FloatArray  # (unknowns,) the equilibrium there
     # below, above: whether a branch that parts from the other one is at smaller, and at larger values of the drive
     below: bool
     above: bool

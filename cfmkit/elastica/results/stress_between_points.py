@@ -39,10 +39,10 @@ def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots
     largest = rows.max(axis=0)
     found = [(t, row) for row in rows]
     for _ in range(ROUNDS):
-        more = [_tops(knots, t, largest) for knots in found]
+        more = [_find_tops(knots, t, largest) for knots in found]
         if not any(map(len, more)):
             break
-        found = _solved(solve, found, found, more)
+        found = _add_solved(solve, found, found, more)
     return tuple(found)
 
 
@@ -53,14 +53,14 @@ def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed:
     """
     found = list(knots)
     for _ in range(ROUNDS):
-        more = [_passes(own, allowed, t) for own in found]
+        more = [_find_passes(own, allowed, t) for own in found]
         if not any(map(len, more)):
             break
-        found = _solved(solve, found, list(knots), more)
+        found = _add_solved(solve, found, list(knots), more)
     return tuple(found)
 
 
-def _tops(knots: Knots, t: FloatArray, largest: FloatArray) -> FloatArray:
+def _find_tops(knots: Knots, t: FloatArray, largest: FloatArray) -> FloatArray:
     """Return where the stress of a beam has an extreme that may be the largest of all."""
     own, values = knots
     top = inner_extremes(own, values)
@@ -68,12 +68,12 @@ def _tops(knots: Knots, t: FloatArray, largest: FloatArray) -> FloatArray:
     return top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
 
 
-def _passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
+def _find_passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
     """Return where the stress of a beam passes the allowable one, but for known places."""
     return np.array(sorted({*crossings(*knots, allowed)} - {*known.tolist()}))
 
 
-def _solved(
+def _add_solved(
     solve: Solve,
     cubics: list[Knots],
     knots: list[Knots],
@@ -88,11 +88,11 @@ def _solved(
         stress = row[mine]
         if not accurate[mine].all():
             stress = np.where(accurate[mine], stress, values_at(*cubic, places))
-        found.append(inserted(*own, places, stress) if len(places) else cubic)
+        found.append(insert_knots(*own, places, stress) if len(places) else cubic)
     return found
 
 
-def inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> Knots:
+def insert_knots(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> Knots:
     """Return increasing places with some more among them, and their values."""
     at = np.searchsorted(x, places)
     return np.insert(x, at, places), np.insert(y, at, values)

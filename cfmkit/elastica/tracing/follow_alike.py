@@ -56,8 +56,8 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
     if not _goes_straight_on(path, control):
         return None
     efforts = np.full((len(networks), len(path.load_case.points)), np.nan)
-    own = _same_for_all(path.network)
-    alike = [k for k, network in enumerate(networks) if _same_for_all(network) == own]
+    own = _get_common_values(path.network)
+    alike = [k for k, network in enumerate(networks) if _get_common_values(network) == own]
     if alike:
         try:
             efforts[alike] = _follow(path, [networks[k] for k in alike], control)
@@ -66,17 +66,17 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
     return efforts
 
 
-def _same_for_all(network: Network) -> Any:
+def _get_common_values(network: Network) -> Any:
     """Return what is the same in networks that are set up together; None if this one cannot be."""
     if not all(is_plain(beam) and beam.closure == "rotscale" for beam in network.beams.values()):
         return None
     supports = [node.support for node in network.nodes.values()]
     arms = [apart(network, link.node) for link in network.links]
-    beams = [_kept(beam) for beam in network.beams.values()]
+    beams = [_get_beam_kind(beam) for beam in network.beams.values()]
     return make_up(network), supports, arms, beams, network.springs, network.loads
 
 
-def _kept(beam: Beam) -> Any:
+def _get_beam_kind(beam: Beam) -> Any:
     """Return whether a plain beam has offsets, stretches, and gets a floor of flexibility because it is straight."""
     shape: Any = beam.shape
     stretches = beam.section.axial
@@ -91,7 +91,7 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
         path.network.loads or arrays.base.any() or any(getattr(s, name, None) for s in springs for name in FREE)
     )
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
-    simple = _same_for_all(path.network) is not None and arrays.pieces == 1 and not arrays.tension
+    simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
     alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
     return bool(rests and quiet and simple and not alone and engine() == "C")
 

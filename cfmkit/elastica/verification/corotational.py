@@ -50,10 +50,10 @@ _GAUSS = np.polynomial.legendre.leggauss(8)
 class Recheck:
     """Efforts and stresses of corotational elements at points of a path."""
 
-    # (p,): force or moment of the drive [N or N m], extrapolated; NaN where no equilibrium was found
+    # (p,) force or moment of the drive [N or N m], extrapolated; NaN where no equilibrium was found
     effort: FloatArray
-    stress: FloatArray  # (p,): largest stress at the ends of the elements [Pa], extrapolated
-    stable: Any  # (p,): whether the energy is at a minimum there while the drive is held
+    stress: FloatArray  # (p,) largest stress at the ends of the elements [Pa], extrapolated
+    stable: Any  # (p,) whether the energy is at a minimum there while the drive is held
     elements: int  # of the finer mesh
 
 

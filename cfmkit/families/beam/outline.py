@@ -84,7 +84,7 @@ class HeldPlace:
 
     name: str  # of its node; of the mirrored half with a prime
     node: str
-    at: FloatArray  # (2,): where the node is [m]
+    at: FloatArray  # (2,) where the node is [m]
     # polygons that it covers [m]; a line (2, 2) across a beam where the node is neither a pad nor an eye
     shapes: tuple[FloatArray, ...]
     seams: tuple[FloatArray, ...] = ()  # lines at which it begins [m]

@@ -58,7 +58,7 @@ class SolidSolution(ShortRepr):
 
     assembly: Assembly  # the network that the part is drawn from
     solved: AdaptiveSolution
-    # (n,): travel of the points of the curve [m or rad]
+    # (n,) travel of the points of the curve [m or rad]
     motion: FloatArray = field(default_factory=lambda: np.zeros(0))
     reached: LoadPath | None = None  # how far a load leads that drives the part; None if its motion is given
 

@@ -44,9 +44,9 @@ class Solution(ShortRepr):
 
     assembly: Assembly  # the network and what is done to it
     path: Path  # its equilibria
-    # (n,): which points of the path make the curve: those requested, or all where the path is followed through folds
+    # (n,) which points of the path make the curve: those requested, or all where the path is followed through folds
     keep: Any
-    ends: Any = ()  # (m,): points of the path at which windows end between two points of the curve
+    ends: Any = ()  # (m,) points of the path at which windows end between two points of the curve
 
     @property
     def spec(self) -> BeamSpec:
@@ -124,12 +124,12 @@ class Solution(ShortRepr):
     def _part_efforts_at(self, places: FloatArray) -> FloatArray:
         assert self.everywhere is not None
         found, near = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
-        for corner, *sides in self.everywhere.beside[:, [1, 0, 2]].tolist():
+        for corner, *sides in self.everywhere.beside_corners[:, [1, 0, 2]].tolist():
             here = np.abs(places - corner) <= near
             if here.any():  # the path has two directions: along one it may be unbounded, along the other it goes on
                 steps = np.array([side - corner for side in sides if side != corner])
                 one, two = (self._solved_part_efforts(corner + count * steps) for count in (1, 2))
-                found[here] = (2 * one - two)[one.argmin()]
+                found[here] = (2 * one - two)[np.where(np.isfinite(one), one, np.inf).argmin()]
         return found
 
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:

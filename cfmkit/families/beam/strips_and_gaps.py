@@ -35,7 +35,7 @@ TOGETHER = 0.25  # of the thickness: ends closer than this are one
 class BeamStrip:
     """A smooth piece of a beam."""
 
-    points: FloatArray  # (n, 2): of its centre line [m]
+    points: FloatArray  # (n, 2) of its centre line [m]
     # angle, thickness, (n,): there [rad], [m]
     angle: FloatArray
     thickness: FloatArray

@@ -52,8 +52,8 @@ class SurfaceCourse(ShortRepr):
     # height, slope: height [m] and its derivative [1] at places [m]; at a corner the slope is that of one side
     height: Callable[[FloatArray], FloatArray]
     slope: Callable[[FloatArray], FloatArray]
-    rows: FloatArray  # (n,): the places that the curve along it is written at [m]
-    corners: FloatArray  # (k,): where the slope jumps [m]
+    rows: FloatArray  # (n,) the places that the curve along it is written at [m]
+    corners: FloatArray  # (k,) where the slope jumps [m]
     holes: tuple[tuple[float, float], ...] = ()  # between which places it was not measured [m]
 
     def places(self, end: float) -> FloatArray:
@@ -155,13 +155,13 @@ class Ride:
     place: FloatArray
     height: FloatArray
     displacement: FloatArray
-    force: FloatArray  # (n,): axial force of the tip [N]
+    force: FloatArray  # (n,) axial force of the tip [N]
     # contact, lateral, (2, n): normal force on the surface and force against the motion [N], on the way along x and on
     # the way back; not finite where the tip jams
     contact: FloatArray
     lateral: FloatArray
-    stress: FloatArray  # (n,): largest stress in the mechanism [Pa]
-    stable: Any  # (n,): whether the mechanism is stable there
+    stress: FloatArray  # (n,) largest stress in the mechanism [Pa]
+    stable: Any  # (n,) whether the mechanism is stable there
     values: Mapping[str, float | None]  # the scalar results; extremes are those between the points, too
     ending: Finding | None = None  # why it ends before the surface does
     findings: tuple[Finding, ...] = ()  # what else is wrong with it

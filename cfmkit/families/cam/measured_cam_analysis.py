@@ -394,12 +394,12 @@ REACH = 2e-3
 class BuiltTrack:
     """The track of a roller's centre on a built flank, mirrored to the right, over the slider's position."""
 
-    slider: FloatArray  # (n,): increasing: height of the slider above the path's first point [m]
+    slider: FloatArray  # (n,) increasing: height of the slider above the path's first point [m]
     # x, y, (n,): roller centre [m]
     x: FloatArray
     y: FloatArray
-    slope: FloatArray  # (n,): dy/dx of the track
-    contact: FloatArray  # (n,): arc length of the flank at which the roller touches it [m]
+    slope: FloatArray  # (n,) dy/dx of the track
+    contact: FloatArray  # (n,) arc length of the flank at which the roller touches it [m]
     # slider positions between which the contact is where nothing was measured [m]
     holes: tuple[tuple[float, float], ...] = ()
 

@@ -324,7 +324,7 @@ class FlankSamples:
     """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
 
     solution: Solution  # the mechanism
-    travel: FloatArray  # (n,): increasing [m]
+    travel: FloatArray  # (n,) increasing [m]
     states: TrackStates  # where the rollers are, (n,)
     # up, down: on the way up and on the way down, (n,) each
     up: Forces

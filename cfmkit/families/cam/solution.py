@@ -58,8 +58,8 @@ class ForceBand:
     """Forces of all drawn cams over the travel."""
 
     travel: FloatArray  # (n,) [m]
-    forces: FloatArray  # (samples, n): without friction [N]
-    design: FloatArray  # (n,): force of the design [N]
+    forces: FloatArray  # (samples, n) without friction [N]
+    design: FloatArray  # (n,) force of the design [N]
 
     def quantile(self, share: float) -> FloatArray:
         """Return the force that a share of the cams stays below at each travel [N]; NaN where not all have a flank."""
@@ -79,7 +79,7 @@ class Solution(ShortRepr):
     """A solved mechanism, as the checks, the scalar values and the pictures need it."""
 
     assembly: Assembly  # the parts
-    travel: FloatArray  # (n,): slider travel from the start of the roller path, increasing [m]
+    travel: FloatArray  # (n,) slider travel from the start of the roller path, increasing [m]
     states: TrackStates  # where the rollers are at those travels
     # up, down: on the way up and on the way down, both ordered by increasing travel
     up: Forces
@@ -167,7 +167,7 @@ class Built(ShortRepr):
     assembly: Assembly  # the design and the loads
     registration: Registration  # of the right and the left flank
     across: tuple[FloatArray, FloatArray]  # errors in x at the same y, positive outside [m]
-    travel: FloatArray  # (n,): from the start of the design's roller path [m]
+    travel: FloatArray  # (n,) from the start of the design's roller path [m]
     sides: Sides  # where the rollers are
     # parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,)
     shares: dict[str, FloatArray]

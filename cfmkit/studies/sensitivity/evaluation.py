@@ -34,8 +34,8 @@ class Piece:
     """Points that were evaluated together."""
 
     records: Records  # their rows
-    blocks: NDArray[np.int64]  # (n,): to which block each belongs, from 1
-    roles: NDArray[np.str_]  # (n,): what each is for
+    blocks: NDArray[np.int64]  # (n,) to which block each belongs, from 1
+    roles: NDArray[np.str_]  # (n,) what each is for
 
 
 @dataclass

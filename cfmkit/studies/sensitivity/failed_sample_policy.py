@@ -83,8 +83,8 @@ def envelope(one: Analysis, other: Analysis) -> Analysis:
 class Blocks:
     """Evaluated samples."""
 
-    points: FloatArray  # (b, s, d): blocks of points
-    outputs: FloatArray  # (b, s, m): NaN where there is no value
+    points: FloatArray  # (b, s, d) blocks of points
+    outputs: FloatArray  # (b, s, m) NaN where there is no value
     failed: int = 0  # samples that failed, those that were drawn again included
     replaced: int = 0  # blocks that were drawn again
 

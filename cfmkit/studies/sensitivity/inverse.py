@@ -40,8 +40,8 @@ CLOSE = 1e-3
 class LimitsAlong:
     """Changes of limits with the error of one parameter."""
 
-    offsets: FloatArray  # (p,): errors at which that is known, increasing, 0 among them
-    changes: FloatArray  # (p, m): of the limits there
+    offsets: FloatArray  # (p,) errors at which that is known, increasing, 0 among them
+    changes: FloatArray  # (p, m) of the limits there
 
     def __call__(self, errors: FloatArray) -> FloatArray:
         """Return the changes of the limits for errors (k,), linear between the offsets and beyond, (k, m)."""

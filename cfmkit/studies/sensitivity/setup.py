@@ -67,7 +67,7 @@ class Setup:
     # samples, seed: how many, and from where
     samples: int
     seed: int
-    correlation: FloatArray  # (d, d): of the normal scores
+    correlation: FloatArray  # (d, d) of the normal scores
     together: tuple[tuple[int, ...], ...]  # parameters whose tolerances are tightened together
     warnings: tuple[Finding, ...] = ()  # what the user must know
 

@@ -40,11 +40,11 @@ _MIDDLE = 0.7  # of the end: a pose under load that stays where it is while the 
 class PosePlan:
     """Displacements, and which of them are what."""
 
-    at: FloatArray  # (p,): from rest, increasing [m]
-    window: Any  # (j,): indices of those in the window
-    shown: Any  # (3,): indices of those at which gaps are looked at: rest, on the way, and the end
-    mean: FloatArray  # (p,): weights of the mean over the window
-    compared: Any  # (2,): indices of a and b; of the end where the paper's objective is not requested
+    at: FloatArray  # (p,) from rest, increasing [m]
+    window: Any  # (j,) indices of those in the window
+    shown: Any  # (3,) indices of those at which gaps are looked at: rest, on the way, and the end
+    mean: FloatArray  # (p,) weights of the mean over the window
+    compared: Any  # (2,) indices of a and b; of the end where the paper's objective is not requested
 
 
 def poses_of(task: Task, start: float) -> PosePlan:
@@ -84,12 +84,12 @@ class NoAnswer(Exception):
 class BeamAtPoses:
     """One beam at p poses, at r places along it."""
 
-    place: FloatArray  # (r,): fraction of the arc length
+    place: FloatArray  # (r,) fraction of the arc length
     # x, y, (p, r): centre line [m]
     x: FloatArray
     y: FloatArray
-    stress: FloatArray  # (p, r): bending stress on the left side [Pa]: signed
-    axial: FloatArray | None = None  # (p, r): axial stress, where it counts [Pa]
+    stress: FloatArray  # (p, r) bending stress on the left side [Pa]: signed
+    axial: FloatArray | None = None  # (p, r) axial stress, where it counts [Pa]
 
     @property
     def left(self) -> FloatArray:
@@ -116,7 +116,7 @@ class NetworkAtPoses:
 class RowsOfBeam:
     """Samples of a beam by the engine, at r places."""
 
-    place: FloatArray  # (r,): fraction of the arc length
+    place: FloatArray  # (r,) fraction of the arc length
     # row, index, (r,): which of the beam's rows, and of all rows, they are
     row: Any
     index: Any

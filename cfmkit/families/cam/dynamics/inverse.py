@@ -85,14 +85,14 @@ class MotionResponse:
     machine: Machine
     moment: Moment
     at: Kinematics  # how the sides follow the slider
-    force: FloatArray  # (n,): on the slider, upwards [N]
+    force: FloatArray  # (n,) on the slider, upwards [N]
     # contact, traction, (2, n): normal and tangential force of the cam on a roller [N]; traction along the way up
     contact: FloatArray
     traction: FloatArray
     # roller_pin, slider_pin, (2, n): force on a brace at the roller's axis and at the slider [N]
     roller_pin: ComplexArray
     slider_pin: ComplexArray
-    on_corner: NDArray[np.bool_]  # (n,): whether a roller pivots on the corner of its cam
+    on_corner: NDArray[np.bool_]  # (n,) whether a roller pivots on the corner of its cam
 
     @cached_property
     def spin(self) -> FloatArray:

@@ -159,7 +159,7 @@ class Trajectory:
     coordinates: FloatArray
     velocities: FloatArray
     accelerations: FloatArray
-    multipliers: FloatArray  # (n, 9): of six holonomic constraints, two rolling constraints and the motion
+    multipliers: FloatArray  # (n, 9) of six holonomic constraints, two rolling constraints and the motion
     residual: float  # largest violation of a holonomic constraint [m]
     postures: tuple[Posture, Posture]  # right and left, at the same times
 

@@ -23,16 +23,16 @@ class History(ShortRepr):
 
     times: FloatArray  # (n,) [s]
     moment: Moment  # position, speed and acceleration of the slider
-    force: FloatArray  # (n,): on the slider, upwards [N]
+    force: FloatArray  # (n,) on the slider, upwards [N]
     # contact, traction, (2, n): normal and tangential force of the cam on a roller [N]
     contact: FloatArray
     traction: FloatArray
-    spin: FloatArray  # (2, n): speed at which a roller turns, positive on the way up [rad/s]
-    brace: FloatArray  # (2, n): force that a brace transmits at the roller's axis [N]
-    pin: FloatArray  # (2, n): force between brace and slider [N]: the other end of the same, brace inertia between them
-    elongation: FloatArray  # (n,): of the springs [m]
-    center: NDArray[np.complex128]  # (2, n): axes of the rollers [m]
-    on_corner: NDArray[np.bool_]  # (n,): whether a roller pivots on the corner of its cam
+    spin: FloatArray  # (2, n) speed at which a roller turns, positive on the way up [rad/s]
+    brace: FloatArray  # (2, n) force that a brace transmits at the roller's axis [N]
+    pin: FloatArray  # (2, n) force between brace and slider [N]: the other end of the same, brace inertia between them
+    elongation: FloatArray  # (n,) of the springs [m]
+    center: NDArray[np.complex128]  # (2, n) axes of the rollers [m]
+    on_corner: NDArray[np.bool_]  # (n,) whether a roller pivots on the corner of its cam
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,5 +54,5 @@ class MotionSolution(ShortRepr):
     spec: CamSpec  # resolved
     build: Build  # the parts
     history: History  # forces and speeds over time
-    static: FloatArray  # (n,): force on the slider at rest in the same places [N]
-    displacement: FloatArray  # (n,): of the slider, from the origin that the analysis asks for [m]
+    static: FloatArray  # (n,) force on the slider at rest in the same places [N]
+    displacement: FloatArray  # (n,) of the slider, from the origin that the analysis asks for [m]

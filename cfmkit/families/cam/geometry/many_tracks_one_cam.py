@@ -71,8 +71,8 @@ class ManyTracks:
     """Tracks on one cam, (d,) each [m]."""
 
     profile: CamProfile  # the cam as cut
-    radius: FloatArray  # (d,): of the rollers that run on it, with the material that is left on the flank
-    brace: FloatArray  # (d,): of the braces built in
+    radius: FloatArray  # (d,) of the rollers that run on it, with the material that is left on the flank
+    brace: FloatArray  # (d,) of the braces built in
 
     def __len__(self) -> int:
         """Return the number of tracks."""

@@ -53,10 +53,10 @@ class TrackStates(ShortRepr):
     # x, y, (n,): roller centre [m]
     x: FloatArray
     y: FloatArray
-    slope: FloatArray  # (n,): dy/dx of the centre's track there
-    bend: FloatArray  # (n,): d2y/dx2 of the centre's track there [1/m]
-    on_corner: NDArray[np.bool_]  # (n,): whether the roller pivots on the cam's corner
-    parameter: FloatArray  # (n,): path coordinate of the contact on the flank [m]; that of the corner while on it
+    slope: FloatArray  # (n,) dy/dx of the centre's track there
+    bend: FloatArray  # (n,) d2y/dx2 of the centre's track there [1/m]
+    on_corner: NDArray[np.bool_]  # (n,) whether the roller pivots on the cam's corner
+    parameter: FloatArray  # (n,) path coordinate of the contact on the flank [m]; that of the corner while on it
 
     def fields(self) -> tuple[NDArray[Any], ...]:
         """Return the arrays in the order in which the class takes them."""

@@ -34,7 +34,7 @@ class SampledBranch:
     travel: FloatArray
     values: FloatArray
     exact: Exact  # ``exact(travel, rows)``, the values at any travels of some rows, (r, m) -> (r, m)
-    peaks: FloatArray | None = None  # (d, k): travels next to which an extreme may stand that the samples miss
+    peaks: FloatArray | None = None  # (d, k) travels next to which an extreme may stand that the samples miss
 
     @cached_property
     def heights(self) -> FloatArray:

@@ -47,7 +47,7 @@ class Around:
 
     cam: Assembly  # the cam, with the parts of the specification
     tracks: ManyTracks  # of the different pairs of roller and brace, (t,)
-    which: Rows  # (d,): which of them each mechanism has
+    which: Rows  # (d,) which of them each mechanism has
     asked: float | None  # requested travel [m]; None: as far as the flank goes
     # roller_weight, slider_weight, (d,): weight that hangs on one roller, and on the slider [N]
     roller_weight: FloatArray

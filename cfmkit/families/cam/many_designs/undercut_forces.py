@@ -77,7 +77,7 @@ class CornerSlab(Slab):
     """Some undercut designs whose shapes exist, at all their samples."""
 
     found: list[Shape]  # different cams
-    which: NDArray[np.intp]  # (d,): which of them each design has
+    which: NDArray[np.intp]  # (d,) which of them each design has
 
     def with_shapes(self, found: list[Shape], which: NDArray[np.intp]) -> CornerSlab:
         """Return the slab itself, with the shapes of its designs."""

@@ -100,8 +100,8 @@ class Pressed(ShortRepr):
 class Chain(ShortRepr):
     """A chain ready to be pressed."""
 
-    points: FloatArray  # (k, 2): what the network is built on, from the clamped end to the slider [m]
-    pins: FloatArray  # (3, 2): pivot, crank pin and slider pin [m]
+    points: FloatArray  # (k, 2) what the network is built on, from the clamped end to the slider [m]
+    pins: FloatArray  # (3, 2) pivot, crank pin and slider pin [m]
     build: Callable[[FloatArray], Network]  # from such points to the network
     direction: float  # of the travel [rad]: pi where the slider moves towards smaller x
     knee: Callable[[Path, int], FloatArray]  # from a path and a point of it to where the crank pin is [m]

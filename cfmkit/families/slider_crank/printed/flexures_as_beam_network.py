@@ -84,10 +84,10 @@ class Elasticity:
 class Strip:
     """One strip along a polyline, its thickness linear between places."""
 
-    corners: FloatArray  # (k, 2): centre line before any load, from the clamped end to the slider [m]
+    corners: FloatArray  # (k, 2) centre line before any load, from the clamped end to the slider [m]
     width: Any  # out of the plane [m]
-    thickness: Any  # (n,): in the plane [m]; complex where derivatives are taken
-    places: FloatArray  # (n,): where, as fractions of the length from 0 to 1
+    thickness: Any  # (n,) in the plane [m]; complex where derivatives are taken
+    places: FloatArray  # (n,) where, as fractions of the length from 0 to 1
 
     def __post_init__(self) -> None:
         """Freeze the corners and places."""

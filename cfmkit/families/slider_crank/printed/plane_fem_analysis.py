@@ -61,7 +61,7 @@ class SolidSolution(ShortRepr):
 
     spec: SliderCrankSpec  # with every default written out
     solved: AdaptiveSolution
-    travel: FloatArray  # (n,): of the slider, at the points of the curve [m]
+    travel: FloatArray  # (n,) of the slider, at the points of the curve [m]
     chain: Chain  # the leg as beams
 
     @cached_property

@@ -51,7 +51,7 @@ Goal = Literal["stroke", "ripple", "rms"]
 class StripTask:
     """Requirements on the strip."""
 
-    corners: FloatArray  # (k, 2): its centre line [m]
+    corners: FloatArray  # (k, 2) its centre line [m]
     direction: float  # of the slider's travel [rad]
     material: Elasticity  # with the stress allowed, if there is a limit
     force: float  # wanted of one set [N]
@@ -373,7 +373,7 @@ class Watched:
     # same
     bending: FloatArray
     axial: FloatArray
-    between: FloatArray  # (13, 4): interpolation between the points
+    between: FloatArray  # (13, 4) interpolation between the points
 
     def stress(self, bending: FloatArray, axial: FloatArray) -> FloatArray:
         """Return the stress (13 r, ...) of stresses (4, rows, ...) at the samples [Pa], or derivatives of theirs."""

@@ -30,7 +30,7 @@ class Solved:
 
     task: SpringTask  # with the lengths chosen
     window: tuple[float, float]  # where the target is kept [rad or m]
-    rates: FloatArray  # (4,): of the springs of one leg [N m/rad; the last N/m]
+    rates: FloatArray  # (4,) of the springs of one leg [N m/rad; the last N/m]
     # deviation, rms: largest and root mean square deviation, as fractions of the target
     deviation: float
     rms: float

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 class RateGoal:
     """Sum that the springs are to have, in units of the target."""
 
-    matrix: FloatArray  # (n, m): what a rate of 1 gives at each of n places, over the target
-    wanted: FloatArray  # (n,): 1 for a constant; something sloping for a stiffness
-    upper: FloatArray  # (m,): largest rates, perhaps infinite; zero for a spring that may not be used
+    matrix: FloatArray  # (n, m) what a rate of 1 gives at each of n places, over the target
+    wanted: FloatArray  # (n,) 1 for a constant; something sloping for a stiffness
+    upper: FloatArray  # (m,) largest rates, perhaps infinite; zero for a spring that may not be used
     held: tuple[FloatArray, float] | None = None  # a row and what it must give exactly
-    lower: FloatArray | None = None  # (m,): smallest rates; None: zero
+    lower: FloatArray | None = None  # (m,) smallest rates; None: zero
     least: tuple[FloatArray, float] | None = None  # a row and what it must give at least
 
     @property

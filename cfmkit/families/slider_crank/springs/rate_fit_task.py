@@ -41,7 +41,7 @@ class SpringTask:
 
     spec: SliderCrankSpec  # with the lengths; its springs do not matter
     assembly: Assembly  # the same put together; its rates do not matter
-    # (4,): springs of one leg whose friction is compensated, from the round before; None: none is
+    # (4,) springs of one leg whose friction is compensated, from the round before; None: none is
     rates: FloatArray | None = None
 
     @property

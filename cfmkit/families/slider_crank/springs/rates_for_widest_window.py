@@ -62,7 +62,7 @@ class FittedWindow:
     # low, high: ends [rad or m]
     low: float
     high: float
-    rates: FloatArray  # (4,): of the springs of one leg
+    rates: FloatArray  # (4,) of the springs of one leg
     deviation: float  # largest one, as a fraction of the target
 
     @property
