@@ -6,7 +6,7 @@ read: a result of one mechanism reads the tables by name at row 0, a study reads
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -25,6 +25,42 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 S = TypeVar("S")
+
+T = TypeVar("T")
+
+
+def stacked(items: Sequence[T]) -> T:
+    """Return dataclasses of numbers as one, with columns where they differ: (m, 1), of arrays (k,) (k, m, 1).
+
+    Numbers that are equal in all stay plain, so that what mechanisms have in common is computed once. A class that
+    knows more of itself than its fields names it in `also_stacked`.
+    """
+    first: Any = items[0]
+    found: Any = first
+    if len(items) == 1:
+        return items[0]
+    if is_dataclass(first):
+        found = object.__new__(type(first))  # type: ignore[arg-type]  # without what is known of the first one
+        for name in (*(item.name for item in fields(first)), *getattr(first, "also_stacked", ())):
+            vars(found)[name] = stacked([getattr(one, name) for one in items])
+    elif isinstance(first, tuple):
+        found = tuple(stacked(one) for one in zip(*items, strict=True))
+    elif not ((values := np.array(items)) == values[0]).all():
+        found = np.moveaxis(values, 0, -1)[..., None]
+    return found  # type: ignore[no-any-return]
+
+
+def rows_of(item: T, rows: Any) -> T:
+    """Return some rows of what is stacked, with what is known of it; plain numbers hold for every row."""
+    found: Any = item
+    if isinstance(item, np.ndarray):
+        found = item[..., rows, :] if item.ndim > 1 else item
+    elif isinstance(item, tuple):
+        found = tuple(rows_of(one, rows) for one in item)
+    elif is_dataclass(item):
+        found = object.__new__(type(found))
+        vars(found).update({name: rows_of(value, rows) for name, value in vars(item).items()})
+    return found  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ of an undercut cam the roller pivots. The slider position is what drives the mec
 the track is the part over which the slider rises while the rollers move out: where another
 brace or friction makes the slider fall first, that part is passed over (a dead point), and
 where the slider would fall again near the end of the brace the track ends.
+
+A `Track` finds its ends when it is made; its formulas take numbers, or columns: `TrackRows` are tracks of one kind.
 """
 
 from __future__ import annotations
@@ -17,17 +19,19 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.families.cam.geometry.path import ideal_position
-from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent
+from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
+from cfmkit.families.cam.geometry.path import RollerPath, ideal_position
+from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw, brace_tangent
+from cfmkit.families.rows import rows_of, stacked
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamCorner
 
 
 Reason = Literal["brace", "crossed", "dead"]
@@ -150,7 +154,10 @@ class Track:
             raise NoTrack("crossed", begins)
         if max(x_first, begins) >= brace_length * (1 - 1e-6):
             raise NoTrack("brace", max(x_first, begins))
-        self._follows_law = not self.shift and brace_length == profile.path.law.brace_length
+        law = profile.path.law
+        self._is_shifted = bool(self.shift)
+        self._follows_law = not self.shift and brace_length == law.brace_length
+        self._is_ideal = self._follows_law and not law.friction and law.slope_factor == 1
         self._limits(x_first)
 
     def _pivot_range(self) -> tuple[float, float]:
@@ -228,21 +235,19 @@ class Track:
         return slider, slope - brace_tangent(x, self.brace_length)
 
     def states(self, slider: FloatArray) -> TrackStates:
-        """Return the roller's states at slider positions between `start` and `end` [m]."""
+        """Return the roller's states at slider positions between `start` and `end`, of any shape [m]."""
         on_corner = slider < self.corner_end
         if not on_corner.any():
             return self._flank_states(slider)
         corner = self._corner_states(slider[on_corner])
         if on_corner.all():
-            return corner
-        flank = self._flank_states(slider[~on_corner])
-        place = np.argsort(~on_corner, kind="stable").argsort()  # from corner first, flank then, to the order requested
-        return TrackStates(*(np.concatenate(pair)[place] for pair in zip(corner.fields(), flank.fields(), strict=True)))
+            return TrackStates(*(field.reshape(slider.shape) for field in corner.fields()))
+        return _joined(on_corner, corner, self._flank_states(slider[~on_corner]))
 
     def _flank_states(self, slider: FloatArray) -> TrackStates:
         law, u = self.profile.path.law, self._flank_parameter(slider)
         x, bend = u, law.slope_derivative(u)
-        if self.shift:
+        if self._is_shifted:
             x = u + self.shift * self.profile.normal(u)[0]
             bend = bend / (1.0 + self.shift / law.curvature_radius(u))
         # Where the path is nearly vertical y follows from the slider far better than from x.
@@ -253,13 +258,21 @@ class Track:
         """Return states on the corner: with the centre and the slider's pin it is a triangle of known sides."""
         xc, yc = self._corner_point
         radius = self.radius
-        turn = pivot_angle(slider, self.pivot)
-        if self.dead_point == self.start:
-            turn[slider <= self.start] = self._pivots[0]
+        first = (slider <= self.start) & (self.dead_point == self.start)
+        turn = np.where(first, self._pivots[0], pivot_angle(slider, self.pivot))
         sin, cos = np.sin(turn), np.cos(turn)
         bend, always = 1.0 / (radius * cos * cos * cos), np.ones(slider.shape, dtype=bool)
         contact = np.full(slider.shape, self.profile.start)
         return TrackStates(xc + radius * sin, yc - radius * cos, sin / cos, bend, always, contact)
+
+    @property
+    def kind(self) -> tuple[Any, ...] | None:
+        """What tracks side by side have in common; None if the path's height is no formula."""
+        law, begins = self.profile.path.law, (self.corner_end > self.start, self.start > self.dead_point)
+        if type(law) is not SlopeLaw or law.friction or self.profile.path.method != "quadrature":
+            return None
+        cut = self.profile.corner is not None, self._is_shifted, self._follows_law, law.slope_factor == 1
+        return *begins, *cut, law.always_rises, self.turns_back
 
     @property
     def pivot(self) -> Pivot:
@@ -297,20 +310,24 @@ class Track:
         return self._slider(x, yc - self.radius * cos), x, sin / cos
 
     def _flank_piece(self, u: Real) -> tuple[Real, Real, Real]:
-        x, y = self.profile.shifted(u, self.shift) if self.shift else (u, self.profile.path.height(u))
+        x, y = self.profile.shifted(u, self.shift) if self._is_shifted else (u, self.profile.path.height(u))
         return self._slider(x, y), x, self.profile.path.law.slope(u)
 
     def _flank_parameter(self, slider: FloatArray) -> FloatArray:
         """Return the path coordinate of the contact on the flank."""
         law = self.profile.path.law
         low, high = self.flank_range
-        if self._follows_law and not law.friction and law.slope_factor == 1:
+        if self._is_ideal:
             travel = np.maximum(slider - self._slider(law.rest_half_width, 0.0), 0.0)
             return np.minimum(np.maximum(ideal_position(law, travel), low), high)
         zero, places, excess = self._guide
         root = np.sqrt(np.maximum(slider - zero, 0.0))
-        guess = ideal_position(law, root * root) + np.interp(root, places, excess)
+        guess = ideal_position(law, root * root) + self._interpolated(root, places, excess)
         return invert_increasing(self._on_flank, slider, self.flank_range, guess)
+
+    @staticmethod
+    def _interpolated(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
+        return np.interp(at, places, values)
 
     @cached_property
     def _guide(self) -> tuple[float, FloatArray, FloatArray]:
@@ -318,8 +335,78 @@ class Track:
 
         The difference from the ideal profile is smooth and small, so that straight lines do.
         """
-        knots = np.linspace(*self.flank_range, KNOTS)
+        low, high = self.flank_range
+        knots = low + (high - low) * np.linspace(0.0, 1.0, KNOTS)
         slider = self._on_flank(knots)[0]
-        zero = min(self.start, float(slider[0]))
+        zero = np.minimum(self.start, slider[..., :1])
         root = np.sqrt(np.maximum(slider - zero, 0.0))
         return zero, root, knots - ideal_position(self.profile.path.law, root * root)
+
+
+def _joined(on_corner: NDArray[np.bool_], corner: TrackStates, flank: TrackStates) -> TrackStates:
+    """Return states of which some are on the corner; those on the flank are given where the others are not, or all."""
+    found = []
+    for some, rest in zip(corner.fields(), flank.fields(), strict=True):
+        joined = np.empty(on_corner.shape, dtype=some.dtype)
+        joined[on_corner] = some.ravel()
+        joined[~on_corner] = rest if rest.ndim == 1 else rest[~on_corner]
+        found.append(joined)
+    return TrackStates(*found)
+
+
+_NUMBERS = ("brace_length", "radius", "shift", "start", "dead_point", "corner_end", "end", "flank_range", "_pivots")
+
+
+class TrackRows(Track):
+    """Tracks of one kind side by side: numbers that differ are columns (m, 1), slider positions are (m, n).
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+        At least two, of equal `kind`.
+    """
+
+    def __init__(self, tracks: Sequence[Track]) -> None:
+        """Set the numbers of all side by side."""
+        first, profiles = tracks[0], [track.profile for track in tracks]
+        law, corner = (stacked([read(one) for one in profiles]) for read in (lambda one: one.path.law, _corner_of))
+        numbers = {name: stacked([getattr(track, name) for track in tracks]) for name in _NUMBERS}
+        cut = stacked([(one.roller_radius, one.end) for one in profiles])
+        alike = {name: getattr(first, name) for name in ("_is_shifted", "_follows_law", "_is_ideal", "turns_back")}
+        parts = zip(*([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True)
+        self._set(law, cut, corner, numbers | alike | {"_parts": tuple(stacked(list(part)) for part in parts)})
+
+    def _set(self, law: Any, cut: Any, corner: Any, numbers: Mapping[str, Any]) -> None:
+        radius, end = cut
+        self.profile = CamProfile(RollerPath(law, end), radius, end, corner)
+        self._corner_point = corner.point if corner else (0.0, 0.0)
+        vars(self).update(numbers)
+
+    def of_rows(self, rows: Any) -> TrackRows:
+        """Return some of the tracks."""
+        found, own = object.__new__(TrackRows), dict(vars(self))
+        profile = own.pop("profile")
+        law, cut, corner = rows_of((profile.path.law, (profile.roller_radius, profile.end), profile.corner), rows)
+        found._set(law, cut, corner, {name: rows_of(value, rows) for name, value in own.items()})
+        return found
+
+    def states(self, slider: FloatArray) -> TrackStates:
+        """Return the rollers' states at slider positions of each track, (m, n) [m]."""
+        on_corner = slider < self.corner_end
+        if not on_corner.any():
+            return self._flank_states(slider)
+        few = self.of_rows(np.nonzero(on_corner)[0])._corner_states(slider[on_corner][:, None])
+        return _joined(on_corner, few, self._flank_states(np.maximum(slider, self.corner_end)))
+
+    def stretches(self) -> Iterator[TrackStretch]:
+        """Yield the parts of the tracks on which the slider rises; their ends are columns."""
+        for on_corner, low, high in self._parts:
+            yield TrackStretch(on_corner, low, high, self._corner_piece if on_corner else self._flank_piece)
+
+    @staticmethod
+    def _interpolated(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
+        return np.stack([np.interp(*row) for row in zip(at, places, values, strict=True)])
+
+
+def _corner_of(profile: CamProfile) -> CamCorner | None:
+    return profile.corner

@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
+from cfmkit.families.rows import rows_of, stacked
 from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, scale_factors, signs
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
-from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, rows_of, stacked, window_of
+from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, window_of
 from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples

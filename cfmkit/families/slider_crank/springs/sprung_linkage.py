@@ -16,14 +16,15 @@ the slider's spring, that adds most where a joint turns most per travel.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FREE, GuideFriction
+from cfmkit.families.rows import stacked
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import (
     SliderPath,
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
-
-T = TypeVar("T")
 
 TURN = 2.0 * math.pi
 
@@ -79,6 +78,11 @@ class Assembly(ShortRepr):
     side: int = 1  # of a force drive: 1 beyond, -1 before the stretched position
     anchor: float = 0.0  # how far the anchor of the slider's spring is screwed beyond where that is relaxed [m]
     rubbing: Rubbing = Rubbing()  # friction of its pins and guide; efforts of `units` and `forces` are without
+
+    @property
+    def also_stacked(self) -> tuple[str, ...]:
+        """What of it is stacked beside its fields (`cfmkit.families.rows.stacked`)."""
+        return ("path",) if self.drive == "force" else ()
 
     @cached_property
     def path(self) -> SliderPath:
@@ -244,37 +248,6 @@ class Assembly(ShortRepr):
 def _with_more_at_slider(rows: FloatArray, more: Any) -> FloatArray:
     """Return rows of the four joints with something added to that of the slider."""
     return np.stack(np.broadcast_arrays(*rows[:3], rows[3] + more))
-
-
-def stacked(items: Sequence[T]) -> T:
-    """Return dataclasses of numbers as one, with columns where they differ: (m, 1), of arrays (k,) (k, m, 1)."""
-    first: Any = items[0]
-    found: Any = first
-    if len(items) == 1:
-        return items[0]
-    if is_dataclass(first):
-        found = object.__new__(type(first))  # without what is known of the first one
-        names = [item.name for item in fields(first)]
-        for name in [*names, "path"] if isinstance(first, Assembly) and first.drive == "force" else names:
-            vars(found)[name] = stacked([getattr(one, name) for one in items])
-    elif isinstance(first, tuple):
-        found = tuple(stacked(one) for one in zip(*items, strict=True))
-    elif not ((values := np.array(items)) == values[0]).all():
-        found = np.moveaxis(values, 0, -1)[..., None]
-    return found  # type: ignore[no-any-return]
-
-
-def rows_of(item: T, rows: Any) -> T:
-    """Return some rows of what is stacked, with what is known of it; plain numbers hold for every row."""
-    found: Any = item
-    if isinstance(item, np.ndarray):
-        found = item[..., rows, :] if item.ndim > 1 else item
-    elif isinstance(item, tuple):
-        found = tuple(rows_of(one, rows) for one in item)
-    elif is_dataclass(item):
-        found = object.__new__(type(found))
-        vars(found).update({name: rows_of(value, rows) for name, value in vars(item).items()})
-    return found  # type: ignore[no-any-return]
 
 
 def assemble(spec: SliderCrankSpec) -> Assembly:
