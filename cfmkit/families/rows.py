@@ -6,16 +6,19 @@ read: a result of one mechanism reads the tables by name at row 0, a study reads
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from cfmkit.arrays import LazyMapping
+from cfmkit.errors import CfmError
 from cfmkit.results import Quantity
+from cfmkit.specs.spec import Model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -141,6 +144,76 @@ class RowsSolution(Protocol):
 
 
 R = TypeVar("R", bound=RowsSolution)
+
+
+class Variants(Sequence[Any]):
+    """Variants of a specification that differ in some values; each is validated when it is read, not before.
+
+    Reading one raises `CfmError` if its values are not valid. A family that knows what its numbers may be reads
+    `values`, and needs no specification of each.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is varied.
+    values : mapping of str to (k,) array
+        By dotted path, SI.
+    make : callable
+        Returns the specification of one of them, by its index.
+    """
+
+    def __init__(self, spec: Any, values: Mapping[str, NDArray[Any]], make: Callable[[int], Any], size: int) -> None:
+        """Make nothing yet."""
+        self.spec, self.values, self._make, self._size = spec, values, make, size
+        self._made: dict[int, Any] = {}
+
+    def __len__(self) -> int:
+        """Return the number of variants."""
+        return self._size
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return the specification of one."""
+        if index not in self._made:
+            self._made[index] = self._make(index)
+        return self._made[index]
+
+
+def valid(specs: Sequence[T]) -> Iterator[tuple[int, T]]:
+    """Yield (index, specification) of those whose values are valid."""
+    for index in range(len(specs)):
+        try:
+            spec = specs[index]
+        except CfmError:  # whoever analyses it alone says what is wrong with it
+            continue
+        yield index, spec
+
+
+def with_values(block: T, values: Mapping[str, Any]) -> T:
+    """Return a copy of a specification, or of a block of it, with other values at dotted paths; nothing is validated.
+
+    Numbers may be columns (m, 1): then it is one of m mechanisms.
+    """
+    inner: dict[str, dict[str, Any]] = {}
+    changes: dict[str, Any] = {}
+    for path, value in values.items():
+        head, _, rest = path.partition(".")
+        if rest:
+            inner.setdefault(head, {})[rest] = value
+        else:
+            changes[head] = value
+    own: Any = block
+    if isinstance(own, tuple):
+        return tuple(changes.get(str(k), one) for k, one in enumerate(own))  # type: ignore[return-value]
+    changes |= {head: with_values(getattr(own, head), below) for head, below in inner.items()}
+    return own.model_copy(update=changes)  # type: ignore[no-any-return]
+
+
+def without_numbers(value: Any) -> Any:
+    """Return what mechanisms that are solved together have in common: all of a block but the values of its numbers."""
+    if isinstance(value, Model | tuple):
+        items = value if isinstance(value, tuple) else vars(value).values()
+        return ["number" if type(item) is float else item and without_numbers(item) for item in items]
+    return "number" if isinstance(value, float) else value
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ def extremes(
     function: Callable[[FloatArray], FloatArray],
     motion: FloatArray,
     effort: FloatArray,
-    uneven: bool = False,
+    uneven: bool | NDArray[np.bool_] = False,
     last: NDArray[np.intp] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest and the smallest value of each row next to its samples, (d,) each.
@@ -78,7 +78,7 @@ def extremes(
         Values at any places of each row, (d, m) -> (d, m); where it is not a number, it does not count.
     motion, effort : (d, n) array
         Samples, monotonic in the motion; their values.
-    uneven : bool
+    uneven : bool or (d,) array
         Whether samples stand closer in some places than in others: then their number does not tell how close.
     last : (d,) array, optional
         Index of the last sample of each row; what follows repeats it.

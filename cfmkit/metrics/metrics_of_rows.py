@@ -40,10 +40,22 @@ class RowSamples:
     values: FloatArray  # (d, n)
     count: NDArray[np.intp]  # (d,) of each row
 
+    @property
+    def _are_alike(self) -> bool:
+        """Whether all curves have the same places."""
+        return self.motion.strides[0] == 0 and bool((self.count == self.motion.shape[1]).all())
+
     def between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[RowSamples, NDArray[np.bool_]]:
         """Return the samples inside of windows, the ends left out; and which of the columns are of each row."""
         low, high = (end[:, None] for end in window)
         margin = np.reshape(slack, (-1, 1))
+        if self._are_alike and all((end == end[0]).all() for end in window):  # one of them tells it of all
+            margin = margin[:1]
+            kept = np.flatnonzero((self.motion[0] > low[0] + margin[0]) & (self.motion[0] < high[0] - margin[0]))
+            some = slice(kept[0], kept[-1] + 1) if len(kept) else slice(0, 0)
+            count = np.full(len(self.motion), len(kept))
+            own = np.ones((len(self.motion), len(kept)), dtype=bool)
+            return RowSamples(self.motion[:, some], self.values[:, some], count), own
         inside = (self.motion > low + margin) & (self.motion < high - margin)
         inside &= np.arange(self.motion.shape[1]) < self.count[:, None]
         count, start = inside.sum(axis=1), inside.argmax(axis=1)
@@ -76,7 +88,7 @@ class RowSamples:
         )
         return RowSamples(np.take_along_axis(motion, order, 1), np.take_along_axis(known, order, 1), count)
 
-    def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: bool = False) -> Ends:
+    def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: Any = False) -> Ends:
         """Return the largest and the smallest value of a function of each row next to its samples, (d,) each."""
         return extremes(function, self.motion, self.values, uneven, self.count - 1)
 
@@ -110,6 +122,8 @@ class CurveRows(ShortRepr):
     stress: StressRows | None = None
     kind: Kind = "force"
     pose: FloatArray | None = None  # (d,) where bands are taken; default: the middle of the window
+    peaks: FloatArray | None = None  # (d, k) places next to which an extreme may hide; default: the dense places
+    travel: Ends | None = None  # (d,) each, of which windows may be shares; default: from end to end
     _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
@@ -117,11 +131,16 @@ class CurveRows(ShortRepr):
         return self.effort(places, None)
 
     @cached_property
+    def heights(self) -> FloatArray:
+        """The effort at the peaks."""
+        return self.dense_effort if self.peaks is None else self.all_at(self.peaks)
+
+    @cached_property
     def dense_effort(self) -> FloatArray:
         """The effort at the dense places."""
         return self.all_at(self.dense)
 
-    @property
+    @cached_property
     def extent(self) -> Ends:
         """First and last place of each row."""
         return self.samples.motion[:, 0], self.samples.motion[:, -1]
@@ -157,24 +176,28 @@ class RowsInWindow:
     @cached_property
     def inside(self) -> RowSamples:
         """The efforts at the points in the window and at its ends."""
+        if self.ends is self.curves.extent:
+            return self.curves.samples
         low, high = self._cut
         at_ends = self.curves.all_at(np.stack([low, high], axis=1))
         return self.curves.samples.with_ends((low, high), at_ends, TOLERANCE * (high - low))
 
     @cached_property
-    def _dense(self) -> tuple[FloatArray, FloatArray]:
-        """The dense places in the window and the efforts there, (d, q); those of a row with fewer repeat its first."""
-        dense, effort = self.curves.dense, self.curves.dense_effort
-        within, own = RowSamples(dense, effort, np.full(len(dense), dense.shape[1])).between(self._cut)
-        first = self.inside.values[:, :1]
-        return np.where(own, within.motion, self._cut[0][:, None]), np.where(own, within.values, first)
+    def _peaks(self) -> tuple[FloatArray, FloatArray]:
+        """The peaks in the window and the efforts there, (d, k); those of a row with fewer repeat its first."""
+        curves = self.curves
+        places, heights = curves.dense if curves.peaks is None else curves.peaks, curves.heights
+        low, high = (end[:, None] for end in self._cut)
+        own = (places > low) & (places < high) & np.isfinite(heights)
+        return np.where(own, places, low), np.where(own, heights, self.inside.values[:, :1])
 
-    @property
-    def _uneven(self) -> bool:
-        return bool(self.curves.dense.shape[1] < FEW)
+    @cached_property
+    def _uneven(self) -> NDArray[np.bool_]:
+        places = self._peaks[0]
+        return (places > self._cut[0][:, None]).any(axis=1) & (places.shape[1] < FEW)
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
-        known = self.inside.joined(*self._dense)
+        known = self.inside.joined(*self._peaks) if self._peaks[0].shape[1] else self.inside
         return known.extremes(self.curves.all_at, self._uneven)
 
     @cached_property
@@ -205,7 +228,7 @@ class RowsInWindow:
         if function is None:
             return np.full(len(self.ends[0]), np.nan)
         sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
-        places, _ = self._dense
+        places, _ = self._peaks
         top, _ = sizes.joined(places, function(places)).extremes(function, self._uneven)
         return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
 
@@ -297,6 +320,15 @@ def _usable_stroke(branches: Mapping[str, RowsInWindow]) -> FloatArray:
     return np.where(known, ranges_many.usable_stroke(*_usable(branches)), np.nan)
 
 
+def _loop_area(branches: Mapping[str, RowsInWindow]) -> FloatArray:
+    """Return the area between `load` and `unload` in the window, (d,) [J]; NaN without these branches."""
+    first = next(iter(branches.values()))
+    if not {"load", "unload"} <= set(branches):
+        return np.full(len(first.ends[0]), np.nan)
+    load, unload = branches["load"], branches["unload"]
+    return np.where(load.covered & unload.covered, load.many.work - unload.many.work, np.nan)
+
+
 CYCLE: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] = {
     "usable_stroke": _usable_stroke,
     "usable_start": lambda branches: _usable(branches)[0],
@@ -332,8 +364,8 @@ def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mappi
     with np.errstate(all="ignore"):
         if name in CYCLE:
             return {"": CYCLE[name](branches)}
-        if name == "hysteresis_area" and not {"load", "unload"} <= set(branches):
-            return {"": np.full(len(next(iter(branches.values())).ends[0]), np.nan)}
+        if name == "hysteresis_area":
+            return {"": _loop_area(branches)}
         if name in RANGES:
             return {branch: one.range_of(name) for branch, one in branches.items()}
         if name in WINDOWED:

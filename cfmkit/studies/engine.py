@@ -17,7 +17,7 @@ from cfmkit.studies.journal import INSIDE, MOST_TOGETHER, Memory, line_of
 from cfmkit.studies.point_evaluation import Row
 from cfmkit.studies.row_blocks_for_journal import ResultRows, cut, gathered, joined, recalled, recalled_row, record
 from cfmkit.studies.serial_and_cluster_executors import Lost, serial
-from cfmkit.studies.vectorised_blocks import BLOCK, evaluate_block, vectorised
+from cfmkit.studies.variants_in_rows import BLOCK, are_solved_together, evaluate_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -64,13 +64,13 @@ class Work:
     def __call__(self, job: Job) -> ResultRows:
         """Return the rows of a job."""
         if job.stop - job.start > 1 or self.vectorised:
-            return evaluate_block(self.study, self.plan, job.start, job.stop)
+            return evaluate_rows(self.study, self.plan, job.start, job.stop)
         return self.gather(self.study.evaluate(self.plan.point(job.start)))
 
     @cached_property
     def vectorised(self) -> bool:
         """Whether points are done in blocks."""
-        return vectorised(self.study, self.plan)
+        return are_solved_together(self.study, self.plan)
 
     @property
     def step(self) -> int:

@@ -144,10 +144,10 @@ class Study:
         cfmkit.errors.SpecError
             If it is not valid.
         """
-        return self._plain.replace(dict(zip(self.paths, values, strict=True)), as_made=self.made)
+        return self.plain.replace(dict(zip(self.paths, values, strict=True)), as_made=self.made)
 
     @cached_property
-    def _plain(self) -> Spec:
+    def plain(self) -> Spec:
         """The specification without what is said of studies, which each variant would read again."""
         return self.spec.model_copy(update={"sweep": None, "sensitivity": None})
 

@@ -9,13 +9,14 @@ import numpy as np
 
 from cfmkit.errors import CfmError
 from cfmkit.families import family
+from cfmkit.families.rows import Variants
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.branches_cut_to_window import TOLERANCE
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import OLD_KEY
-from cfmkit.specs.units import between
+from cfmkit.specs.units import Share, between
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
 if TYPE_CHECKING:
@@ -34,36 +35,67 @@ if TYPE_CHECKING:
     ByBranch = Mapping[str, FloatArray]
 
 
-class SolvedVariants:
-    """Columns of a study for variants that are solved together."""
+BLOCK = 4096
+"""Points that are evaluated and noted together."""
 
-    def __init__(self, study: Study, specs: Sequence[Spec], solved: SolvedRows[Any]) -> None:
+_OF_WINDOWS = ("analysis.window", "requirements")
+"""Where specifications state windows."""
+
+
+class SolvedVariants:
+    """Columns of a study for variants that are solved together.
+
+    Parameters
+    ----------
+    study : Study
+        What is noted.
+    variants : Variants
+        Those that the rows are some of.
+    rows : (m,) array of int
+        Which of them.
+    solved : SolvedRows
+        Their solutions.
+    """
+
+    def __init__(self, study: Study, variants: Variants, rows: NDArray[np.intp], solved: SolvedRows[Any]) -> None:
         """Read nothing yet."""
-        self.study, self.specs, self.solved = study, specs, solved
+        self.study, self.variants, self.members, self.solved = study, variants, rows, solved
         self._values: dict[tuple[str, Ends | None], ByBranch | None] = {}
 
     def __len__(self) -> int:
         """Return the number of variants."""
-        return len(self.specs)
+        return len(self.members)
 
     @cached_property
-    def _travels(self) -> list[tuple[float, float]]:
-        """Start and end of the motion of each."""
+    def specs(self) -> list[Spec]:
+        """The specification of each, or the one that has the windows of all."""
+        if not any(path.startswith(_OF_WINDOWS) for path in self.variants.values):
+            return [self.study.plain]
+        return [self.variants[row] for row in self.members.tolist()]
+
+    @cached_property
+    def _travels(self) -> tuple[FloatArray, FloatArray]:
+        """Start and end of the motion of each, (m,)."""
         curves = next(iter(self.solved.branches.values()))
-        return list(zip(*(end.tolist() for end in curves.extent), strict=True))
+        return curves.travel or curves.extent
 
     def _places(self, ends: Sequence[Ends | None]) -> tuple[FloatArray, FloatArray] | None:
         """Return windows of the variants in places, (m,) each; None for the full travel."""
         if all(one is None for one in ends):
             return None
-        found = [between(one, travel) for one, travel in zip(ends, self._travels, strict=True) if one is not None]
+        start, stop = self._travels
+        if len(ends) == 1 and ends[0] is not None and (first := _between(ends[0], start, stop)) is not None:
+            return first
+        every = ends if len(ends) == len(self) else ends * len(self)  # type: ignore[operator]
+        travels = zip(start.tolist(), stop.tolist(), strict=True)
+        found = [between(one, travel) for one, travel in zip(every, travels, strict=True) if one is not None]
         low, high = np.array(found).T
         return low, high
 
     def _window(self, over: Ends | None) -> tuple[FloatArray, FloatArray] | None:
         """Return the window of a metric: its own, else that of the analysis."""
         if over is not None:
-            return self._places([over] * len(self))
+            return self._places([over])
         return self._places([getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs])
 
     @cached_property
@@ -143,8 +175,18 @@ class SolvedVariants:
 
     def _findings(self) -> dict[str, NDArray[np.bool_]]:
         found = self.solved.findings()
-        old = np.array([any(True for _ in spec.old_keys()) for spec in self.specs])
+        old = np.broadcast_to([any(True for _ in spec.old_keys()) for spec in self.specs], len(self))
         return {**found, OLD_KEY: old} if old.any() else found
+
+
+def _between(ends: Ends, start: FloatArray, stop: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return a window of all in places, (m,) each; None where it has no width for one of them."""
+    places = [
+        start + float(end) * (stop - start) if isinstance(end, Share) else np.full(len(start), float(end))
+        for end in ends
+    ]
+    low, high = np.minimum(*places), np.maximum(*places)
+    return None if (low == high).any() else (low, high)
 
 
 def are_solved_together(study: Study, plan: Plan) -> bool:
@@ -152,23 +194,20 @@ def are_solved_together(study: Study, plan: Plan) -> bool:
     solve = family(study.spec.family).rows
     if solve is None or study.design or not len(plan):
         return False
+    indices = sorted({0, len(plan) // 2, len(plan) - 1})
     try:
-        specs = [study.variant(plan.point(index)) for index in sorted({0, len(plan) // 2, len(plan) - 1})]
-        found = [(members, SolvedVariants(study, [specs[k] for k in members], part)) for members, part in solve(specs)]
-        return sum(len(members) for members, _ in found) == len(specs) and all(part.known for _, part in found)
+        variants = _variants(study, plan, indices)
+        for index in range(len(variants)):
+            variants[index]  # raises where one is not valid
+        found = [(members, SolvedVariants(study, variants, members, part)) for members, part in solve(variants)]
+        return sum(len(members) for members, _ in found) == len(variants) and all(part.known for _, part in found)
     except CfmError:
         return False
 
 
 def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:
     """Return the rows of the points from `start` up to `stop`; those that no rows know are analysed one by one."""
-    variants: dict[int, Spec] = {}
-    for index in range(stop - start):
-        try:
-            variants[index] = study.variant(plan.point(start + index))
-        except CfmError:  # `Study.evaluate` says what is wrong with it
-            continue
-    members, parts = _parts(study, variants)
+    members, parts = _parts(study, _variants(study, plan, range(start, stop)))
     count = stop - start, len(study.metrics), len(study.spec.part_requirements)
     values, met = np.full(count[:2], np.nan), np.zeros((count[0], count[2]), dtype=bool)
     warned: dict[str, NDArray[np.bool_]] = {}
@@ -190,23 +229,31 @@ def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows
     return ResultRows(values, met, odd, curves, bugs, warned)
 
 
+def _variants(study: Study, plan: Plan, indices: Sequence[int]) -> Variants:
+    """Return some points of a study as variants."""
+    start, stop = indices[0], indices[-1] + 1
+    some = np.array(indices) - start
+    columns = (column[some] for column in plan.block(start, stop))
+    values = dict(zip(plan.paths, columns, strict=True))
+    return Variants(study.plain, values, lambda k: study.variant(plan.point(indices[k])), len(indices))
+
+
 def _parts(
-    study: Study, variants: Mapping[int, Spec]
+    study: Study, variants: Variants
 ) -> tuple[set[int], list[tuple[NDArray[np.intp], ResultRows, NDArray[np.bool_]]]]:
     """Return which variants are known as rows, and for each solution its variants, their rows, and which are usable."""
-    solve, order = family(study.spec.family).rows, np.array(list(variants), dtype=np.intp)
+    solve = family(study.spec.family).rows
     members: set[int] = set()
     parts: list[tuple[NDArray[np.intp], ResultRows, NDArray[np.bool_]]] = []
     if solve is None:
         return members, parts
     try:
-        for indices, solved in solve(list(variants.values())):
-            chosen = order[indices]
-            part = SolvedVariants(study, [variants[k] for k in chosen.tolist()], solved)
+        for indices, solved in solve(variants):
+            part = SolvedVariants(study, variants, indices, solved)
             if part.known:
                 usable = part.usable
-                parts.append((chosen, part.rows(), usable))
-                members |= set(chosen[usable].tolist())
+                parts.append((indices, part.rows(), usable))
+                members |= set(indices[usable].tolist())
     except CfmError:  # of a window without a width, say: each point says so by itself
         return set(), []
     return members, parts

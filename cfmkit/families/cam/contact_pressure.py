@@ -12,9 +12,11 @@ Reference
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from cfmkit.families.rows import rows_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -52,15 +54,7 @@ def pressure_between(
         return np.asarray(np.sqrt(force * modulus * curvature / (np.pi * width)))
 
 
-def flank_curvature(assembly: Assembly, parameter: FloatArray) -> FloatArray:
-    """Return 1/R between the roller built in and the flank at path coordinates [1/m]."""
-    mechanism = assembly.spec.mechanism
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cam = assembly.profile.path.law.curvature_radius(parameter) - assembly.profile.roller_radius
-        return np.asarray(1.0 / mechanism.roller_radius + 1.0 / (cam + mechanism.profile.offset))
-
-
-def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray) -> FloatArray:
+def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray, rows: Any = None) -> FloatArray:
     """Return the pressure where contacts press on the flank as designed [Pa]; NaN on the corner, and without a contact.
 
     Parameters
@@ -68,14 +62,20 @@ def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray) -
     assembly : Assembly
         The parts.
     states : TrackStates
-        Where the rollers are, (n,).
-    force : (n,) array
+        Where the rollers are, (n,) or (k, n).
+    force : (n,) or (k, n) array
         At a contact [N].
+    rows : (k,) array of int, optional
+        Which mechanisms of the assembly these are; default: all.
     """
-    contact = assembly.spec.mechanism.contact
+    mechanism, profile, contact = assembly.spec.mechanism, assembly.profile, assembly.spec.mechanism.contact
     if contact is None:
         return np.full_like(force, np.nan)
-    found = pressure(force, flank_curvature(assembly, states.parameter), contact)
+    numbers = profile.path.law, profile.roller_radius, mechanism.roller_radius, mechanism.profile.offset, contact.width
+    law, cut_for, built, offset, width = numbers if rows is None else rows_of(numbers, rows)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        curvature = 1.0 / built + 1.0 / (law.curvature_radius(states.parameter) - cut_for + offset)
+    found = pressure_between(force, curvature, contact.material, width)
     return np.where(states.on_corner, np.nan, found)
 
 

@@ -6,22 +6,16 @@ decide and the cure.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, worst
-from cfmkit.families.cam.scalar_results import (
-    FlankSamples,
-    errors_used,
-    half_extent,
-    largest,
-    largest_pressure,
-    pressure_of,
-    root_mean_square,
-)
+from cfmkit.families.cam.samples_on_flank import largest_of_each
+from cfmkit.families.cam.scalar_results import errors_used, half_extent, largest, pressure_of, root_mean_square
 from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.findings import at_least, finder, mm, mpa, newton
+from cfmkit.families.rows import FindingRule
 from cfmkit.numerics.robust_statistics import neighbour_noise
 
 if TYPE_CHECKING:
@@ -118,25 +112,24 @@ def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Fin
     place : str
         Where that is.
     """
-    contact, allowable = mechanism.contact, allowable_stress(mechanism)
-    if contact is None or allowable is None or largest is None or not yields(largest, allowable):
+    allowable = allowable_stress(mechanism)
+    if mechanism.contact is None or allowable is None or largest is None or not yields(largest, allowable):
         return None
-    limit = YIELD_PRESSURE * allowable
+    return finding("overstressed", *overstress(mechanism, largest, place))
+
+
+def overstress(mechanism: Mechanism, largest: float, place: str) -> tuple[str, ...]:
+    """Return message and cure of a contact that yields under a pressure [Pa] at a place."""
+    contact, limit = mechanism.contact, YIELD_PRESSURE * (allowable_stress(mechanism) or 0.0)
+    assert contact is not None
     wider = at_least(contact.width * (largest / limit) ** 2)
     safety = f" over a safety factor of {mechanism.safety_factor:g}" if mechanism.safety_factor != 1 else ""
-    return finding(
-        "overstressed",
+    return (
         f"the contact pressure of {mpa(largest)} {place} is above {mpa(limit)}, at which the material first yields "
         f"below the surface (1.67 times its yield strength{safety}); use a contact of at least {wider} "
         "('mechanism.contact.width'), a stronger material or a larger roller",
         f"mechanism.contact.width={wider}",
     )
-
-
-def findings_of(solution: Solution) -> tuple[Finding, ...]:
-    """Return every finding about a solved mechanism, the gravest first."""
-    checks = (_undercut, _jam, _dead_point, _springs, _contact, _lift_off, _bearings, _pressure)
-    return tuple(found for check in checks for found in check(solution))
 
 
 def left_out(spec: CamSpec) -> tuple[Finding, ...]:
@@ -166,10 +159,8 @@ def rubbing_left_out(spec: CamSpec, model: str) -> tuple[Finding, ...]:
     return (finding("friction_left_out", f"{model} includes rolling friction only: {keys} is neglected"),)
 
 
-def _undercut(solution: Solution) -> Iterator[Finding]:
+def _undercut(solution: Solution) -> tuple[str, ...]:
     profile, corner = solution.assembly.track.profile, solution.corner_travel
-    if not profile.corner or not corner:
-        return
     law = profile.path.law
     (place, radius), missing = law.tightest(profile.end), max(-_offset(solution), 0.0)
     where = "at the start" if place <= law.rest_half_width else f"at x = {mm(place)}"
@@ -182,24 +173,27 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     cures = ["design.choose=preload"] if designed and tight else []
     cures += ["design.avoid_undercut=true"] if cure and designed else []
     fits = f"a roller <= {mm(radius - missing)}" if radius > missing else "less missing material"
-    yield finding(
-        "undercut",
+    return (
         f"{roller} is larger than the path's smallest radius of curvature "
         f"({mm(radius)}, {where}); the first {mm(corner)} run on a corner, "
         f"without the {'constant force' if law.constant else 'force it is cut for'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,
     )
-    yield finding(
-        "contact_not_single_valued",
-        f"for the first {mm(corner)} of travel the contact stays on the corner at x = {mm(profile.corner.point[0])}, "
-        f"y = {mm(profile.corner.point[1])}: a profile x(y) measured by the roller's height is not single-valued there",
+
+
+def _two_contacts(solution: Solution) -> tuple[str, ...]:
+    corner, travel = solution.assembly.track.profile.corner, mm(solution.corner_travel)
+    assert corner is not None
+    return (
+        f"for the first {travel} of travel the contact stays on the corner at x = {mm(corner.point[0])}, "
+        f"y = {mm(corner.point[1])}: a profile x(y) measured by the roller's height is not single-valued there",
     )
-    if solution.assembly.spec.mechanism.contact:
-        yield finding(
-            "corner_pressure",
-            f"on a sharp corner the contact pressure is unbounded: it is reported from {mm(corner)} of travel on",
-        )
+
+
+def _corner_pressure(solution: Solution) -> tuple[str, ...]:
+    corner = mm(solution.corner_travel)
+    return (f"on a sharp corner the contact pressure is unbounded: it is reported from {corner} of travel on",)
 
 
 def _preload_cure(solution: Solution) -> float | None:
@@ -213,112 +207,162 @@ def _preload_cure(solution: Solution) -> float | None:
 
 
 def _offset(solution: Solution) -> float:
-    return solution.assembly.spec.mechanism.profile.offset
+    return float(solution.mechanism.profile.offset)
 
 
-def _jam(solution: Solution) -> Iterator[Finding]:
-    friction = solution.assembly.spec.mechanism.rolling_friction
-    for low, high in solution.jams:
-        yield finding(
-            "up_jam",
+def _jam(number: int) -> FindingRule[Solution]:
+    """Return the rule of the first interval without leverage, or of a later one."""
+
+    def message(solution: Solution) -> tuple[str, ...]:
+        (low, high), friction = solution.jams[number], solution.mechanism.rolling_friction
+        return (
             f"on the way up friction ({friction:g}) holds the roller from {mm(low)} to {mm(high)} of travel: "
             "no force moves the slider there; use less friction, or start beyond",
         )
 
+    return FindingRule("up_jam", lambda one: np.array([len(jams) > number for jams in one.all_jams]), message)
 
-def _dead_point(solution: Solution) -> Iterator[Finding]:
+
+def _is_sunk(solution: Solution) -> Any:
+    track = solution.assembly.track
+    return sinks_first(track.dead_point, track.start, track.brace_length)
+
+
+def _is_dead(solution: Solution) -> Any:
+    unbounded = np.isnan(solution.up.slider[..., :1]) | np.isnan(solution.down.slider[..., :1])
+    return solution.column(_is_sunk(solution)) | solution.column(unbounded)
+
+
+def _dead_point(solution: Solution) -> tuple[str, ...]:
     track, loads = solution.assembly.track, solution.assembly.loads
-    if sinks_first(track.dead_point, track.start, track.brace_length):
-        yield finding(
-            "dead_point",
+    if _is_sunk(solution):
+        return (
             f"at the start the slider must first go down by {mm(track.start - track.dead_point)} before the rollers "
             "move out: the brace is too short for this profile",
         )
-    elif np.isnan(solution.up.slider[0]) or np.isnan(solution.down.slider[0]):
-        cause = "weight" if loads.roller_weight else "spring pretension or friction"
-        yield finding(
-            "dead_point",
-            f"at the start the slider has no leverage on the rollers: the force from {cause} is unbounded there; "
-            "state a window that begins later, or use a gravity-compensated profile",
-        )
+    cause = "weight" if loads.roller_weight else "spring pretension or friction"
+    return (
+        f"at the start the slider has no leverage on the rollers: the force from {cause} is unbounded there; "
+        "state a window that begins later, or use a gravity-compensated profile",
+    )
 
 
 def _travel_at(solution: Solution, elongation: float) -> float:
     """Return the travel at which the springs are stretched by so much [m]."""
-    track, opened = solution.assembly.track, solution.assembly.spec.mechanism.springs.tension_stretch
+    track, opened = solution.assembly.track, solution.mechanism.springs.tension_stretch
     half_width = solution.assembly.loads.rest_half_width + 0.5 * (elongation + opened)
     return min(track.slider_at(half_width) - track.start, float(solution.travel[-1]))
 
 
-def _springs(solution: Solution) -> Iterator[Finding]:
-    if is_slack(solution.elongation).any():
-        last = _travel_at(solution, 0.0)
-        yield finding(
-            "spring_slack",
-            f"the springs are shorter than their rest length for the first {mm(last)} of travel, by up to "
-            f"{mm(-float(solution.elongation.min()))}: they carry no force there",
-        )
-    limit = solution.assembly.spec.mechanism.springs.max_elongation
-    longest = float(solution.elongation[-1])
-    if limit and overstretched(longest, limit):
-        past = _travel_at(solution, limit)
-        yield finding(
-            "spring_overstretched",
-            f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",
-        )
+def _slack(solution: Solution) -> tuple[str, ...]:
+    last = _travel_at(solution, 0.0)
+    return (
+        f"the springs are shorter than their rest length for the first {mm(last)} of travel, by up to "
+        f"{mm(-float(solution.elongation.min()))}: they carry no force there",
+    )
 
 
-def _contact(solution: Solution) -> Iterator[Finding]:
+def _is_overstretched(solution: Solution) -> Any:
+    limit = solution.mechanism.springs.max_elongation
+    return limit is not None and overstretched(solution.elongation[..., -1:], limit)
+
+
+def _overstretched(solution: Solution) -> tuple[str, ...]:
+    limit, longest = solution.mechanism.springs.max_elongation, float(solution.elongation[-1])
+    past = _travel_at(solution, limit)
+    return (f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",)
+
+
+def _slack_cable(way: Literal["up", "down"]) -> FindingRule[Solution]:
     # Springs that pull keep the rollers on the cam as long as nothing accelerates: the contact force is positive.
-    for way, state in (("up", solution.up), ("down", solution.down)):
-        slack = (solution.elongation > 0) & (state.slider <= 0)
-        if slack.any():
-            yield finding(
-                "slack_cable",
-                f"on the way {way} the force on the slider is not positive from {_where(solution.travel, slack)} "
-                "of travel: a cable would go slack",
-            )
+    def places(solution: Solution) -> NDArray[np.bool_]:
+        return (solution.elongation > 0) & (getattr(solution, way).slider <= 0)
+
+    def message(solution: Solution) -> tuple[str, ...]:
+        return (
+            f"on the way {way} the force on the slider is not positive from "
+            f"{_where(solution.travel, places(solution))} of travel: a cable would go slack",
+        )
+
+    return FindingRule("slack_cable", lambda one: places(one).any(axis=-1), message)
 
 
-def _lift_off(solution: Solution) -> Iterator[Finding]:
-    """Yield where weight across the slider's travel pulls the lower roller off the cam."""
-    loads = solution.assembly.loads
+def _is_lifted(solution: Solution) -> Any:
+    """Return whether weight across the slider's travel pulls the lower roller off the cam."""
+    loads, beside = solution.assembly.loads, np.abs(solution.assembly.loads.sideways[0])
+    mounted = solution.mechanism.mounting is not None
+    return mounted and (beside > 0) & (beside > spring_force(solution.states, loads)[..., :1])
+
+
+def _lift_off(solution: Solution) -> tuple[str, ...]:
+    loads, mounting = solution.assembly.loads, solution.mechanism.mounting
     beside = abs(loads.sideways[0])
-    mounting = solution.assembly.spec.mechanism.mounting
-    if mounting and beside and beside > float(spring_force(solution.states, loads)[0]):
-        opened = loads.stiffness * solution.assembly.spec.mechanism.springs.tension_stretch
-        released = _travel_at(solution, (beside - opened) / loads.stiffness)
-        yield finding(
-            "lift_off",
-            f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "
-            f"the lower roller lifts off the cam for the first {mm(released)} of travel; use preloaded springs, "
-            "lighter rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
-            f"mechanism.mounting={{elevation: {np.degrees(mounting.elevation):.10g} deg, roll: 90 deg}}",
-        )
+    opened = loads.stiffness * solution.mechanism.springs.tension_stretch
+    released = _travel_at(solution, (beside - opened) / loads.stiffness)
+    return (
+        f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "
+        f"the lower roller lifts off the cam for the first {mm(released)} of travel; use preloaded springs, "
+        "lighter rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
+        f"mechanism.mounting={{elevation: {np.degrees(mounting.elevation):.10g} deg, roll: 90 deg}}",
+    )
 
 
-def _bearings(solution: Solution) -> Iterator[Finding]:
-    bearings = solution.assembly.spec.mechanism.bearings
-    most = largest(solution.up.contact, solution.down.contact)
-    if bearings and bearings.static_rating and most and most > bearings.static_rating * bearings.per_roller:
-        yield finding(
-            "bearing_overloaded",
-            f"a roller presses with {newton(most)} on {bearings.per_roller} bearing(s) with a static rating of "
-            f"{newton(bearings.static_rating)} each ('mechanism.bearings.static_rating')",
-        )
+def _is_overloaded(solution: Solution) -> Any:
+    bearings = solution.mechanism.bearings
+    if bearings is None or bearings.static_rating is None:
+        return False
+    most = largest_of_each(solution.up.contact, solution.down.contact)
+    return (most > 0) & (most > bearings.static_rating * bearings.per_roller)
 
 
-def _pressure(solution: Solution) -> Iterator[Finding]:
-    if solution.assembly.spec.mechanism.contact is None:
-        return
-    top, travel = largest_pressure(FlankSamples.of(solution))
-    if reported := overstressed(solution.assembly.spec.mechanism, top, f"at {mm(travel)} of travel"):
-        yield reported
+def _overloaded(solution: Solution) -> tuple[str, ...]:
+    bearings, most = solution.mechanism.bearings, largest(solution.up.contact, solution.down.contact)
+    return (
+        f"a roller presses with {newton(most or 0.0)} on {bearings.per_roller} bearing(s) with a static rating of "
+        f"{newton(bearings.static_rating)} each ('mechanism.bearings.static_rating')",
+    )
+
+
+def _is_overstressed(solution: Solution) -> Any:
+    allowable = allowable_stress(solution.mechanism)
+    return allowable is not None and yields(solution.flank.largest_pressure[0], allowable)
+
+
+def _overstressed(solution: Solution) -> tuple[str, ...]:
+    top, travel = (float(one[0, 0]) for one in solution.flank.largest_pressure)
+    return overstress(solution.mechanism, top, f"at {mm(travel)} of travel")
 
 
 def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:
     hits = np.flatnonzero(mask)
     return f"{mm(float(travel[hits[0]]))} to {mm(float(travel[hits[-1]]))}"
+
+
+def _is_undercut(solution: Solution) -> Any:
+    return np.greater(solution.corner_travel, 0.0)
+
+
+def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
+    """Return every rule that a solved mechanism may break, the gravest first."""
+    number = max(map(len, solution.all_jams))
+    return (
+        FindingRule("undercut", _is_undercut, _undercut),
+        FindingRule("contact_not_single_valued", _is_undercut, _two_contacts),
+        FindingRule(
+            "corner_pressure",
+            lambda one: one.mechanism.contact is not None and _is_undercut(one),
+            _corner_pressure,
+        ),
+        *map(_jam, range(number)),
+        FindingRule("dead_point", _is_dead, _dead_point),
+        FindingRule("spring_slack", lambda one: is_slack(one.elongation).any(axis=-1), _slack),
+        FindingRule("spring_overstretched", _is_overstretched, _overstretched),
+        _slack_cable("up"),
+        _slack_cable("down"),
+        FindingRule("lift_off", _is_lifted, _lift_off),
+        FindingRule("bearing_overloaded", _is_overloaded, _overloaded),
+        FindingRule("overstressed", _is_overstressed, _overstressed),
+    )
 
 
 TOO_NOISY = 2.0

@@ -43,10 +43,9 @@ from cfmkit.families.cam.scalar_results import (
     design_values,
     largest,
     pressure_of,
-    target_force,
     values_of_built,
 )
-from cfmkit.families.cam.solution import Assembly, Built, Sides
+from cfmkit.families.cam.solution import Assembly, Built, Sides, target_force
 from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result

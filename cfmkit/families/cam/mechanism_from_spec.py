@@ -19,7 +19,7 @@ from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.solution import Assembly
+from cfmkit.families.cam.solution import CLOSE, Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm
@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.slope_law import Real
     from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
     from cfmkit.results import Finding
-
-
-CLOSE = 1e-6
-"""A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
 
 
 def resolve(spec: CamSpec) -> CamSpec:

@@ -12,20 +12,19 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-from math import isclose
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
+from cfmkit.arrays import LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import Problem, SpecError
 from cfmkit.families.cam.bought_parts import parts_of
 from cfmkit.families.cam.clearance import smallest, touching
-from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
-from cfmkit.families.cam.findings import finding, findings_of, left_out
+from cfmkit.families.cam.contact_pressure import allowable_stress, stress
+from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.mechanism_from_spec import (
     CLOSE,
     assemble,
@@ -33,17 +32,19 @@ from cfmkit.families.cam.mechanism_from_spec import (
     check_springs,
     displacement_origin,
 )
-from cfmkit.families.cam.scalar_results import contact_pressure, curve_cut_for, target_force, values_of
-from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
-from cfmkit.families.cam.statics import Forces, forces
+from cfmkit.families.cam.scalar_results import QUANTITIES, contact_pressure, curve_cut_for
+from cfmkit.families.cam.solution import Assembly, DenseLoop, Solution, target_force
+from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.rows import findings_of_one, stacked, values_of_one
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
@@ -90,12 +91,12 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     solution = with_band(solution, run.seed)
-    shortfalls = _shortfalls(assembly, solution)
+    loop = DenseLoop(solution)
+    short = shortfalls(assembly, float(solution.travel[-1]))
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
-    warnings = (*shortfalls, *left_out(spec), *findings_of(solution), *touching(solution))
     status, message = Status.COMPLETE, ""
-    if shortfalls:
-        status, message = Status.PARTIAL, shortfalls[0].message
+    if short:
+        status, message = Status.PARTIAL, short[0].message
     elif failed:
         status, message = Status.PARTIAL, f"{failed} of {2 * len(solution.travel)} points have no equilibrium"
     return Result(
@@ -103,9 +104,9 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         status=status,
         message=message,
         curves=(_curve(solution),),
-        values={**values_of(solution), **smallest(solution)},
-        warnings=warnings,
-        travel=(solution.origin + float(solution.travel[0]), solution.origin + _requested(solution, bool(shortfalls))),
+        values=values_of_one(QUANTITIES, solution) | smallest(solution),
+        warnings=LazySequence(partial(_findings, solution, short)),
+        travel=(solution.origin + float(solution.travel[0]), solution.origin + _requested(solution, bool(short))),
         valid=(
             (
                 max(solution.corner_travel, float(solution.travel[0])) + solution.origin,
@@ -115,12 +116,19 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         target=target_force(spec, assembly),
         target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
-        closed=DenseLoop(solution),
+        closed=loop,
         effort_error=solution.effort_error,
-        part_efforts=DenseLoop(solution).part_efforts,
+        part_efforts=loop.part_efforts,
         tables=listed(parts_of(spec)),
         state=solution,
     )
+
+
+def _findings(solution: Solution, short: Sequence[Finding]) -> Iterator[Finding]:
+    yield from short
+    yield from left_out(solution.assembly.spec)
+    yield from findings_of_one(rules_of(solution), finding, solution)
+    yield from touching(solution)
 
 
 def with_band(solution: Solution, seed: int) -> Solution:
@@ -136,9 +144,7 @@ def with_band(solution: Solution, seed: int) -> Solution:
 def _requested(solution: Solution, short: bool) -> float:
     """Return how far the slider was to go [m]; without a request, as far as the flank was to be cut."""
     spec = solution.assembly.spec
-    reached, stroke = float(solution.travel[-1]), spec.mechanism.profile.stroke or 0.0
-    # the whole stroke but for rounding is the stroke: shares of the travel are then the same places in every run
-    return spec.analysis.travel or (stroke if short or isclose(reached, stroke, rel_tol=CLOSE) else reached)
+    return float(spec.mechanism.profile.stroke or 0.0) if short and not spec.analysis.travel else solution.requested
 
 
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
@@ -148,22 +154,43 @@ def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     return spec.model_copy(update={"analysis": analysis})
 
 
-def solve(assembly: Assembly) -> Solution:
-    """Return states and forces over the travel that the analysis asks for, as far as the track goes."""
-    spec, track = assembly.spec, assembly.track
-    available = track.end - track.start
-    asked = spec.analysis.travel or available
-    low, high = stopped(spec)
-    travel = np.linspace(low, min(asked, available, high), spec.analysis.points)
-    if travel[-1] <= low:
+def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -> Solution:
+    """Return states and forces over the travel that the analysis asks for, as far as the track goes.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        One mechanism; or several whose numbers are columns.
+    count : int
+        Number of mechanisms.
+    cams : tuple of Assembly
+        Of mechanisms that have a track each, which go through all of their travel.
+
+    Raises
+    ------
+    CannotBuild
+        If a stop leaves no travel.
+    """
+    spec, track, loads = assembly.spec, assembly.track, assembly.loads
+    low, end = np.array([reached(one) for one in cams]).T if cams else reached(assembly)
+    if not cams and end <= low:
         raise CannotBuild(
             finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
         )
-    states = track.states(track.start + travel)
-    friction = spec.mechanism.rolling_friction
-    up = forces(states, assembly.loads, friction)
-    down = forces(states, assembly.loads, -friction, -1.0) if friction or assembly.loads.losses else up
-    return Solution(assembly, travel, states, up, down, displacement_origin(assembly))
+    travel = np.linspace(low, end, spec.analysis.points, axis=-1)
+    states, friction = track.states(track.start + travel), spec.mechanism.rolling_friction
+    up = forces(states, loads, friction)
+    down = forces(states, loads, -friction, -1.0) if np.any(friction) or loads.losses else up
+    origin = stacked([displacement_origin(one) for one in cams or (assembly,)])
+    return Solution(assembly, travel, states, up, down, origin, count=count, cams=cams)
+
+
+def reached(assembly: Assembly) -> tuple[float, float]:
+    """Return where the travel begins, and as far as it goes: to what is asked, the end of the track, or a stop [m]."""
+    spec, track = assembly.spec, assembly.track
+    available = track.end - track.start
+    low, high = stopped(spec)
+    return low, min(spec.analysis.travel or available, available, high)
 
 
 def stopped(spec: CamSpec) -> tuple[float, float]:
@@ -172,10 +199,10 @@ def stopped(spec: CamSpec) -> tuple[float, float]:
     return (0.0, np.inf) if stops is None else (stops.lower, np.inf if stops.upper is None else stops.upper)
 
 
-def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
-    """Return why the curve ends before what was requested, or before the flank does."""
+def shortfalls(assembly: Assembly, reached: float) -> tuple[Finding, ...]:
+    """Return why the curve ends, at a travel [m], before what was requested, or before the flank does."""
     found = [assembly.shortfall] if assembly.shortfall else []
-    asked, reached = assembly.spec.analysis.travel, float(solution.travel[-1])
+    asked = assembly.spec.analysis.travel
     short = asked is not None and reached < asked * (1 - CLOSE)
     if asked is not None and short and stopped(assembly.spec)[1] <= reached * (1 + CLOSE):
         found.append(
@@ -237,80 +264,3 @@ def _curve(solution: Solution) -> Curve:
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.repeat(["load", "unload"], points)
     return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)
-
-
-_SHARES = np.concatenate(
-    [np.geomspace(1e-14, 1e-4, 51), np.linspace(0.0, 1.0, 181) ** 2, 1.0 - np.geomspace(1e-9, 0.03, 24)]
-)
-"""Shares of the travel at which the force is looked at.
-
-With friction it rises from zero to its constant value within nanometres: nodes stand at even shares of the logarithm
-there, at even steps of the springs' stretch beyond, and close together before the end, where a brace may come near
-horizontal.
-"""
-
-_SORTED = np.sort(_SHARES)
-_ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0, 61)])
-"""The same on a corner, where it rises within a tenth of a millimetre."""
-
-
-def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
-    """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m].
-
-    Parameters
-    ----------
-    total, corner : (d,) array
-        Travel of each cam, and that at which its roller leaves the corner; 0 without one [m].
-    """
-    if not corner.any():
-        return np.asarray(total[:, None] * _SORTED)
-    on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER
-    return np.sort(np.concatenate([total[:, None] * _SHARES, on_corner], axis=1), axis=1)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DenseLoop(ShortRepr):
-    """The loop of a solved mechanism at every place (a `cfmkit.results.ClosedForm`)."""
-
-    solution: Solution
-
-    @cached_property
-    def places(self) -> FloatArray:
-        """Increasing displacements [m]."""
-        solution = self.solution
-        low = float(solution.travel[0])
-        grid = low + nodes(solution.travel[-1:] - low, np.array([max(solution.corner_travel - low, 0.0)]))[0]
-        return np.asarray(grid + solution.origin)
-
-    @cached_property
-    def peaks(self) -> FloatArray:
-        """Places all over the corner of an undercut cam, where the force has a peak between two samples [m]."""
-        corner = min(self.solution.corner_travel, float(self.solution.travel[-1]))
-        return np.asarray(corner * ON_CORNER + self.solution.origin) if corner > 0 else np.empty(0)
-
-    def effort(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return the force on the way up or down at displacements of any shape [N]."""
-        return np.asarray(self._at(branch, places)[1].slider.reshape(np.shape(places)))
-
-    def stress(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return the stress below the contact at displacements of any shape [Pa]; NaN on the corner."""
-        states, found = self._at(branch, places)
-        pressed = flank_pressure(self.solution.assembly, states, found.contact)
-        return np.asarray(stress(pressed).reshape(np.shape(places)))
-
-    def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
-        assembly, springs = self.solution.assembly, self.solution.assembly.spec.mechanism.springs
-        strongest = max(springs.each) if isinstance(springs.each, tuple) else springs.each
-        alone = replace(assembly.loads, roller_weight=0.0, slider_weight=0.0, sideways=(0.0, 0.0), off_plane=0.0)
-        unweighted = DenseLoop(replace(self.solution, assembly=replace(assembly, loads=alone)))
-        return np.asarray(strongest / assembly.loads.stiffness * np.abs(unweighted.effort(branch, places)))
-
-    def _at(self, branch: str, places: FloatArray) -> tuple[TrackStates, Forces]:
-        """Return where the rollers are at displacements, and the forces there, as one row."""
-        solution = self.solution
-        track, friction = solution.assembly.track, solution.assembly.spec.mechanism.rolling_friction
-        travel = np.clip(np.ravel(places) - solution.origin, 0.0, solution.travel[-1])
-        states = track.states(track.start + travel)
-        way = 1.0 if branch == "load" else -1.0
-        return states, forces(states, solution.assembly.loads, way * friction, way)

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import isfinite
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from functools import partial, reduce
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import flank_pressure
-from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
-from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
+from cfmkit.families.cam.samples_on_flank import extreme_next_to, largest_of_each
+from cfmkit.families.cam.solution import ON_CORNER, constant_force
+from cfmkit.families.cam.statics import Losses, normal_turn
 from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
-from cfmkit.metrics.continuous_means_and_extremes import extremes
-from cfmkit.results import Quantity, quantities
+from cfmkit.families.rows import ScalarQuantity
+from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import between
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly, Built, Solution
     from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.cam.statics import Forces
 
 
 BUILT_DEFINITIONS = {
@@ -75,6 +76,14 @@ BUILT_DEFINITIONS = {
     ),
 }
 
+KINDS = {
+    "rolling": "rolling on the cam dissipates",
+    "bearings": "the rollers' bearings dissipate",
+    "pins": "slider pin and spring hooks dissipate",
+    "guide": "the slider's guide dissipates",
+}
+"""Of friction, and what each does."""
+
 DEFINITIONS = {
     "force_constant": ("length", "A of the cut profile; the force is 4 K A [SS, eq. 1]"),
     "spring_stiffness": ("stiffness", "K, the sum of all parallel springs"),
@@ -118,12 +127,7 @@ DEFINITIONS = {
                 else f"share of the loop's area that {words}"
             ),
         )
-        for kind, words in {
-            "rolling": "rolling on the cam dissipates",
-            "bearings": "the rollers' bearings dissipate",
-            "pins": "slider pin and spring hooks dissipate",
-            "guide": "the slider's guide dissipates",
-        }.items()
+        for kind, words in KINDS.items()
         for what in ("energy", "share")
     },
     "contact_force_least": (
@@ -163,56 +167,16 @@ DEFINITIONS = {
 } | BUILT_DEFINITIONS
 
 
-def values_of(solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None if a value does not exist."""
-    assembly = solution.assembly
+def largest_roller(assembly: Assembly) -> float:
+    """Return the smallest radius of curvature of the roller path [m]; infinite if no roller is too large for it."""
+    return assembly.profile.path.law.tightest(assembly.profile.end)[1]
+
+
+def smallest_constant(assembly: Assembly) -> float:
+    """Return the smallest force constant whose path the roller can follow [m]; NaN without one, and of curves."""
     law = assembly.profile.path.law
-    flank = FlankSamples.of(solution)
-    numbers: dict[str, float | None] = {
-        **design_values(assembly),
-        "undercut_travel": solution.corner_travel,
-        "roller_radius_max": largest_roller(assembly),
-        "force_constant_min": law.smallest_force_constant(assembly.profile.roller_radius) if law.constant else None,
-        "corner_force_max": _corner_peak(solution),
-        "jam_travel": next((high for low, high in solution.jams if low == 0), 0.0),
-        "spring_elongation_max": float(solution.elongation.max()),
-        "contact_force_max": largest(solution.up.contact, solution.down.contact),
-        "pressure_angle_max": largest(flank.pressure_angle),
-        "brace_angle_max": float(np.arcsin(solution.states.x.max() / assembly.track.brace_length)),
-        "friction_half_gap_max": _half_gap(flank),
-    }
-    if assembly.spec.mechanism.contact:
-        numbers["contact_pressure_max"] = largest_pressure(flank)[0]
-    if assembly.loads.losses is not None:
-        numbers |= loop_shares(solution)
-    if assembly.spec.mechanism.bearings:
-        numbers |= _bearing(solution)
-    if solution.up.least_contact is not None and solution.down.least_contact is not None:
-        numbers["contact_force_least"] = smallest(solution.up.least_contact[1:], solution.down.least_contact[1:])
-    if solution.band is not None:
-        shares = solution.band.deviations()
-        numbers["manufacturing_force_share"] = float(np.median(shares))
-        numbers["manufacturing_force_share_95"] = float(np.quantile(shares, 0.95))
-    return quantities(DEFINITIONS, numbers) | _wire(solution)
-
-
-def _wire(solution: Solution) -> dict[str, Quantity]:
-    """Return what the springs' wire bears, where it is known; of unequal springs the stiffest."""
-    springs, ends = solution.assembly.spec.mechanism.springs, solution.elongation
-    stiffest = max(springs.each) if isinstance(springs.each, tuple) else springs.each
-    wire = springs.wound
-    wound = None if wire is None else wire.wound("extension")
-    fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
-    least, most = (
-        springs.initial_tension * (end >= 0.0) + stiffest * max(float(end), 0.0) for end in (ends.min(), ends.max())
-    )
-    return wire_quantities([SpringInUse(wound, least, most, fatigue, springs.life)])
-
-
-def largest_roller(assembly: Assembly) -> float | None:
-    """Return the smallest radius of curvature of the roller path [m]; None if no roller is too large for it."""
-    radius = assembly.profile.path.law.tightest(assembly.profile.end)[1]
-    return radius if isfinite(radius) else None
+    found = law.smallest_force_constant(assembly.profile.roller_radius) if law.constant else None
+    return np.nan if found is None else found
 
 
 def design_values(assembly: Assembly) -> dict[str, float]:
@@ -222,19 +186,6 @@ def design_values(assembly: Assembly) -> dict[str, float]:
         "spring_stiffness": assembly.loads.stiffness,
         "theoretical_force": constant_force(assembly),
     }
-
-
-def constant_force(assembly: Assembly) -> float:
-    """Return the force that the profile is cut for, with the springs and weights built in [N]."""
-    law, loads = assembly.profile.path.law, assembly.loads
-    return 4.0 * loads.stiffness * law.force_constant + loads.slider_weight
-
-
-def target_force(spec: CamSpec, assembly: Assembly) -> float | None:
-    """Return the constant force that is wanted or that the profile is cut for [N]; None if it follows a curve."""
-    if spec.target_curve is not None or assembly.spec.mechanism.profile.curve is not None:
-        return None
-    return spec.design.force if spec.design else constant_force(assembly)
 
 
 def curve_cut_for(assembly: Assembly) -> TargetCurve | None:
@@ -254,147 +205,200 @@ def contact_pressure(solution: Solution, forces: Forces | None = None) -> FloatA
 
 def largest(*arrays: FloatArray) -> float | None:
     """Return the largest finite value of all arrays; None if there is none."""
-    finite = [array[np.isfinite(array)] for array in arrays]
-    return max((float(array.max()) for array in finite if array.size), default=None)
+    found = float(largest_of_each(*arrays)[0])
+    return None if np.isnan(found) else found
 
 
-def smallest(*arrays: FloatArray) -> float | None:
-    """Return the smallest finite value of all arrays; None if there is none."""
-    found = largest(*(-array for array in arrays))
-    return None if found is None else -found
+def _bearing_load(solution: Solution) -> FloatArray:
+    """Return the largest load of one bearing of each mechanism [N]."""
+    return largest_of_each(*(_of_contact(solution) * state.contact for state in (solution.up, solution.down)))
 
 
-def loop_shares(solution: Solution) -> dict[str, float | None]:
-    """Return the energy that each kind of friction takes over the window [J], and its share of the loop's area."""
-    up, down = solution.up.lost or {}, solution.down.lost or {}
-    places, window = solution.travel + solution.origin, solution.assembly.spec.analysis.window
-    ends = between(window, (float(places[0]), float(places[-1]))) if window else None
-    taken = {kind: _integral(places, up[kind] + down[kind], ends) for kind in up}
-    area = sum(taken.values())
-    finite = np.isfinite(area) and area > 0
-    return {f"loop_energy_{kind}": value if finite else None for kind, value in taken.items()} | {
-        f"loop_share_{kind}": value / area if finite else None for kind, value in taken.items()
-    }
+def _of_contact(solution: Solution) -> Any:
+    """Return the load of one bearing over the contact force of its roller."""
+    mechanism, loads = solution.mechanism, solution.assembly.loads
+    losses = loads.losses or Losses(roller_radius=mechanism.roller_radius)
+    turn = normal_turn(losses, mechanism.rolling_friction)
+    return np.sqrt(1.0 + turn**2) / mechanism.bearings.per_roller
 
 
-def _integral(places: FloatArray, values: FloatArray, window: tuple[float, float] | None) -> float:
-    """Return the integral of values over increasing places, from one end of a window to the other."""
-    low, high = np.clip(window or (places[0], places[-1]), places[0], places[-1])
-    at = np.unique(np.concatenate([[low, high], places[(places > low) & (places < high)]]))
-    return float(np.trapezoid(np.interp(at, places, values), at))
-
-
-def _bearing(solution: Solution) -> dict[str, float | None]:
-    """Return largest load [N], life [strokes up and down] and static safety of the rollers' bearings."""
-    mechanism, loads = solution.assembly.spec.mechanism, solution.assembly.loads
-    bearings = mechanism.bearings
-    assert bearings is not None
-    mu = mechanism.rolling_friction
-    of_contact = np.sqrt(1.0 + normal_turn(loads.losses or Losses(roller_radius=mechanism.roller_radius), mu) ** 2)
-    of_contact /= bearings.per_roller
-    most = largest(*(of_contact * state.contact for state in _both(solution)))
-    found: dict[str, float | None] = {"bearing_load_max": most}
-    if bearings.static_rating and most:
-        found["bearing_static_safety"] = bearings.static_rating / most
-    if bearings.dynamic_rating:
-        exponent = 3.0 if bearings.kind == "ball" else 10.0 / 3.0
-        turns, track = _bearing_turns(solution), solution.assembly.track
-        # In the middle of each step: at the start the load of a mechanism that jams there is unbounded.
-        middles = track.states(track.start + 0.5 * (solution.travel[1:] + solution.travel[:-1]))
-        used = 0.0
-        for way in (1.0, -1.0):
-            load = of_contact * np.nan_to_num(np.maximum(forces(middles, loads, way * mu, way).contact, 0.0))
-            used += float(turns @ (load / bearings.dynamic_rating) ** exponent)
-        found["bearing_life"] = 1e6 / used if used > 0 else None
-    return found
+def _bearing_life(solution: Solution) -> FloatArray:
+    """Return the strokes up and down that 90 % of single bearings survive, of each mechanism."""
+    bearings, travel, turns = solution.mechanism.bearings, solution.travel, _bearing_turns(solution)
+    exponent = 3.0 if bearings.kind == "ball" else 10.0 / 3.0
+    # In the middle of each step: at the start the load of a mechanism that jams there is unbounded.
+    middles = 0.5 * (travel[..., 1:] + travel[..., :-1])
+    used = 0.0
+    for way in (1.0, -1.0):
+        load = np.nan_to_num(np.maximum(solution.at_travel(middles, way)[1].contact, 0.0)) * _of_contact(solution)
+        used = used + (turns * (load / bearings.dynamic_rating) ** exponent).sum(axis=-1, keepdims=True)
+    return np.where(used > 0, 1e6 / used, np.nan)
 
 
 def _bearing_turns(solution: Solution) -> FloatArray:
-    """Return the revolutions of a roller's bearing from point to point, (n - 1,).
+    """Return the revolutions of a roller's bearing from point to point, (..., n - 1).
 
     Its shaft turns with the brace, in the direction in which the roller rolls: the bearing feels the difference.
     """
-    states, mechanism = solution.states, solution.assembly.spec.mechanism
+    states, mechanism = solution.states, solution.mechanism
     rolled = np.hypot(np.diff(states.x), np.diff(states.y)) / mechanism.roller_radius
     return np.asarray(np.abs(rolled - np.diff(np.arcsin(states.x / mechanism.brace_length))) / (2.0 * np.pi))
 
 
-@dataclass(frozen=True, eq=False)
-class FlankSamples:
-    """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
-
-    solution: Solution  # the mechanism
-    travel: FloatArray  # (n,) increasing [m]
-    states: TrackStates  # where the rollers are, (n,)
-    # up, down: on the way up and on the way down, (n,) each
-    up: Forces
-    down: Forces
-
-    @classmethod
-    def of(cls, solution: Solution) -> FlankSamples:
-        """Return those of a solved mechanism."""
-        corner = solution.corner_travel
-        if not 0 < corner <= solution.travel[-1]:
-            keep = ~solution.states.on_corner
-            states = TrackStates(*(field[keep] for field in solution.states.fields()))
-            up, down = (Forces(one.slider[keep], one.contact[keep], one.brace[keep]) for one in _both(solution))
-            return cls(solution, solution.travel[keep], states, up, down)
-        track, mu = solution.assembly.track, solution.assembly.spec.mechanism.rolling_friction
-        travel = np.concatenate([[corner], solution.travel[~solution.states.on_corner & (solution.travel > corner)]])
-        states = track.states(np.maximum(track.start + travel, track.corner_end))
-        up, down = (forces(states, solution.assembly.loads, way * mu, way) for way in (1.0, -1.0))
-        return cls(solution, travel, states, up, down)
-
-    @property
-    def pressure_angle(self) -> FloatArray:
-        """Angle between the brace's pull and the roller's motion [rad]."""
-        return pressure_angle(self.states, self.solution.assembly.track.brace_length)
-
-    def pressure(self, travel: FloatArray) -> FloatArray:
-        """Return the pressure of the contact on the way up at travels of any shape [Pa]; NaN where there is none."""
-        track, mechanism = self.solution.assembly.track, self.solution.assembly.spec.mechanism
-        states = track.states(np.maximum(track.start + np.ravel(travel), track.corner_end))
-        contact = forces(states, self.solution.assembly.loads, mechanism.rolling_friction).contact
-        return flank_pressure(self.solution.assembly, states, contact).reshape(np.shape(travel))
+def _taken(solution: Solution, kind: str) -> FloatArray:
+    """Return the energy that a kind of friction takes over the window, up and down [J]."""
+    up, down = (state.lost or {} for state in (solution.up, solution.down))
+    places = solution.travel + solution.origin
+    return _integral(places, up[kind] + down[kind], *solution.window)
 
 
-def _both(solution: Solution) -> tuple[Forces, Forces]:
-    return solution.up, solution.down
+def _loop_area(solution: Solution) -> FloatArray:
+    """Return the energy that all friction takes over the window [J]; NaN where it is not finite, or nothing."""
+    area = reduce(np.add, (_taken(solution, kind) for kind in solution.up.lost or {}))
+    return np.where(np.isfinite(area) & (area > 0), area, np.nan)
 
 
-def largest_pressure(flank: FlankSamples) -> tuple[float | None, float]:
-    """Return the largest pressure of the contact on the way up [Pa], None without one, and about where it is [m]."""
-    pressed = flank.pressure(flank.travel)
-    known = np.isfinite(pressed)
-    if not known.any():
-        return None, 0.0
-    travel, pressed = flank.travel[known], pressed[known]
-    top, _ = extremes(flank.pressure, travel[None, :], pressed[None, :], uneven=True)
-    return float(top[0]), float(travel[np.argmax(pressed)])
+def _integral(places: FloatArray, values: FloatArray, low: Any, high: Any) -> FloatArray:
+    """Return the integral of values over increasing places from low to high, linear between them, (..., 1)."""
+    start, stop = np.clip(places, low, high)[..., :-1], np.clip(places, low, high)[..., 1:]
+    left, first = places[..., :-1], values[..., :-1]
+    slope = np.diff(values) / np.diff(places)
+    middle = np.where(start == left, first, first + slope * (start - left)) + 0.5 * slope * (stop - start)
+    found = np.where(stop > start, (stop - start) * middle, 0.0)
+    return np.asarray(found.sum(axis=-1, keepdims=True))
 
 
-def _half_gap(flank: FlankSamples) -> float | None:
-    up, down = flank.up.slider, flank.down.slider
-    usable = np.isfinite(up) & np.isfinite(down) & (up + down > flank.solution.effort_error)
-    return largest(((up - down) / np.where(usable, up + down, 1.0))[usable])
-
-
-def _corner_peak(solution: Solution) -> float | None:
-    """Return the peak force on the corner, on the way up [N]."""
-    assembly = solution.assembly
-    corner = min(solution.corner_travel, float(solution.travel[-1]))
-    if corner <= 0 or any(low < corner for low, _ in solution.jams):  # next to a jam the force is unbounded
-        return None
+def _corner_peak(solution: Solution) -> FloatArray:
+    """Return the peak force on the corner, on the way up, (m, 1) [N]."""
+    corner = np.minimum(solution.corner_travel, solution.travel[..., -1:])
+    free = (corner > 0) & ~solution.is_held_on_corner  # next to a jam the force is unbounded
+    if not free.any():
+        return np.full((1, 1), np.nan)
 
     def force(travel: FloatArray) -> FloatArray:
-        states = assembly.track.states(assembly.track.start + np.ravel(travel))
-        found = forces(states, assembly.loads, assembly.spec.mechanism.rolling_friction).slider
-        return np.asarray(found.reshape(np.shape(travel)))
+        return solution.at_travel(travel, 1.0)[1].slider
 
-    travel = np.concatenate([[0.0], corner * ON_CORNER])[None, :]
-    found = force(travel)
-    known = np.isfinite(found[0])
-    return float(extremes(force, travel[:, known], found[:, known], uneven=True)[0][0])
+    travel = corner * np.concatenate([[0.0], ON_CORNER])
+    return np.where(free, extreme_next_to(force, travel, force(travel), len(solution))[0], np.nan)
+
+
+def _springs_in_use(solution: Solution) -> list[SpringInUse]:
+    """Return a spring of each mechanism between its loads, the stiffest of unequal ones; one where all are alike."""
+    springs, ends = solution.mechanism.springs, solution.elongation
+    wire = springs.wound
+    wound = None if wire is None else wire.wound("extension")
+    fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
+    least, most = (
+        np.ravel(springs.initial_tension * (end >= 0.0) + springs.stiffest * np.maximum(end, 0.0)).tolist()
+        for end in (ends.min(axis=-1, keepdims=True), ends.max(axis=-1, keepdims=True))
+    )
+    return [SpringInUse(wound, low, high, fatigue, springs.life) for low, high in zip(least, most, strict=True)]
+
+
+def _wire(name: str) -> ScalarQuantity[Solution]:
+    """Return what the springs' wire bears, where it is known; of unequal springs the stiffest."""
+
+    def read(solution: Solution) -> FloatArray:
+        found = [wire_quantities([one]).get(name) for one in _springs_in_use(solution)]
+        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
+
+    def of_first(solution: Solution) -> Mapping[str, Quantity]:
+        return wire_quantities(_springs_in_use(solution)[:1])
+
+    return ScalarQuantity(
+        *WIRE_DEFINITIONS[name],
+        read,
+        lambda solution: of_first(solution)[name].reason,
+        lambda solution: name in of_first(solution),
+    )
+
+
+def _is_in_contact(solution: Solution) -> bool:
+    return solution.mechanism.contact is not None
+
+
+def _rubs(solution: Solution) -> bool:
+    return solution.assembly.loads.losses is not None
+
+
+def _has_bearings(solution: Solution) -> bool:
+    return solution.mechanism.bearings is not None
+
+
+def _is_tilted(solution: Solution) -> bool:
+    return solution.up.least_contact is not None and solution.down.least_contact is not None
+
+
+def _deviations(share: float) -> Callable[[Solution], float]:
+    return lambda solution: float(np.quantile(solution.band.deviations(), share)) if solution.band else np.nan
+
+
+def _loop_energy(solution: Solution, kind: str) -> FloatArray:
+    return np.where(np.isnan(_loop_area(solution)), np.nan, _taken(solution, kind))
+
+
+def _loop_share(solution: Solution, kind: str) -> FloatArray:
+    return _taken(solution, kind) / _loop_area(solution)
+
+
+def _least_contact(solution: Solution) -> FloatArray:
+    both = (solution.up.least_contact, solution.down.least_contact)
+    return -largest_of_each(*(-one[..., 1:] for one in both if one is not None))
+
+
+_FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution], bool] | None]] = {
+    "force_constant": (lambda one: one.assembly.profile.path.law.force_constant, None),
+    "spring_stiffness": (lambda one: one.assembly.loads.stiffness, None),
+    "theoretical_force": (lambda one: constant_force(one.assembly), None),
+    "undercut_travel": (lambda one: one.corner_travel, None),
+    "roller_radius_max": (lambda one: one.of_each_cam(largest_roller), None),
+    "force_constant_min": (lambda one: one.of_each_cam(smallest_constant), None),
+    "corner_force_max": (_corner_peak, None),
+    "jam_travel": (lambda one: one.jam_travel, None),
+    "spring_elongation_max": (lambda one: one.elongation.max(axis=-1, keepdims=True), None),
+    "contact_force_max": (lambda one: largest_of_each(one.up.contact, one.down.contact), None),
+    "pressure_angle_max": (lambda one: largest_of_each(one.flank.pressure_angle), None),
+    "brace_angle_max": (
+        lambda one: np.arcsin(one.states.x.max(axis=-1, keepdims=True) / one.assembly.track.brace_length),
+        None,
+    ),
+    "friction_half_gap_max": (lambda one: one.flank.half_gap, None),
+    "contact_pressure_max": (lambda one: one.flank.largest_pressure[0], _is_in_contact),
+    **{f"loop_energy_{kind}": (partial(_loop_energy, kind=kind), _rubs) for kind in KINDS},
+    **{f"loop_share_{kind}": (partial(_loop_share, kind=kind), _rubs) for kind in KINDS},
+    "bearing_load_max": (_bearing_load, _has_bearings),
+    "bearing_static_safety": (
+        lambda one: one.mechanism.bearings.static_rating / _bearing_load(one),
+        lambda one: (
+            _has_bearings(one)
+            and one.mechanism.bearings.static_rating is not None
+            and bool((_bearing_load(one) > 0).any())
+        ),
+    ),
+    "bearing_life": (
+        _bearing_life,
+        lambda one: _has_bearings(one) and one.mechanism.bearings.dynamic_rating is not None,
+    ),
+    "contact_force_least": (_least_contact, _is_tilted),
+    "manufacturing_force_share": (_deviations(0.5), lambda one: one.band is not None),
+    "manufacturing_force_share_95": (_deviations(0.95), lambda one: one.band is not None),
+}
+
+QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+    **{
+        name: ScalarQuantity(*DEFINITIONS[name], function, "", applies)
+        for name, (function, applies) in _FUNCTIONS.items()
+    },
+    **{name: _wire(name) for name in WIRE_DEFINITIONS},
+}
+"""Every scalar result of a quasi-static cam as designed, in the order in which they are shown."""
+
+COLUMNS = QUANTITIES | {
+    name: ScalarQuantity[Any](*about, lambda _solution: np.nan, applies=lambda _solution: False)
+    for name, about in DEFINITIONS.items()
+    if name not in QUANTITIES
+}
+"""What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 
 def values_of_built(built: Built) -> Mapping[str, Quantity]:
@@ -445,7 +449,8 @@ def loop_area_per_friction(built: Built) -> float:
     up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
     window = built.assembly.spec.analysis.window
     ends = between(window, requested_travel(built)) if window else None
-    return _integral(built.travel + built.origin, up - down, ends) / small
+    places = built.travel + built.origin
+    return float(_integral(places, up - down, *(ends or (places[0], places[-1])))[0]) / small
 
 
 def half_extent(built: Built) -> float:

@@ -5,18 +5,28 @@ Values are computed when they are first read; figures, findings and results impo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
-from cfmkit.families.cam.statics import Forces, Loads, jams, levers, load_on_contact, load_on_slider
-from cfmkit.results import round_off
+from cfmkit.families.cam.samples_on_flank import FlankSamples, largest_of_each, pressure_angle
+from cfmkit.families.cam.statics import Forces, Loads, forces, jams, levers, load_on_contact, load_on_slider
+from cfmkit.families.rows import rows_of
+from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
+from cfmkit.results import ROUND_OFF
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates
@@ -25,6 +35,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
+CLOSE = 1e-6
+"""A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
+
 FEW = 100
 """Of fewer samples than these all are looked at for jams; of more, only places between which a jam may begin."""
 
@@ -32,16 +45,9 @@ ON_CORNER = np.linspace(0.0, 1.0, 34)[1:]
 """Shares of the travel on a corner next to which an extreme of the force is looked for: its end is a kink."""
 
 
-def pressure_angle(states: TrackStates, brace_length: float) -> FloatArray:
-    """Return the angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
-    slope, tangent = states.slope, brace_tangent(states.x, brace_length)
-    angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
-    return angle
-
-
 @dataclass(frozen=True)
 class Assembly:
-    """A mechanism put together."""
+    """A mechanism put together; several of one kind have columns (m, 1) for numbers that differ."""
 
     spec: CamSpec  # with every derived value written out
     profile: CamProfile  # the cam as cut
@@ -74,18 +80,42 @@ class ForceBand:
         return found
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution(ShortRepr):
-    """A solved mechanism, as the checks, the scalar values and the pictures need it."""
+    """A solved mechanism, as the checks, the scalar values and the pictures need it; or several of one kind as rows.
+
+    Of one mechanism arrays are (n,). Of m the numbers that differ are columns (m, 1), also those in `assembly` and its
+    specification, and curves that differ are (m, n). Mechanisms around one cam with rollers and braces alike share its
+    track, and where the rollers are on it.
+    """
 
     assembly: Assembly  # the parts
-    travel: FloatArray  # (n,) slider travel from the start of the roller path, increasing [m]
+    travel: FloatArray  # slider travel from the start of the roller path, increasing [m]
     states: TrackStates  # where the rollers are at those travels
     # up, down: on the way up and on the way down, both ordered by increasing travel
     up: Forces
     down: Forces
     origin: float  # what is added to the travel to give the displacement [m]
     band: ForceBand | None = None  # forces of cams that are cut with errors
+    count: int = 1  # number of mechanisms
+    cams: tuple[Assembly, ...] = ()  # of m mechanisms each with a cam, or a track on it, of its own; else none
+
+    def __len__(self) -> int:
+        """Return the number of mechanisms."""
+        return self.count
+
+    @property
+    def mechanism(self) -> Any:
+        """What the specification says of the mechanism."""
+        return self.assembly.spec.mechanism
+
+    def of_each_cam(self, read: Callable[[Assembly], float]) -> FloatArray:
+        """Return a number of each different cam, (m, 1), or (1, 1) where all are alike."""
+        return np.array([[read(one)] for one in self.cams or (self.assembly,)])
+
+    def column(self, value: Any) -> FloatArray:
+        """Return a number of each mechanism, (m,)."""
+        return np.broadcast_to(np.ravel(value), self.count)
 
     @cached_property
     def pressure_angle(self) -> FloatArray:
@@ -95,35 +125,293 @@ class Solution(ShortRepr):
     @cached_property
     def elongation(self) -> FloatArray:
         """Elongation of the springs [m]."""
-        opened = self.assembly.spec.mechanism.springs.tension_stretch
-        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width) - opened
+        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width) - self.mechanism.springs.tension_stretch
 
     @property
-    def effort_error(self) -> float:
+    def effort_error(self) -> Any:
         """Rounding of the sum of springs and weights on the slider [N]."""
         weight = self.assembly.loads.slider_weight
-        both = np.concatenate([self.up.slider, self.down.slider])
-        return round_off(np.stack([both - weight, np.full(len(both), weight)]))
-
-    @property
-    def corner_travel(self) -> float:
-        """Travel at which the roller leaves the corner [m]; 0 if there is none."""
-        track = self.assembly.track
-        corner = max(track.corner_end - track.start, 0.0)
-        return corner if corner > float(self.travel[0]) else 0.0
+        most = largest_of_each(*(np.abs(one.slider - weight) + np.abs(weight) for one in (self.up, self.down)))
+        return ROUND_OFF * (np.nan_to_num(most) if self.count > 1 else float(np.nan_to_num(most)[0]))
 
     @cached_property
+    def corner_travel(self) -> Any:
+        """Travel at which the roller leaves the corner [m]; 0 if there is none."""
+        track = self.assembly.track
+        corner = np.maximum(track.corner_end - track.start, 0.0)
+        found = np.where(corner > self.travel[..., :1], corner, 0.0)
+        return found if self.count > 1 else float(found[0])
+
+    @cached_property
+    def flank(self) -> FlankSamples:
+        """Contacts on the flank."""
+        return FlankSamples.of(self)
+
+    # --- at any travel ----------------------------------------------------------------------------------------------
+
+    def at_travel(
+        self, travel: FloatArray, way: float, rows: Any = None, flank: bool = False
+    ) -> tuple[TrackStates, Forces]:
+        """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m].
+
+        Parameters
+        ----------
+        travel : (k, m) array, or of any shape for one mechanism
+            Travels of each mechanism, or of some.
+        way : float
+            1 or -1.
+        rows : (k,) array of int, optional
+            Which mechanisms; default: all.
+        flank : bool
+            Whether places are on the flank: rounding must not take the first one to the corner.
+        """
+        track, loads, friction = self.assembly.track, self.assembly.loads, self.mechanism.rolling_friction
+        if rows is not None:
+            track, loads, friction = track.of_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
+        slider = track.start + travel
+        states = track.states(np.maximum(slider, track.corner_end) if flank else slider)
+        return states, forces(states, loads, way * friction, way)
+
+    def at_places(self, places: FloatArray, way: float, rows: Any = None) -> tuple[TrackStates, Forces]:
+        """Return the same at displacements, which end with the travel [m]; what is alike for all is computed once."""
+        shared = rows is None and places.ndim == 2 and not isinstance(self.assembly.track, TrackRows)
+        places = places[:1] if shared and places.strides[0] == 0 else places
+        origin, last = self.origin, self.travel[..., -1:]
+        if rows is not None:
+            origin, last = rows_of((origin, last), rows)
+        return self.at_travel(np.clip(places - origin, 0.0, last), way, rows)
+
+    # --- jams -------------------------------------------------------------------------------------------------------
+
+    @property
     def jams(self) -> tuple[tuple[float, float], ...]:
-        """Intervals of travel in which no force moves the slider up [m]."""
-        track, friction = self.assembly.track, self.assembly.spec.mechanism.rolling_friction
-        losses = self.assembly.loads.losses
-        if not friction and losses is None:
-            return ()
-        total = float(self.travel[-1])
-        missing = bool(np.isnan(self.up.slider).any())
-        states = self.states if missing or len(self.travel) < FEW else None
-        found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states, losses))
-        return tuple((max(low, 0.0), min(high, total)) for low, high in found if low < total)
+        """Intervals of travel in which no force moves the slider of the first mechanism up [m]."""
+        return self.all_jams[0]
+
+    @cached_property
+    def all_jams(self) -> list[tuple[tuple[float, float], ...]]:
+        """Intervals of travel in which no force moves the slider up, of each mechanism [m]."""
+        friction, losses = self.mechanism.rolling_friction, self.assembly.loads.losses
+        found: list[tuple[tuple[float, float], ...]] = [()] * self.count
+        if not np.any(friction) and losses is None:
+            return found
+        is_looked_at = np.isnan(self.up.slider).any(axis=-1) | (self.travel.shape[-1] < FEW)
+        is_looked_at = np.broadcast_to(is_looked_at, self.count)
+        for states, some in ((None, ~is_looked_at), (self.states, is_looked_at)):
+            rows, track, parts = np.flatnonzero(some), self.assembly.track, (friction, states, losses)
+            if not len(rows):
+                continue
+            if self._jam_alike:
+                known = jams(track, friction, states) * len(rows)
+            elif len(rows) == self.count:
+                known = jams(track, *parts, self.count)
+            else:
+                known = jams(track.of_rows(rows), *rows_of(parts, rows), len(rows))
+            for row, own in zip(rows.tolist(), known, strict=True):
+                found[row] = own
+        total = self.column(self.travel[..., -1:]).tolist()
+        return [
+            own and tuple((max(low, 0.0), min(high, end)) for low, high in own if low < end)
+            for own, end in zip(found, total, strict=True)
+        ]
+
+    @property
+    def _jam_alike(self) -> bool:
+        """Whether leverage is the same in all: springs and weights do not change it."""
+        alone = self.assembly.loads.losses is None and not np.ndim(self.mechanism.rolling_friction)
+        return alone and not isinstance(self.assembly.track, TrackRows)
+
+    @property
+    def jam_travel(self) -> FloatArray:
+        """Travel at the start over which no force moves the slider up [m], (m,)."""
+        return np.array([next((high for low, high in own if low == 0), 0.0) for own in self.all_jams])
+
+    @property
+    def is_held_on_corner(self) -> NDArray[np.bool_]:
+        """Whether no force moves the slider up somewhere on the corner, (m, 1)."""
+        corner = self.column(self.corner_travel).tolist()
+        return np.array([[any(low < end for low, _ in own)] for own, end in zip(self.all_jams, corner, strict=True)])
+
+    # --- as metrics see it ------------------------------------------------------------------------------------------
+
+    @property
+    def window(self) -> tuple[Any, Any]:
+        """Ends of the window of the analysis, else of the travel [m], numbers or (m, 1)."""
+        places, stated = self.travel + self.origin, self.assembly.spec.analysis.window
+        low, high = places[..., :1], places[..., -1:]
+        if stated is None:
+            return low, high
+        ends = [between(stated, pair) for pair in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)]
+        return tuple(np.array(ends).T[..., None] if low.ndim > 1 else np.array(ends[0])[:, None])
+
+    @property
+    def requested(self) -> Any:
+        """How far the sliders were to go [m]; without a request, as far as the flank was to be cut."""
+        analysis, stroke, last = self.assembly.spec.analysis, self.mechanism.profile.stroke, self.travel[..., -1:]
+        if analysis.travel is not None:
+            return analysis.travel
+        # the whole stroke but for rounding is the stroke: shares of the travel are then the same places in every run
+        is_whole = np.abs(last - stroke) <= CLOSE * np.maximum(np.abs(last), np.abs(stroke))
+        found = np.where(is_whole, stroke, last)
+        return found if self.count > 1 else float(found[0])
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Increasing displacements so dense that the force hides nothing between two, (m, q), or (1, q) for all [m]."""
+        travel = np.atleast_2d(self.travel)
+        low, high = travel[:, 0], travel[:, -1]
+        grid = low[:, None] + nodes(high - low, np.maximum(np.ravel(self.corner_travel) - low, 0.0))
+        return np.asarray(grid + self.origin)
+
+    @cached_property
+    def peaks(self) -> FloatArray:
+        """Places all over the corner of an undercut cam, where the force has a peak between two samples, (m, k) [m]."""
+        corner = np.minimum(np.ravel(self.corner_travel), np.atleast_2d(self.travel)[:, -1])
+        return corner[:, None] * (ON_CORNER if corner.any() else ON_CORNER[:0]) + self.origin
+
+    def effort(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
+        """Return the force on the way up or down at displacements of each mechanism, or of some, (k, n) [N]."""
+        return self.at_places(places, WAYS[branch], rows)[1].slider
+
+    def stress(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
+        """Return the stress below the contact at displacements, likewise [Pa]; NaN on the corner."""
+        states, found = self.at_places(places, WAYS[branch], rows)
+        return stress(flank_pressure(self.assembly, states, found.contact, rows))
+
+    def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
+        share = self.mechanism.springs.stiffest / self.assembly.loads.stiffness
+        return np.asarray(share * np.abs(self._unweighted.effort(branch, places)))
+
+    @cached_property
+    def _unweighted(self) -> Solution:
+        loads = self.assembly.loads
+        alone = replace(loads, roller_weight=0.0, slider_weight=0.0, sideways=(0.0, 0.0), off_plane=0.0)
+        return replace(self, assembly=replace(self.assembly, loads=alone))
+
+    @cached_property
+    def branches(self) -> dict[str, CurveRows]:
+        """The curves by branch, up and down."""
+        motion, dense = (self._of_each(one) for one in (self.travel + self.origin, self.places))
+        corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
+        valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
+        target = target_force(self.assembly.spec, self.assembly)
+        return {
+            name: CurveRows(
+                RowSamples(motion, self._of_each(state.slider), np.full(self.count, motion.shape[1])),
+                dense,
+                partial(self._effort_in_rows, name),
+                self.column(self.effort_error),
+                self.column(np.nan if target is None else target),
+                self.assembly.spec.analysis.band,
+                valid,
+                partial(self._part_efforts_in_rows, name),
+                self._stress_rows(name, state),
+                peaks=self._of_each(self.peaks),
+                travel=(motion[:, 0], self.column(self.requested) + self.column(self.origin)),
+            )
+            for name, state in (("load", self.up), ("unload", self.down))
+        }
+
+    def _of_each(self, values: FloatArray) -> FloatArray:
+        return np.broadcast_to(values, (self.count, values.shape[-1]))
+
+    def _effort_in_rows(self, name: str, places: FloatArray, rows: Any) -> FloatArray:
+        found = self.effort(name, places, rows)
+        return np.broadcast_to(found, (len(places), places.shape[1]))
+
+    def _part_efforts_in_rows(self, name: str, places: FloatArray) -> FloatArray:
+        return np.broadcast_to(self.part_efforts(name, places), places.shape)
+
+    def _stress_rows(self, name: str, state: Forces) -> StressRows | None:
+        if self.mechanism.contact is None:
+            return None
+        allowable = allowable_stress(self.mechanism)
+
+        def read() -> list[RowSamples]:
+            values = self._of_each(stress(flank_pressure(self.assembly, self.states, state.contact)))
+            curve = self.branches[name].samples
+            return [RowSamples(curve.motion, values, curve.count)]
+
+        def at(places: FloatArray, rows: Any) -> FloatArray:
+            return np.broadcast_to(self.stress(name, places, rows), places.shape)
+
+        return StressRows(read, at, self.column(np.nan if allowable is None else allowable))
+
+
+WAYS = {"load": 1.0, "unload": -1.0}
+"""Up and down, by branch."""
+
+
+def constant_force(assembly: Assembly) -> float:
+    """Return the force that the profile is cut for, with the springs and weights built in [N]."""
+    law, loads = assembly.profile.path.law, assembly.loads
+    return 4.0 * loads.stiffness * law.force_constant + loads.slider_weight
+
+
+def target_force(spec: CamSpec, assembly: Assembly) -> float | None:
+    """Return the constant force that is wanted or that the profile is cut for [N]; None if it follows a curve."""
+    if spec.target_curve is not None or assembly.spec.mechanism.profile.curve is not None:
+        return None
+    return spec.design.force if spec.design else constant_force(assembly)
+
+
+_SHARES = np.concatenate(
+    [np.geomspace(1e-14, 1e-4, 51), np.linspace(0.0, 1.0, 181) ** 2, 1.0 - np.geomspace(1e-9, 0.03, 24)]
+)
+"""Shares of the travel at which the force is looked at.
+
+With friction it rises from zero to its constant value within nanometres: nodes stand at even shares of the logarithm
+there, at even steps of the springs' stretch beyond, and close together before the end, where a brace may come near
+horizontal.
+"""
+
+_SORTED = np.sort(_SHARES)
+_ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0, 61)])
+"""The same on a corner, where it rises within a tenth of a millimetre."""
+
+
+def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
+    """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m].
+
+    Parameters
+    ----------
+    total, corner : (d,) array
+        Travel of each cam, and that at which its roller leaves the corner; 0 without one [m].
+    """
+    if not corner.any():
+        return np.asarray(total[:, None] * _SORTED)
+    on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER
+    return np.sort(np.concatenate([total[:, None] * _SHARES, on_corner], axis=1), axis=1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DenseLoop(ShortRepr):
+    """The loop of one solved mechanism at every place (a `cfmkit.results.ClosedForm`)."""
+
+    solution: Solution
+
+    @property
+    def places(self) -> FloatArray:
+        """Increasing displacements [m]."""
+        return self.solution.places[0]
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Places all over the corner of an undercut cam [m]."""
+        return self.solution.peaks[0]
+
+    def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the force on the way up or down at displacements of any shape [N]."""
+        return self.solution.effort(branch, places)
+
+    def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the stress below the contact at displacements of any shape [Pa]; NaN on the corner."""
+        return self.solution.stress(branch, places)
+
+    def part_efforts(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
+        return self.solution.part_efforts(branch, places)
 
 
 @dataclass(frozen=True)

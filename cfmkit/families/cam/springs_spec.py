@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
+import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
@@ -81,7 +83,12 @@ class Springs(Model):
         """K, the sum of all parallel springs [N/m]."""
         if isinstance(self.each, tuple):
             return sum(self.each)
-        return self.each * (self.count or 1)
+        return self.each * (1 if self.count is None else self.count)
+
+    @property
+    def stiffest(self) -> float:
+        """Stiffness of the stiffest spring [N/m]."""
+        return reduce(np.maximum, self.each) if isinstance(self.each, tuple) else self.each
 
     @property
     def tension_stretch(self) -> float:

@@ -29,6 +29,7 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,12 +37,19 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.guide_friction import FREE, GuideFriction
-from cfmkit.numerics.roots import bracketed_root
+from cfmkit.families.rows import rows_of
+from cfmkit.numerics.where_condition_ends import last_places
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates, TrackStretch
     from cfmkit.families.cam.geometry.slope_law import Real
+
+    Interval = tuple[float, float]
 
 GRAVITY = 9.80665
 """Standard acceleration of gravity, exact by definition (3rd CGPM, 1901) [m/s^2]."""
@@ -64,7 +72,7 @@ class Losses:
 
 @dataclass(frozen=True)
 class Loads:
-    """Loads on the rollers and the slider."""
+    """Loads on the rollers and the slider; of many mechanisms those that differ are columns (m, 1)."""
 
     stiffness: float  # K, the sum of all parallel springs [N/m]
     rest_half_width: float  # half the distance of the roller axes at which the springs are at rest [m]
@@ -80,12 +88,12 @@ class Loads:
     @property
     def plain(self) -> bool:
         """Whether both sides are loaded alike, and nothing rubs but the rollers."""
-        return self.losses is None and not any(self.sideways)
+        return self.losses is None and not np.any(self.sideways)
 
 
 @dataclass(frozen=True, repr=False)
 class Forces(ShortRepr):
-    """Forces on one branch, each (n,): on the slider, at a contact, in a brace [N].
+    """Forces on one branch, each (n,) or (m, n): on the slider, at a contact, in a brace [N].
 
     NaN where no finite force holds the mechanism (a jam, or a dead point under load). Where the sides are loaded
     differently `contact` and `brace` are the larger of both and `least_contact` is the smaller; `lost` is what each
@@ -97,6 +105,10 @@ class Forces(ShortRepr):
     brace: FloatArray
     least_contact: FloatArray | None = None
     lost: dict[str, FloatArray] | None = None
+
+    def fields(self) -> tuple[FloatArray, ...]:
+        """Return the arrays that all mechanisms have, in the order in which the class takes them."""
+        return self.slider, self.contact, self.brace
 
 
 def load_on_slider(turn: Real, slope: Real, friction: Any, spring: Real, weight: Any = None) -> Real:
@@ -132,7 +144,7 @@ def spring_force(states: TrackStates, loads: Loads) -> FloatArray:
     return stretch
 
 
-def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0) -> Forces:
+def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -> Forces:
     """Return the forces for one direction of travel [SS, eq. 1].
 
     Parameters
@@ -141,8 +153,8 @@ def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0)
         Where the rollers are.
     loads : Loads
         Springs and weights.
-    friction : float
-        Rolling friction mu: positive on the way up, negative on the way down.
+    friction : float or (m, 1) array
+        Rolling friction mu, of one sign: positive on the way up, negative on the way down.
     way : float
         1 on the way up, -1 on the way down: the sign of all other friction, and of mu where that is zero.
 
@@ -152,19 +164,22 @@ def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0)
         On the slider, at each contact and in each brace.
     """
     if not loads.plain:
-        return _forces_with_losses(states, loads, abs(friction), way if friction == 0.0 else float(np.sign(friction)))
-    slope, weight = states.slope, loads.roller_weight or None
+        sign = float(np.sign(np.ravel(friction)[0]))
+        return _forces_with_losses(states, loads, np.abs(friction), sign or way)
+    slope, weight = states.slope, loads.roller_weight if np.any(loads.roller_weight) else None
     tangent = brace_tangent(states.x, loads.brace_length)
     turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
     pull = over(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever)
     contact = over(load_on_contact(slope, tangent, spring, weight), lever)
     at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
-    idle = np.flatnonzero(at_rest & (np.abs(lever) < 1e-13))
-    if idle.size and not weight:
+    idle = at_rest & (np.abs(lever) < 1e-13)
+    if idle.any() and weight is None:
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
-        pull[idle] = at_dead_point(slope[idle], states.bend[idle], parts, friction)
-        contact[idle] = load_on_contact(slope[idle], tangent[idle], 0.5 * pull[idle]) / turn[idle]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            limit = at_dead_point(slope, states.bend, parts, friction)
+            pressed = load_on_contact(slope, tangent, 0.5 * limit) / turn
+        pull, contact = np.where(idle, limit, pull), np.where(idle, pressed, contact)
     return Forces(pull + loads.slider_weight, contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent))
 
 
@@ -208,13 +223,13 @@ class _Side:
     axial: FloatArray
 
 
-def normal_turn(losses: Losses, rolling: float) -> float:
+def normal_turn(losses: Losses, rolling: Any) -> Any:
     """Return m, the traction on a roller over its contact force: m = mu + kappa sqrt(1 + m^2), solved for m."""
     kappa = losses.bearing / losses.roller_radius
-    return float((rolling + kappa * np.sqrt(1.0 + rolling**2 - kappa**2)) / (1.0 - kappa**2))
+    return (rolling + kappa * np.sqrt(1.0 + rolling**2 - kappa**2)) / (1.0 - kappa**2)
 
 
-def leverage(x: FloatArray, slope: FloatArray, brace_length: float, losses: Losses, friction: float) -> FloatArray:
+def leverage(x: FloatArray, slope: FloatArray, brace_length: Any, losses: Losses, friction: Any) -> FloatArray:
     """Return the slider's lever on a roller with all friction: no force moves it where this is not positive.
 
     Parameters
@@ -228,18 +243,18 @@ def leverage(x: FloatArray, slope: FloatArray, brace_length: float, losses: Loss
     friction : float
         Rolling friction: positive on the way up, negative on the way down.
     """
-    way = -1.0 if friction < 0 else 1.0
-    turn = way * normal_turn(losses, abs(friction))
+    way = -1.0 if np.any(friction < 0) else 1.0
+    turn = way * normal_turn(losses, np.abs(friction))
     tangent = brace_tangent(x, brace_length)
     cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
     along = np.sqrt(1.0 + slope * slope)
     one, lever = levers(slope, tangent, turn)
-    rubbed = losses.pin * (one / cos + sin * lever) - losses.bearing * float(np.sqrt(1.0 + turn**2)) * along
+    rubbed = losses.pin * (one / cos + sin * lever) - losses.bearing * np.sqrt(1.0 + turn**2) * along
     found: FloatArray = lever - way * rubbed / (cos * brace_length)
     return found
 
 
-def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward: float) -> _Side:
+def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward: Any) -> _Side:
     """Return the forces of one side whose roller's weight pulls `outward` [N]; NaN where nothing moves it.
 
     With n and t along the contact normal and the track, u along the brace and V across it, the roller's axis is in
@@ -253,7 +268,7 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     (one, lever), along = levers(slope, tangent, turn), np.sqrt(1.0 + slope * slope)
     spring = spring_force(states, loads)
     pulled, hooks = spring - outward, losses.pin * spring
-    bearing = losses.bearing * float(np.sqrt(1.0 + turn**2))
+    bearing = losses.bearing * np.sqrt(1.0 + turn**2)
     load = pulled * one + weight * (slope - turn)
     # A pin rubs whichever way its brace is loaded: the sign is that of the axial force.
     for sign in (1.0, -1.0):
@@ -272,7 +287,7 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     pull, bend = found
     idle = (load == 0) & (hooks == 0) & (weight == 0)
     pull, bend = np.where(idle, 0.0, pull), np.where(idle, 0.0, bend)
-    if not turn and not losses.pin and not weight and not outward:
+    if not any(map(np.any, (turn, losses.pin, weight, outward))):
         dead = (np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width) & (np.abs(lever) < 1e-13)
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
         pull = np.where(dead, 0.5 * at_dead_point(slope, states.bend, parts, 0.0), pull)
@@ -280,10 +295,10 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     return _Side(pull, pull * tangent + bend, contact, (pull + bend * cos * sin) / cos)
 
 
-def _forces_with_losses(states: TrackStates, loads: Loads, rolling: float, way: float) -> Forces:
+def _forces_with_losses(states: TrackStates, loads: Loads, rolling: Any, way: float) -> Forces:
     losses = replace(loads.losses or Losses(), rolling=rolling)
     right = _side(states, loads, losses, way, loads.sideways[0])
-    left = _side(states, loads, losses, way, -loads.sideways[0]) if loads.sideways[0] else right
+    left = _side(states, loads, losses, way, -loads.sideways[0]) if np.any(loads.sideways[0]) else right
     free = right.along + left.along + loads.slider_weight
     guided = losses.guide.force(free, right.across - left.across + loads.sideways[1], loads.off_plane, way)
     return Forces(
@@ -312,46 +327,78 @@ def _lost(states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side,
 
 
 def jams(
-    track: Track, friction: float, states: TrackStates | None = None, losses: Losses | None = None
-) -> tuple[tuple[float, float], ...]:
-    """Return the intervals of the slider's position in which no force moves it up [m].
+    track: Track, friction: Any, states: TrackStates | None = None, losses: Losses | None = None, count: int = 1
+) -> list[tuple[Interval, ...]]:
+    """Return the intervals of the slider's travel in which no force moves it up, of each of some mechanisms [m].
 
-    There the lever of the slider on a roller, f - mu - tan(alpha) (1 + mu f), is not positive.
-    It is looked at in the `states` that are given, if force is known to be missing in one of
-    them; else where a stretch of the track begins or ends without it. With `losses` it is `leverage`.
+    There the lever of the slider on a roller, f - mu - tan(alpha) (1 + mu f), is not positive. It is looked at in the
+    `states` that are given, if force is known to be missing in one of them; else where a stretch of the track begins or
+    ends without it. With `losses` it is `leverage`.
+
+    Parameters
+    ----------
+    track : Track
+        Of one mechanism or of all, or tracks side by side.
+    friction : float or (count, 1) array
+        Rolling friction.
+    states : TrackStates, optional
+        Of each, (n,) or (count, n).
+    losses : Losses, optional
+        All friction.
+    count : int
+        Number of mechanisms.
     """
-    edges: list[float] = []
-    jammed = False
-    for part in track.stretches():
-
-        def lever(u: Real, part: TrackStretch = part) -> Real:
-            _, x, slope = part.at(u)
-            if losses is not None:
-                with_all: Any = leverage(np.asarray(x), np.asarray(slope), track.brace_length, losses, friction)
-                moves: Real = with_all + 1e-12
-                return moves
-            # Rounding at a start without any lever is not a jam.
-            margin: Real = levers(slope, brace_tangent(x, track.brace_length), friction)[1] + 1e-12
-            return margin
-
-        if states is None and not jammed and lever(part.low) >= 0 and lever(part.high) >= 0:
-            continue
+    before, found = np.zeros(count, dtype=bool), [list[float]() for _ in range(count)]
+    for number, part in enumerate(track.stretches()):
+        lever = partial(_lever, track, number, friction, losses)
         grid = _places(part, states)
-        held = lever(grid) < 0
-        if held[0] and not jammed:
-            edges.append(float(part.at(part.low)[0]) if edges else track.start)
-        for k in np.flatnonzero(held[1:] != held[:-1]):
-            edges.append(float(part.at(bracketed_root(lever, float(grid[k]), float(grid[k + 1])))[0]))
-        jammed = bool(held[-1])
-    if jammed:
-        edges.append(track.end)
-    return tuple(zip(edges[::2], edges[1::2], strict=True))
+        held = np.array(np.broadcast_to(lever(grid) < 0, (count, grid.shape[-1])))
+        if states is None:
+            held &= (held[:, 0] | held[:, -1] | before)[:, None]
+        rows, at = np.nonzero(held != np.column_stack([before, held[:, :-1]]))
+        if rows.size:
+            grid = np.broadcast_to(grid, held.shape)
+            here, earlier, begins = grid[rows, at], grid[rows, np.maximum(at - 1, 0)], held[rows, at]
+            ends = (np.where(begins, one, other)[:, None] for one, other in ((earlier, here), (here, earlier)))
+            place = last_places(partial(_shortage, lever, rows), *ends)
+            own = track.of_rows(rows)
+            travel = list(own.stretches())[number].at(place)[0] - own.start
+            for row, first, edge in zip(rows.tolist(), (at == 0).tolist(), travel[:, 0].tolist(), strict=True):
+                found[row].append(0.0 if first and not found[row] else edge)
+        before = held[:, -1]
+    ends_of = np.broadcast_to(track.end - track.start, (count, 1))
+    for row in np.flatnonzero(before).tolist():
+        found[row].append(float(ends_of[row, 0]))
+    return [tuple(zip(edges[::2], edges[1::2], strict=True)) for edges in found]
+
+
+def _lever(
+    track: Track, number: int, friction: Any, losses: Losses | None, parameter: Any, rows: Any = None
+) -> FloatArray:
+    """Return the slider's lever on a roller on the way up at parameters of a stretch, rounding added.
+
+    Rounding at a start without any lever is not a jam.
+    """
+    if rows is not None:
+        track, losses = track.of_rows(rows), rows_of(losses, rows)
+        friction = friction[rows] if np.ndim(friction) else friction
+    _, x, slope = list(track.stretches())[number].at(parameter)
+    if losses is not None:
+        return leverage(x, slope, track.brace_length, losses, friction) + 1e-12
+    return np.asarray(levers(slope, brace_tangent(x, track.brace_length), friction)[1] + 1e-12)
+
+
+def _shortage(
+    lever: Callable[..., FloatArray], rows: NDArray[np.intp], parameter: FloatArray, ends: NDArray[np.intp]
+) -> FloatArray:
+    return -lever(parameter, rows[ends])
 
 
 def _places(part: TrackStretch, states: TrackStates | None) -> FloatArray:
-    """Return where to look for a jam on a stretch: its parameters in increasing order."""
-    grid = part.low + (part.high - part.low) * JAM_SHARES
+    """Return where to look for a jam on a stretch: its parameters in increasing order, of one track or of each."""
+    grid: FloatArray = part.low + (part.high - part.low) * JAM_SHARES
     if states is not None:
-        known = np.arctan(states.slope[states.on_corner]) if part.on_corner else states.parameter[~states.on_corner]
-        grid = np.sort(np.concatenate([known, grid]))
+        known = np.arctan(states.slope) if part.on_corner else states.parameter
+        known = np.where(states.on_corner == part.on_corner, known, part.low)
+        grid = np.sort(np.concatenate([known, np.broadcast_to(grid, (*known.shape[:-1], grid.shape[-1]))], axis=-1))
     return np.minimum(np.maximum(grid, part.low), part.high)

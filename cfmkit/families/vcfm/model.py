@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.arrays import LazySequence, ShortRepr
 from cfmkit.curves import Column, Curve
-from cfmkit.families.rows import SolvedRows, findings_of_one, values_of_one
+from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
 from cfmkit.families.vcfm.findings import RULES, closed_spring, finding, is_closed
@@ -124,7 +124,7 @@ def solve(spec: VcfmSpec, made: Parts, sampler: PartSampler) -> Solution:
 
 def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
     """Yield (indices, mechanisms that are solved together) of those that have closed forms; others are left out."""
-    kinds = {index: kind for index, spec in enumerate(specs) if (kind := _kind(spec)) is not None}
+    kinds = {index: kind for index, spec in valid(specs) if (kind := _kind(spec)) is not None}
     order = sorted(kinds, key=lambda index: repr(kinds[index]))
     for _, alike in groupby(order, key=lambda index: repr(kinds[index])):
         members = list(alike)

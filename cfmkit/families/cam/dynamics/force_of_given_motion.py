@@ -30,7 +30,7 @@ from cfmkit.families.cam.dynamics.scalar_results import contact_pressure, slow_f
 from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.findings import finding, rubbing_left_out
 from cfmkit.families.cam.mechanism_from_spec import displacement_origin, flanks_cross, rollers_overlap
-from cfmkit.families.cam.scalar_results import constant_force
+from cfmkit.families.cam.solution import constant_force
 from cfmkit.families.findings import mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status

@@ -144,6 +144,8 @@ class _OdeHeight:
     def __call__(self, x: Real) -> Real:
         if not np.size(x):
             return x
+        if np.ndim(x) > 1:  # scipy's interpolant takes rows only
+            return np.reshape(self(np.ravel(x)), np.shape(x))
         at, heights = self.knots
         step = np.clip(np.searchsorted(at, x), 1, len(at) - 1)
         y: Any = np.interp(x, at, heights)

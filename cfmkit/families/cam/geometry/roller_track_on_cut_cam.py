@@ -279,6 +279,10 @@ class Track:
         """The triangle that a brace and the corner make."""
         return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
 
+    def of_rows(self, _rows: Any) -> Track:
+        """Return the track itself: what many mechanisms share is the same for all of them."""
+        return self
+
     def stretches(self) -> Iterator[TrackStretch]:
         """Yield the parts of the track on which the slider rises, in order, from `start` on."""
         passed = self.start - self.dead_point
@@ -369,25 +373,24 @@ class TrackRows(Track):
     def __init__(self, tracks: Sequence[Track]) -> None:
         """Set the numbers of all side by side."""
         first, profiles = tracks[0], [track.profile for track in tracks]
-        law, corner = (stacked([read(one) for one in profiles]) for read in (lambda one: one.path.law, _corner_of))
         numbers = {name: stacked([getattr(track, name) for track in tracks]) for name in _NUMBERS}
-        cut = stacked([(one.roller_radius, one.end) for one in profiles])
         alike = {name: getattr(first, name) for name in ("_is_shifted", "_follows_law", "_is_ideal", "turns_back")}
-        parts = zip(*([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True)
-        self._set(law, cut, corner, numbers | alike | {"_parts": tuple(stacked(list(part)) for part in parts)})
+        parts = zip(
+            *([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True
+        )
+        parts = tuple(stacked(list(part)) for part in parts)
+        self._set(profiles_in_rows(profiles), numbers | alike | {"_parts": parts})
 
-    def _set(self, law: Any, cut: Any, corner: Any, numbers: Mapping[str, Any]) -> None:
-        radius, end = cut
-        self.profile = CamProfile(RollerPath(law, end), radius, end, corner)
-        self._corner_point = corner.point if corner else (0.0, 0.0)
+    def _set(self, profile: CamProfile, numbers: Mapping[str, Any]) -> None:
+        self.profile, self._corner_point = profile, profile.corner.point if profile.corner else (0.0, 0.0)
         vars(self).update(numbers)
 
     def of_rows(self, rows: Any) -> TrackRows:
         """Return some of the tracks."""
         found, own = object.__new__(TrackRows), dict(vars(self))
         profile = own.pop("profile")
-        law, cut, corner = rows_of((profile.path.law, (profile.roller_radius, profile.end), profile.corner), rows)
-        found._set(law, cut, corner, {name: rows_of(value, rows) for name, value in own.items()})
+        parts = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
+        found._set(_profile(*parts), {name: rows_of(value, rows) for name, value in own.items()})
         return found
 
     def states(self, slider: FloatArray) -> TrackStates:
@@ -408,5 +411,10 @@ class TrackRows(Track):
         return np.stack([np.interp(*row) for row in zip(at, places, values, strict=True)])
 
 
-def _corner_of(profile: CamProfile) -> CamCorner | None:
-    return profile.corner
+def profiles_in_rows(profiles: Sequence[CamProfile]) -> CamProfile:
+    """Return cut cams of one kind side by side, as one whose numbers are columns (m, 1)."""
+    return _profile(*stacked([(one.path.law, one.roller_radius, one.end, one.corner) for one in profiles]))
+
+
+def _profile(law: Any, radius: Any, end: Any, corner: CamCorner | None) -> CamProfile:
+    return CamProfile(RollerPath(law, end), radius, end, corner)

@@ -24,7 +24,7 @@ from cfmkit.arrays import LazySequence, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import ScalarQuantity, SolvedRows, findings_of_one, values_of_one
+from cfmkit.families.rows import ScalarQuantity, SolvedRows, findings_of_one, valid, values_of_one, without_numbers
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
@@ -37,7 +37,6 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
-from cfmkit.specs.spec import Model
 from cfmkit.specs.units import format_short
 from cfmkit.stock.parts_list import BoughtPart, listed
 from cfmkit.stock.springs.guides import guide_words
@@ -115,7 +114,7 @@ def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.in
     """Yield (indices, mechanisms that are solved together) of those that go through all of the motion."""
     alike: dict[str, list[int]] = {}
     built: dict[int, tuple[SliderCrankSpec, Assembly, Ends]] = {}
-    for index, spec in enumerate(specs):
+    for index, spec in valid(specs):
         if spec.fidelity != "prb" or spec.target_curve is not None or not any(spec.mechanism.springs.rates):
             continue
         try:
@@ -138,14 +137,7 @@ def _kind(spec: SliderCrankSpec, assembly: Assembly, asked: Ends) -> tuple[Any, 
     """Return what mechanisms that are solved together have in common: all but the values of numbers."""
     rubbing, blocks = assembly.rubbing, (spec.mechanism, spec.analysis, spec.design)
     rubs = rubbing.there, rubbing.guide.friction > 0, rubbing.pin > 0
-    return (*map(_without_numbers, blocks), *rubs, spec.analysis.band, is_wide(assembly, *asked))
-
-
-def _without_numbers(value: Any) -> Any:
-    if isinstance(value, Model | tuple):
-        items = value if isinstance(value, tuple) else vars(value).values()
-        return ["number" if type(item) is float else item and _without_numbers(item) for item in items]
-    return "number" if isinstance(value, float) else value
+    return (*map(without_numbers, blocks), *rubs, spec.analysis.band, is_wide(assembly, *asked))
 
 
 def _solution(specs: Sequence[SliderCrankSpec], assemblies: Sequence[Assembly], motions: Sequence[Ends]) -> Solution:

@@ -1,1 +1,0 @@
-"""Many cams at once: one array operation for all of them where a cam alone takes a model."""
