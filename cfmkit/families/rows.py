@@ -43,7 +43,7 @@ def stacked(items: Sequence[T]) -> T:
     if len(items) == 1:
         return items[0]
     if is_dataclass(first):
-        found = object.__new__(type(first))  # type: ignore[arg-type]  # without what is known of the first one
+        found = object.__new__(type(first))  # without what is known of the first one
         for name in (*(item.name for item in fields(first)), *getattr(first, "also_stacked", ())):
             vars(found)[name] = stacked([getattr(one, name) for one in items])
     elif isinstance(first, tuple):

@@ -167,6 +167,11 @@ class RowsInWindow:
         slack = TOLERANCE * (high - low)
         return (first <= low + slack) & (last >= high - slack)
 
+    @property
+    def is_known(self) -> NDArray[np.bool_]:
+        """Which curves reach both ends and have an effort at every point between."""
+        return self.covered & np.isfinite(self.many.mean)
+
     @cached_property
     def _cut(self) -> Ends:
         """The ends, not beyond those of the curves."""
@@ -194,7 +199,7 @@ class RowsInWindow:
     @cached_property
     def _uneven(self) -> NDArray[np.bool_]:
         places = self._peaks[0]
-        return (places > self._cut[0][:, None]).any(axis=1) & (places.shape[1] < FEW)
+        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (places.shape[1] < FEW))
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
         known = self.inside.joined(*self._peaks) if self._peaks[0].shape[1] else self.inside
@@ -283,7 +288,7 @@ class RowsInWindow:
     @cached_property
     def level(self) -> FloatArray:
         """Mean effort over the way in the window [N or N m]; NaN if the curve does not cover it."""
-        return np.where(self.covered, mean_of_rows(self.curves.all_at, self.curves.dense, *self._cut), np.nan)
+        return np.where(self.is_known, mean_of_rows(self.curves.all_at, self.curves.dense, *self._cut), np.nan)
 
     @property
     def reference(self) -> FloatArray:
@@ -369,7 +374,7 @@ def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mappi
         if name in RANGES:
             return {branch: one.range_of(name) for branch, one in branches.items()}
         if name in WINDOWED:
-            return {branch: np.where(one.covered, WINDOWED[name](one), np.nan) for branch, one in branches.items()}
+            return {branch: np.where(one.is_known, WINDOWED[name](one), np.nan) for branch, one in branches.items()}
         if name in metrics_of(kind):
             return {
                 branch: np.where(one.covered, metric_of(name, one.many, one.curves.target), np.nan)

@@ -86,7 +86,7 @@ class SolvedVariants:
         start, stop = self._travels
         if len(ends) == 1 and ends[0] is not None and (first := _between(ends[0], start, stop)) is not None:
             return first
-        every = ends if len(ends) == len(self) else ends * len(self)  # type: ignore[operator]
+        every = list(ends) if len(ends) == len(self) else list(ends) * len(self)
         travels = zip(start.tolist(), stop.tolist(), strict=True)
         found = [between(one, travel) for one, travel in zip(every, travels, strict=True) if one is not None]
         low, high = np.array(found).T

@@ -13,7 +13,8 @@ from scipy.optimize import root
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.figures import figures
-from cfmkit.families.cam.scalar_results import values_of
+from cfmkit.families.cam.scalar_results import QUANTITIES
+from cfmkit.families.rows import values_of_one
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
 BEARINGS = {"bore": "8 mm", "friction": 0.004}
@@ -130,9 +131,9 @@ def test_a_smallest_contact_force_that_is_nowhere_finite_is_unknown():
     """Zero would say that a roller leaves the cam."""
     solution = analyze(cam(mounting={"elevation": "0 deg", "roll": "0 deg"}, analysis__points=11)).state
     least = np.concatenate([state.least_contact[1:] for state in (solution.up, solution.down)])
-    assert values_of(solution)["contact_force_least"].value == least.min()
+    assert values_of_one(QUANTITIES, solution)["contact_force_least"].value == least.min()
     up, down = (replace(state, least_contact=np.full(11, np.nan)) for state in (solution.up, solution.down))
-    assert values_of(replace(solution, up=up, down=down))["contact_force_least"].value is None
+    assert values_of_one(QUANTITIES, replace(solution, up=up, down=down))["contact_force_least"].value is None
 
 
 def test_hanging_down_the_weight_helps_by_what_it_hinders_standing_up():

@@ -13,9 +13,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut
-from cfmkit.families.cam.geometry.many_tracks_one_cam import ManyTracks
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, TrackRows
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.no_mechanism import CannotBuild
@@ -253,17 +252,14 @@ def test_a_dead_point_on_the_corner_is_where_brace_and_roller_are_in_line():
     assert first.low > turn[np.argmin(slider)]
 
 
-def test_rollers_on_a_cam_that_other_parts_run_on_are_found_in_two_steps(monkeypatch):
-    """Twice as many made sweeps of a cut cam two thirds slower than those of cams as designed."""
+def test_tracks_side_by_side_have_the_states_of_each():
     profile = assemble(cam()).track.profile
-    tracks = ManyTracks(profile, profile.roller_radius + np.linspace(-5e-5, 5e-5, 8), np.linspace(0.1998, 0.2002, 8))
-    rows = np.arange(8)
-    places = tracks.start + np.linspace(0.004, 0.23, 60)
-    calls = []
-    plain = ManyTracks._bent
-    monkeypatch.setattr(ManyTracks, "_bent", lambda self, u, rows: calls.append(u.shape) or plain(self, u, rows))
-    found = tracks.poses(places, rows)
-    assert calls.count(places.shape) == 2
-    one = Track(profile, float(tracks.radius[0]), float(tracks.brace[0])).states(places[0])
-    np.testing.assert_allclose(found.x[0], one.x, rtol=1e-14)
-    np.testing.assert_allclose(found.slope[0], one.slope, rtol=1e-13)
+    pairs = zip(profile.roller_radius + np.linspace(-5e-5, 5e-5, 8), np.linspace(0.1998, 0.2002, 8), strict=True)
+    tracks = [Track(profile, float(radius), float(brace)) for radius, brace in pairs]
+    together = TrackRows(tracks)
+    slider = together.start + np.linspace(0.0, 0.23, 60)
+    for some in (np.arange(8), np.array([5, 2])):
+        found = together.of_rows(some).states(slider[some])
+        for row, track in enumerate(some):
+            for one, own in zip(found.fields(), tracks[track].states(slider[track]).fields(), strict=True):
+                np.testing.assert_allclose(one[row], own, rtol=1e-14)

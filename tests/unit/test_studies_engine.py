@@ -9,7 +9,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import UsageError
 from cfmkit.families import family
-from cfmkit.families.base import BlockAnswer
+from cfmkit.families.cam.cams_in_rows import solve_rows
+from cfmkit.families.rows import FindingRule, Variants
 from cfmkit.results import Finding, Status
 from cfmkit.store import origin, safe_disk_changes
 from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
@@ -220,21 +221,27 @@ def test_the_table_names_the_warnings_of_each_point(tmp_path):
             assert (warnings(records), records.reused) == (expected, reused)
 
 
-def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(monkeypatch, tmp_path):
+def test_the_warnings_of_rows_are_theirs_and_those_of_single_analyses(monkeypatch, tmp_path):
     record = family("cam")
 
-    def block(spec, asked):
-        friction = asked.values["mechanism.profile.friction"]
-        values = tuple({"": np.zeros(asked.size)} for _ in asked.measures)
-        reported = {"high_pressure_angle": friction > 0.0015, "undercut": friction > 0.0005}
-        return BlockAnswer(friction < 0.0025, values, None, "force", reported)
+    def rows(variants):
+        friction = variants.values["mechanism.profile.friction"]
+        some = np.flatnonzero(friction < 0.0025)
+        for indices, solved in solve_rows(Variants(SPEC, {}, lambda _k: SPEC, len(some))):
+            own = friction[some[indices]]
+            rules = (
+                FindingRule("high_pressure_angle", lambda _solution, own=own: own > 0.0015, str),
+                FindingRule("undercut", lambda _solution, own=own: own > 0.0005, str),
+            )
+            yield some[indices], dataclasses.replace(solved, rules=rules)
 
     def single(spec, run):
         found = record.analyze(spec, run)
         return dataclasses.replace(found, warnings=(Finding("odd", "no matter"), Finding("odd", "again")))
 
-    fake = dataclasses.replace(record, models={"quasi-static": single}, analyze_block=block)
-    monkeypatch.setattr("cfmkit.studies.vectorised_blocks.family", lambda _name: fake)
+    fake = dataclasses.replace(record, models={"quasi-static": single}, rows=rows)
+    monkeypatch.setattr("cfmkit.studies.variants_in_rows.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.engine.are_solved_together", lambda *_: True)
     monkeypatch.setattr("cfmkit.studies.point_evaluation.family", lambda _name: fake)
     some = work("mechanism.profile.friction=[0, 0.001, 0.002, 0.003]", names=("theoretical_force",))
     expected = [None, "undercut", "high_pressure_angle; undercut", "odd"]
@@ -293,19 +300,6 @@ def test_a_journal_that_cannot_be_made_small_stays_as_it_is(tmp_path, monkeypatc
         monkeypatch.undo()
     assert path.read_bytes() == before
     assert [item.name for item in tmp_path.iterdir()] == ["journal"]
-
-
-def test_warnings_that_a_block_model_does_not_know_are_not_told_as_none(monkeypatch):
-    def block(spec, asked):
-        return BlockAnswer(np.arange(asked.size) < 1, tuple({"": np.zeros(asked.size)} for _ in asked.measures))
-
-    def single(spec, run):
-        return dataclasses.replace(family("cam").analyze(spec, run), warnings=())
-
-    fake = dataclasses.replace(family("cam"), models={"quasi-static": single}, analyze_block=block)
-    monkeypatch.setattr("cfmkit.studies.vectorised_blocks.family", lambda _name: fake)
-    monkeypatch.setattr("cfmkit.studies.point_evaluation.family", lambda _name: fake)
-    assert warnings(run(work(FRICTION, names=("theoretical_force",)))) == ["not_judged", None]
 
 
 def table(records):

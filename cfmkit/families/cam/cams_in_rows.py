@@ -1,8 +1,8 @@
 """Cams of a study as rows of solutions: those of one kind are solved together.
 
-Mechanisms whose values move neither the roller nor the brace on the cam (springs, friction, weights, the width of the
-contact) share one cam and its track, which is found once: they are numbers beside it. Others have a cam each, or a track
-of their own on it, and these stand side by side. Each cam is put together as that of a run is.
+Mechanisms that differ in what moves neither the roller nor the brace on the cam (springs, friction, weights, the width
+of the contact) share one cam and its track, which is found once. Others have a cam each, or a track of their own on it,
+and these stand side by side. Each cam is put together as that of a run is.
 
 What no rows have is analysed alone: motions, measured cams, drawn ones, envelopes, forces that follow a curve, whatever
 does not reach the end of the travel, and what cannot be built.
@@ -24,7 +24,6 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, prof
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
     check_first_pose,
-    displacement_origin,
     loads_of,
 )
 from cfmkit.families.cam.model import reached, shortfalls, solve

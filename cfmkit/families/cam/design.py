@@ -26,7 +26,6 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.mechanism_from_spec import (
-    CLOSE,
     assemble_sides,
     check_start,
     cut_profile,
@@ -36,6 +35,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     weights_of,
 )
 from cfmkit.families.cam.outline import plate_notes
+from cfmkit.families.cam.solution import CLOSE
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate

@@ -230,7 +230,7 @@ def _is_sunk(solution: Solution) -> Any:
 
 def _is_dead(solution: Solution) -> Any:
     unbounded = np.isnan(solution.up.slider[..., :1]) | np.isnan(solution.down.slider[..., :1])
-    return solution.column(_is_sunk(solution)) | solution.column(unbounded)
+    return np.logical_or(solution.column(_is_sunk(solution)), solution.column(unbounded))
 
 
 def _dead_point(solution: Solution) -> tuple[str, ...]:
@@ -276,7 +276,7 @@ def _overstretched(solution: Solution) -> tuple[str, ...]:
 def _slack_cable(way: Literal["up", "down"]) -> FindingRule[Solution]:
     # Springs that pull keep the rollers on the cam as long as nothing accelerates: the contact force is positive.
     def places(solution: Solution) -> NDArray[np.bool_]:
-        return (solution.elongation > 0) & (getattr(solution, way).slider <= 0)
+        return np.asarray((solution.elongation > 0) & (getattr(solution, way).slider <= 0))
 
     def message(solution: Solution) -> tuple[str, ...]:
         return (

@@ -26,14 +26,13 @@ from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
 from cfmkit.families.cam.mechanism_from_spec import (
-    CLOSE,
     assemble,
     check_first_pose,
     check_springs,
     displacement_origin,
 )
 from cfmkit.families.cam.scalar_results import QUANTITIES, contact_pressure, curve_cut_for
-from cfmkit.families.cam.solution import Assembly, DenseLoop, Solution, target_force
+from cfmkit.families.cam.solution import CLOSE, Assembly, DenseLoop, Solution, target_force
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result

@@ -51,9 +51,14 @@ class FlankSamples:
         if not leaves.any():
             return cls(solution, travel, there, states, solution.up, solution.down)
         (first, up), (_, down) = (solution.at_travel(corner, way, flank=True) for way in (1.0, -1.0))
-        pairs = ((first, states), (up, solution.up), (down, solution.down))
-        joined = (type(one)(*map(_behind, one.fields(), two.fields())) for one, two in pairs)
-        return cls(solution, _behind(corner, travel), _behind(leaves, there), *joined)
+        return cls(
+            solution,
+            _behind(corner, travel),
+            _behind(leaves, there),
+            TrackStates(*map(_behind, first.fields(), states.fields())),
+            Forces(*map(_behind, up.fields(), solution.up.fields())),
+            Forces(*map(_behind, down.fields(), solution.down.fields())),
+        )
 
     @property
     def pressure_angle(self) -> FloatArray:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly, Built, Solution
-    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Forces
 
 
@@ -285,14 +285,20 @@ def _corner_peak(solution: Solution) -> FloatArray:
 def _springs_in_use(solution: Solution) -> list[SpringInUse]:
     """Return a spring of each mechanism between its loads, the stiffest of unequal ones; one where all are alike."""
     springs, ends = solution.mechanism.springs, solution.elongation
-    wire = springs.wound
-    wound = None if wire is None else wire.wound("extension")
-    fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
     least, most = (
         np.ravel(springs.initial_tension * (end >= 0.0) + springs.stiffest * np.maximum(end, 0.0)).tolist()
         for end in (ends.min(axis=-1, keepdims=True), ends.max(axis=-1, keepdims=True))
     )
-    return [SpringInUse(wound, low, high, fatigue, springs.life) for low, high in zip(least, most, strict=True)]
+    stated = [one.spec.mechanism.springs for one in solution.cams] or [springs] * len(least)
+    least, most = (np.broadcast_to(one, len(stated)).tolist() for one in (least, most))
+    return [_in_use(*each) for each in zip(stated, least, most, strict=True)]
+
+
+def _in_use(springs: Springs, least: float, largest: float) -> SpringInUse:
+    wire = springs.wound
+    wound = None if wire is None else wire.wound("extension")
+    fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
+    return SpringInUse(wound, least, largest, fatigue, springs.life)
 
 
 def _wire(name: str) -> ScalarQuantity[Solution]:
@@ -393,11 +399,13 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result of a quasi-static cam as designed, in the order in which they are shown."""
 
-COLUMNS = QUANTITIES | {
-    name: ScalarQuantity[Any](*about, lambda _solution: np.nan, applies=lambda _solution: False)
+_OTHERS: dict[str, ScalarQuantity[Solution]] = {
+    name: ScalarQuantity(*about, lambda _solution: np.nan, applies=lambda _solution: False)
     for name, about in DEFINITIONS.items()
     if name not in QUANTITIES
 }
+
+COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {**QUANTITIES, **_OTHERS}
 """What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 

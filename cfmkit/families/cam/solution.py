@@ -125,7 +125,8 @@ class Solution(ShortRepr):
     @cached_property
     def elongation(self) -> FloatArray:
         """Elongation of the springs [m]."""
-        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width) - self.mechanism.springs.tension_stretch
+        opened: Any = self.mechanism.springs.tension_stretch
+        return np.asarray(2.0 * (self.states.x - self.assembly.loads.rest_half_width) - opened)
 
     @property
     def effort_error(self) -> Any:
@@ -295,14 +296,15 @@ class Solution(ShortRepr):
         motion, dense = (self._of_each(one) for one in (self.travel + self.origin, self.places))
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
-        target = target_force(self.assembly.spec, self.assembly)
+        design = self.assembly.spec.design  # forces that follow a curve are no rows
+        target = constant_force(self.assembly) if design is None else design.force
         return {
             name: CurveRows(
                 RowSamples(motion, self._of_each(state.slider), np.full(self.count, motion.shape[1])),
                 dense,
                 partial(self._effort_in_rows, name),
                 self.column(self.effort_error),
-                self.column(np.nan if target is None else target),
+                self.column(target),
                 self.assembly.spec.analysis.band,
                 valid,
                 partial(self._part_efforts_in_rows, name),
@@ -394,12 +396,12 @@ class DenseLoop(ShortRepr):
     @property
     def places(self) -> FloatArray:
         """Increasing displacements [m]."""
-        return self.solution.places[0]
+        return np.asarray(self.solution.places[0])
 
     @property
     def peaks(self) -> FloatArray:
         """Places all over the corner of an undercut cam [m]."""
-        return self.solution.peaks[0]
+        return np.asarray(self.solution.peaks[0])
 
     def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""

@@ -93,7 +93,7 @@ class Springs(Model):
     @property
     def tension_stretch(self) -> float:
         """Elongation at which springs without initial tension would pull as hard as these when they open [m]."""
-        if not self.initial_tension:
+        if not np.any(self.initial_tension):
             return 0.0
         count = len(self.each) if isinstance(self.each, tuple) else self.count or 1
         return count * self.initial_tension / self.total

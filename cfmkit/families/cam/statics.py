@@ -88,7 +88,7 @@ class Loads:
     @property
     def plain(self) -> bool:
         """Whether both sides are loaded alike, and nothing rubs but the rollers."""
-        return self.losses is None and not np.any(self.sideways)
+        return self.losses is None and not any(map(np.any, self.sideways))
 
 
 @dataclass(frozen=True, repr=False)
@@ -359,8 +359,8 @@ def jams(
         if rows.size:
             grid = np.broadcast_to(grid, held.shape)
             here, earlier, begins = grid[rows, at], grid[rows, np.maximum(at - 1, 0)], held[rows, at]
-            ends = (np.where(begins, one, other)[:, None] for one, other in ((earlier, here), (here, earlier)))
-            place = last_places(partial(_shortage, lever, rows), *ends)
+            moves, rests = np.where(begins, earlier, here)[:, None], np.where(begins, here, earlier)[:, None]
+            place = last_places(partial(_shortage, lever, rows), moves, rests)
             own = track.of_rows(rows)
             travel = list(own.stretches())[number].at(place)[0] - own.start
             for row, first, edge in zip(rows.tolist(), (at == 0).tolist(), travel[:, 0].tolist(), strict=True):

@@ -145,7 +145,8 @@ class _OdeHeight:
         if not np.size(x):
             return x
         if np.ndim(x) > 1:  # scipy's interpolant takes rows only
-            return np.reshape(self(np.ravel(x)), np.shape(x))
+            flat: Any = self(np.ravel(x)).reshape(np.shape(x))
+            return flat
         at, heights = self.knots
         step = np.clip(np.searchsorted(at, x), 1, len(at) - 1)
         y: Any = np.interp(x, at, heights)

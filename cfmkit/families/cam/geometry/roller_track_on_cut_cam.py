@@ -334,7 +334,7 @@ class Track:
         return np.interp(at, places, values)
 
     @cached_property
-    def _guide(self) -> tuple[float, FloatArray, FloatArray]:
+    def _guide(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """First estimates: a slider position, square roots of the travel from it, and path coordinates less ideal ones.
 
         The difference from the ideal profile is smooth and small, so that straight lines do.
@@ -375,10 +375,10 @@ class TrackRows(Track):
         first, profiles = tracks[0], [track.profile for track in tracks]
         numbers = {name: stacked([getattr(track, name) for track in tracks]) for name in _NUMBERS}
         alike = {name: getattr(first, name) for name in ("_is_shifted", "_follows_law", "_is_ideal", "turns_back")}
-        parts = zip(
+        stretches = zip(
             *([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True
         )
-        parts = tuple(stacked(list(part)) for part in parts)
+        parts = tuple(stacked(list(part)) for part in stretches)
         self._set(profiles_in_rows(profiles), numbers | alike | {"_parts": parts})
 
     def _set(self, profile: CamProfile, numbers: Mapping[str, Any]) -> None:
@@ -403,11 +403,13 @@ class TrackRows(Track):
 
     def stretches(self) -> Iterator[TrackStretch]:
         """Yield the parts of the tracks on which the slider rises; their ends are columns."""
-        for on_corner, low, high in self._parts:
+        for on_corner, low, high in vars(self)["_parts"]:
             yield TrackStretch(on_corner, low, high, self._corner_piece if on_corner else self._flank_piece)
 
     @staticmethod
     def _interpolated(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
+        if places.ndim == 1:  # what differs in these tracks does not move them
+            return np.interp(at, places, values)
         return np.stack([np.interp(*row) for row in zip(at, places, values, strict=True)])
 
 

@@ -1,0 +1,348 @@
+"""Many cams solved together have the numbers that a run of each has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.families.cam.cams_in_rows import solve_rows
+from cfmkit.families.rows import Variants
+from cfmkit.results import Status
+from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.engine import Work, run
+from cfmkit.studies.journal import Journal
+from cfmkit.studies.plan import Draw, sampled
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.row_blocks_for_journal import joined
+from cfmkit.studies.serial_and_cluster_executors import Lost
+from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+from cfmkit.studies.varied_axes import axes, wishes
+
+CLOSED = (
+    "cam", "cam_catalogue", "cam_friction", "cam_gravity", "cam_no_undercut", "cam_preloaded", "cam_six_springs",
+    "studies/cam_bought_parts", "studies/cam_radius_and_constant", "studies/cam_rest_length", "studies/cam_tolerance",
+)  # fmt: skip
+"""Configurations of cams that are moved slowly, for a constant force."""
+
+SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 61})
+
+RANGES = {
+    "mechanism.brace_length": "190 mm:400 mm",
+    "mechanism.rest_half_width": "20 mm:100 mm",
+    "mechanism.roller_radius": "-1 mm:30 mm",
+    "mechanism.rolling_friction": "0:0.004",
+    "mechanism.springs.stiffness": "0.3 N/mm:1 N/mm",
+    "mechanism.springs.count": [1, 2, 4],
+    "mechanism.profile.force_constant": "5 mm:16 mm",
+    "design.force": "40 N:60 N",
+}
+"""Some of these cams do not exist, some are jammed, some end early."""
+
+
+def config(stem):
+    return cfmkit.load(f"configs/{stem}.yaml")
+
+
+def work(spec=SPEC, ranges=RANGES, count=60, names=()):
+    """Return a study of points drawn in ranges, by default with every metric that a sweep notes."""
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", count))
+    return Work(Study(spec, plan.paths, metrics_of(spec, names, cfmkit.analyze(spec).curve)), plan)
+
+
+def drawn(spec, draw, count):
+    """Return a study in which up to three numbers of a specification vary at random about their own values."""
+    own = {
+        path: value
+        for path, value in spec.leaves()
+        if path.startswith(("mechanism.", "analysis.")) and isinstance(value, float) and value
+    }
+    chosen = draw.choice(sorted(own), draw.integers(1, 4), replace=False).tolist()
+    ranges = {path: (own[path] * draw.uniform(0.9, 1.1, count)).tolist() for path in chosen}
+    return Listed(spec, ranges)
+
+
+class Listed(Work):
+    """Points of a study, given one by one."""
+
+    def __init__(self, spec, values):
+        super().__init__(Study(spec, tuple(values), metrics_of(spec, (), cfmkit.analyze(spec).curve)), Points(values))
+
+
+class Points:
+    """A plan of given points."""
+
+    def __init__(self, values):
+        self.paths, self.columns = tuple(values), tuple(np.array(column) for column in values.values())
+
+    def __len__(self):
+        return len(self.columns[0])
+
+    def point(self, index):
+        return tuple(column[index].item() for column in self.columns)
+
+    def block(self, start, stop):
+        return tuple(column[start:stop] for column in self.columns)
+
+
+def members(many):
+    """Return which points of a study are rows of a solution, and have a complete curve."""
+    values = dict(zip(many.plan.paths, many.plan.block(0, len(many.plan)), strict=True))
+    variants = Variants(many.study.plain, values, lambda k: many.study.variant(many.plan.point(k)), len(many.plan))
+    with np.errstate(all="ignore"):
+        found = [indices[solved.complete] for indices, solved in solve_rows(variants)]
+    return set(np.concatenate([[], *found]).astype(int).tolist())
+
+
+def check_rows_against_single_runs(many, step=1):
+    """Compare rows of a study with a run of each of its points: status, message, warnings, requirements, numbers."""
+    study, plan = many.study, many.plan
+    together = evaluate_rows(study, plan, 0, len(plan))
+    sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
+    force, work = ([k for k, one in enumerate(study.metrics) if one.dimension == kind] for kind in ("force", "energy"))
+    sizes[force] = sizes[force].max(initial=0.0)  # a column may vanish: it is the difference of others
+    sizes[work] = np.maximum(sizes[work], 0.1 * sizes[force].max(initial=0.0))
+    for k in range(0, len(plan), step):
+        alone = study.evaluate(plan.point(k))
+        assert not alone.bug
+        assert together.status(k) == (alone.status, alone.message)
+        assert {name for name, mask in together.warned.items() if mask[k]} == set(alone.warnings), plan.point(k)
+        if not alone.values:
+            continue
+        own = np.array([np.nan if value is None else value for value in alone.values])
+        wrong = ~((np.abs(together.values[k] - own) <= 1e-12 * sizes) | (np.isnan(own) & np.isnan(together.values[k])))
+        found = [(study.names[m], together.values[k, m], own[m]) for m in np.flatnonzero(wrong)]
+        assert not found, dict(zip(plan.paths, plan.point(k), strict=True))
+        assert tuple(together.met[k].tolist()) == alone.met
+    return together
+
+
+@pytest.mark.parametrize("stem", ["cam", "cam_friction", "cam_gravity", "studies/cam_tolerance"])
+def test_a_row_of_a_study_is_a_run_of_its_own(stem):
+    """Whatever is varied, with every metric that a sweep notes."""
+    check_rows_against_single_runs(drawn(config(stem), np.random.default_rng(7), 4))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("stem", CLOSED)
+def test_every_row_of_a_study_is_a_run_of_its_own(stem, number):
+    spec = config(stem)
+    if number % 2:
+        spec = spec.replace({"analysis.window": ("11 %", "78.3 %"), "design": None})
+    if number % 3 == 2:
+        spec = spec.replace({"analysis.points": 41})
+    check_rows_against_single_runs(drawn(spec, np.random.default_rng(100 + number + 10 * CLOSED.index(stem)), 4))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"analysis.window": None},
+        {"mechanism.rolling_friction": 0.0},
+        {"analysis.window": ("3.3 mm", "151 mm"), "design": None},
+    ],
+)
+def test_rows_of_cams_that_may_not_exist_or_jam_are_runs_of_their_own(change):
+    spec = SPEC.replace(change)
+    ranges = {k: v for k, v in RANGES.items() if k not in change and not (spec.design is None and k == "design.force")}
+    many = work(spec, ranges)
+    assert many.vectorised
+    together = check_rows_against_single_runs(many)
+    assert {status for status, _ in together.odd.values()} >= {Status.INVALID, Status.NO_EQUILIBRIUM}
+    assert len(members(many)) > 15
+
+
+HEAVY = {
+    "mechanism.masses": {"slider": "0.068 kg", "brace": "0.077 kg", "roller": "0.38 kg"},
+    "analysis.gravity": True,
+}
+LEANING = {
+    "mechanism.masses": HEAVY["mechanism.masses"],
+    "mechanism.mounting": {"elevation": "20 deg", "roll": "5 deg"},
+}
+RUBBING = {
+    "mechanism.pins": {"diameter": "6 mm", "friction": 0.1},
+    "mechanism.bearings": {"bore": "8 mm", "friction": 0.0015, "dynamic_rating": "3300 N", "static_rating": "60 N"},
+    "mechanism.guide": {"friction": 0.05, "drag": "0.1 N"},
+}
+PRESSED = {"mechanism.contact": {"width": "8 mm"}}
+SHARES = {
+    "analysis.window": ("2 mm", "100 %"),
+    "requirements": [
+        {"metric": "deviation_from_target", "max": "5 %", "over": ("2.1 %", "97.7 %")},
+        {"metric": "band_range_1pct", "min": "100 mm", "over": ("10 %", "180 mm")},
+        {"metric": "force_mean[load]", "min": "49.6 N", "max": "51.8 N", "over": ("5 mm", "235 mm")},
+    ],
+}
+AROUND = {
+    "mechanism.rest_half_width": "67 mm:69 mm",
+    "mechanism.roller_radius": "15.5 mm:16.5 mm",
+    "mechanism.brace_length": "199 mm:201 mm",
+    "mechanism.rolling_friction": "0:0.01",
+}
+BARE = {"mechanism.roller_radius": "8 mm", "mechanism.profile.roller_radius": "8 mm"}
+SMALL = AROUND | {"mechanism.roller_radius": "7.5 mm:8.5 mm"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "ranges"),
+    [
+        ({}, {"mechanism.springs.stiffness.0": "0.65 N/mm:0.73 N/mm"}),
+        (PRESSED, AROUND | {"mechanism.contact.width": "6 mm:10 mm"}),
+        (HEAVY | PRESSED, AROUND | {"mechanism.masses.roller": "0.2 kg:0.5 kg"}),
+        (HEAVY, {"mechanism.masses.roller": "0 kg:0.5 kg", "mechanism.springs.stiffness.1": "0.6 N/mm:0.7 N/mm"}),
+        (LEANING, AROUND | {"mechanism.mounting.elevation": "10 deg:30 deg"}),
+        (RUBBING, {"mechanism.bearings.bore": "6 mm:10 mm", "mechanism.guide.drag": "0.1 N:1 N"}),
+        (RUBBING | SHARES, AROUND),
+        ({"analysis.travel": None} | SHARES, AROUND),
+        (BARE, SMALL),
+        (BARE | HEAVY, SMALL),
+        (BARE, {"mechanism.rolling_friction": "0:0.01"}),
+        (BARE | {"mechanism.profile.friction": 0.002}, {"mechanism.rolling_friction": "0:0.01"}),
+        (HEAVY | {"mechanism.profile.slope_factor": 1.05}, AROUND),
+        (PRESSED | {"mechanism.profile.offset": "-0.1 mm"}, AROUND),
+        ({"mechanism.profile.offset": "0.1 mm", "analysis.origin": "slider-from-cam"}, AROUND),
+        ({"mechanism.stops": {"lower": "5 mm", "upper": "100 mm"}, "analysis.travel": None, "requirements": []},
+         {"mechanism.stops.upper": "90 mm:110 mm"}),
+        ({"mechanism.springs.preload": "60 mm"}, {"mechanism.springs.preload": "50 mm:70 mm"}),
+        ({"analysis.path_method": "ode"}, {"mechanism.springs.stiffness.0": "0.65 N/mm:0.73 N/mm"}),
+        ({}, {"mechanism.brace_length": "190 mm:260 mm", "mechanism.rolling_friction": "0:0.1"}),
+    ],
+    ids=(
+        "springs", "contact", "weights", "masses", "leaning", "rubbing", "rubbing shares", "stroke", "bare", "heavy",
+        "jams", "friction", "carrying", "missing", "left", "stops", "stretched", "ode", "wide",
+    ),
+)  # fmt: skip
+def test_rows_around_a_cut_cam_are_runs_of_their_own(changes, ranges):
+    many = work(config("studies/cam_tolerance").replace(changes), ranges, 8)
+    assert many.vectorised
+    check_rows_against_single_runs(many)
+    assert len(members(many)) >= 4
+
+
+@pytest.mark.parametrize("stem", CLOSED)
+def test_a_sweep_over_any_number_with_the_requirements_of_its_own_is_solved_in_rows(stem):
+    spec = config(stem)
+    for path, value in spec.leaves():
+        if path.startswith("mechanism.") and isinstance(value, float) and value and ".wound." not in path:
+            plan = Points({path: np.array([value, value * (1 + 1e-4 if "_factor" in path else 1 - 1e-4)])})
+            assert are_solved_together(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan), path
+
+
+def test_whoever_runs_on_a_corner_is_a_row_too():
+    many = Listed(SPEC, {"mechanism.roller_radius": [0.0100, 0.0103, 0.0104, 0.0160, 0.0300]})
+    assert len(members(many)) == 5
+    rows = check_rows_against_single_runs(many)
+    corner, peak = (rows.values[:, many.study.names.index(name)] for name in ("undercut_travel", "corner_force_max"))
+    assert corner[:2].tolist() == [0.0, 0.0]
+    assert (np.diff(corner[1:]) > 0).all()
+    # Just undercut, friction holds the roller on its corner, and there is no largest force.
+    assert np.isnan(peak).tolist() == [True, True, True, False, False]
+
+
+def test_rollers_that_overlap_are_analysed_alone():
+    many = Listed(SPEC, {"mechanism.roller_radius": [0.067, 0.068, 0.0681, 0.150]})
+    assert members(many) == {0, 1}
+    assert [evaluate_rows(many.study, many.plan, 0, 4).status(k)[0] for k in (2, 3)] == [Status.NO_EQUILIBRIUM] * 2
+
+
+def test_rows_warn_of_what_each_cam_warns_of():
+    spec = SPEC.replace({"mechanism.springs.max_elongation": "130 mm"})
+    ranges = RANGES | {"mechanism.rolling_friction": "0:0.3", "mechanism.profile.force_constant": "5 mm:30 mm"}
+    rows = check_rows_against_single_runs(work(spec, ranges, 64, ("force_mean",)))
+    assert set(rows.warned) >= {"undercut", "up_jam", "spring_overstretched", "slack_cable"}
+
+
+def test_motions_measured_cams_and_forces_that_follow_a_curve_are_analysed_alone():
+    for stem in ("cam_dynamics", "cam_as_built", "cam_balance"):
+        spec = config(stem)
+        values = {"mechanism.brace_length": np.full(2, spec.mechanism.brace_length)}
+        assert not list(solve_rows(Variants(spec, values, lambda _k, spec=spec: spec, 2))), stem
+
+
+def test_designing_is_done_point_by_point():
+    many = work(count=4, names=("force_mean",))
+    assert not are_solved_together(Study(SPEC, many.plan.paths, many.study.metrics, design=True), many.plan)
+
+
+def test_rows_do_not_depend_on_how_a_study_is_cut_into_blocks():
+    many = work(count=41)
+    whole = evaluate_rows(many.study, many.plan, 0, 41)
+    parts = joined([evaluate_rows(many.study, many.plan, k, min(k + 13, 41)) for k in range(0, 41, 13)])
+    np.testing.assert_allclose(whole.values, parts.values, rtol=1e-9, atol=1e-12)
+    assert (whole.met.tolist(), whole.odd) == (parts.met.tolist(), parts.odd)
+
+
+def test_rows_are_the_same_whether_curves_are_wanted_or_not(tmp_path):
+    plain = work(count=20, names=("force_mean", "usable_stroke"))
+    kept = Work(Study(SPEC, plain.plan.paths, plain.study.metrics, curves=True), plain.plan)
+    assert kept.vectorised
+    without = evaluate_rows(plain.study, plain.plan, 0, 20)
+    for _ in range(2):
+        with Journal(tmp_path / "journal") as journal:
+            (rows,) = [rows for _, rows in run(kept, journal=journal).batches()]
+        assert np.array_equal(rows.values, without.values, equal_nan=True)
+        assert rows.odd == without.odd
+        alone = {k: kept.study.evaluate(kept.plan.point(k)).curve for k in range(20)}
+        assert rows.curves == {k: curve for k, curve in alone.items() if curve}
+
+
+def test_blocks_are_noted_and_reused_whole(tmp_path):
+    ranges = {"mechanism.springs.stiffness": "0.3 N/mm:1 N/mm"}
+    many = work(ranges=ranges, count=5000, names=("force_mean", "force_ripple"))
+    with Journal(tmp_path / "journal") as journal:
+        first = np.concatenate([rows.values for _, rows in run(many, journal=journal).batches()])
+    with Journal(tmp_path / "journal") as journal:
+        # blocks of 64: their size is a power of two, so that a study with a few more points has the same ones
+        assert len(journal) == 79
+        again = run(many, journal=journal)
+        assert again.reused == 5000
+        assert again.work.step == 64
+        assert np.array_equal(np.concatenate([rows.values for _, rows in again.batches()]), first, equal_nan=True)
+        assert np.array_equal(again.row(4999).values[0], first[4999], equal_nan=True)
+
+
+def test_a_block_that_is_lost_costs_only_the_points_that_are_lost_alone():
+    many = work(count=40, names=("force_mean",))
+
+    def losing(work, jobs, _stopping):
+        for job in jobs:
+            lost = job.stop - job.start > 1 or job.start == 7
+            yield job, Lost(Status.CRASHED, "it died") if lost else work(job)
+
+    together, alone = run(many, losing), run(many)
+    assert together.finished == 40
+    assert together.row(7).status(0) == (Status.CRASHED, "it died")
+    for k in set(range(40)) - {7}:
+        assert np.allclose(together.row(k).values, alone.row(k).values, rtol=1e-12, equal_nan=True)
+
+
+def test_shares_of_the_travel_are_those_of_each_stroke():
+    shares = {"analysis.window": ("1 %", "95 %"), "requirements": []}
+    many = work(SPEC.replace(shares), {"mechanism.profile.stroke": "150 mm:245 mm"}, 8)
+    assert len(members(many)) == 8
+    check_rows_against_single_runs(many)
+
+
+def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_refuses_it():
+    spec = config("studies/cam_tolerance").replace(
+        {"analysis.travel": None, "analysis.window": ("240 mm", "100 %"), "requirements": []}
+    )
+    ranges = {"mechanism.springs.stiffness.0": "0.65 N/mm:0.73 N/mm"}
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 4))
+    many = Work(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan)
+    assert {run(many).row(k).status(0) for k in range(4)} == {
+        (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))
+    }
+
+
+def test_forces_on_the_corner_of_an_undercut_cam_do_not_depend_on_the_number_of_points():
+    found = []
+    for points in (13, 301, 3001):
+        result = cfmkit.analyze(SPEC.replace({"analysis.points": points, "analysis.window": None}))
+        metrics = cfmkit.metrics.evaluate(result, ["force_max[load]", "force_max[unload]", "corner_force_max"])
+        found.append([quantity.value for quantity in metrics.values()])
+    np.testing.assert_allclose(found, np.broadcast_to(found[-1], (3, 3)), rtol=1e-10)
+    assert found[0][0] == pytest.approx(found[0][2], rel=1e-12)
