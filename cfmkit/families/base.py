@@ -17,46 +17,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.curves import Kind
     from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.rows import SolvedRows
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
     from cfmkit.specs.spec import Spec
-    from cfmkit.specs.units import Ends
-
-
-@dataclass(frozen=True)
-class Measure:
-    """One number requested of each design of a block: a metric over a window, or a value of the family."""
-
-    name: str  # ``force_ripple``, ``theoretical_force``; never with a branch in brackets
-    # ends of the window [m or rad], or shares of each variant's own travel, where the family's blocks take them
-    # (`Family.block_shares`); None: the full travel
-    window: Ends | None = None
-
-
-@dataclass(frozen=True)
-class Block:
-    """Many variants of one specification, and what is to be known about each."""
-
-    values: Mapping[str, NDArray[Any]]  # dotted path -> SI value in each variant; words and whole numbers as they are
-    measures: tuple[Measure, ...]  # what is requested
-    size: int  # n
-
-
-@dataclass(frozen=True)
-class BlockAnswer:
-    """Answer of a vectorised model about a block."""
-
-    done: NDArray[Any]  # (n,) the variants that it solved completely; all others are analysed one by one
-    # for each measure: branch -> (n,) array of SI values, NaN where undefined. What is no matter of one branch stands
-    # under the name "" alone
-    values: tuple[Mapping[str, FloatArray], ...]
-    target: FloatArray | None = None  # (n,) force or torque that each curve should have [N or N m]
-    kind: Kind | None = None  # whether the curves are of force or of torque; None: what the names of the metrics imply
-    # name of a finding -> the variants whose analysis would warn of it; None: the model does not know
-    warnings: Mapping[str, NDArray[Any]] | None = None
 
 
 @dataclass(frozen=True)
@@ -220,14 +185,9 @@ class Family:
     # for values of the dimension ``text``: name -> the words that the value is an index into
     words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     resolve: Callable[[Any], Any] | None = None  # ``resolve(spec) -> spec`` with every derived part written out
-    # ``analyze_block(spec, block) -> answer``: many variants of a specification at once; None if the model cannot
-    # vary these paths or measure these metrics
-    analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
-    # ``rows(specs) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
-    # (`cfmkit.families.rows`); it takes the place of `analyze_block`
-    rows: Callable[[Sequence[Any]], Iterator[tuple[NDArray[Any], SolvedRows[Any]]]] | None = None
-    # whether `analyze_block` takes windows whose ends are shares of the travel, which each variant has of its own
-    block_shares: bool = False
+    # ``rows(variants) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
+    # (`cfmkit.families.rows`)
+    rows: Callable[[Any], Iterator[tuple[NDArray[Any], SolvedRows[Any]]]] | None = None
     # ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those metrics (over the
     # window of the analysis) and paths that the family knows; `local` asks for it
     gradient: Callable[[Any, Sequence[str]], Any] | None = None

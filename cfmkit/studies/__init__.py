@@ -3,7 +3,7 @@
 A study sees a specification, dotted paths and names of metrics; it knows no family.
 
 `variable_paths` and `varied_axes` say what may vary and how, `plan` enumerates the points,
-`point_evaluation` evaluates one of them, `vectorised_blocks` many at once where the model is vectorised,
+`point_evaluation` evaluates one of them, `variants_in_rows` many at once where the family solves them together,
 `serial_and_cluster_executors` and `pool` are ways to get that done, `journal` and `row_blocks_for_journal`
 remember what is finished, `engine` puts these together, `choose_metrics_to_note` names what is
 noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` is the study that

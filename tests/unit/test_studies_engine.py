@@ -60,10 +60,11 @@ def test_a_bug_is_a_crashed_row_with_its_traceback_and_is_not_kept(monkeypatch, 
             raise ZeroDivisionError("oops")
         return record.analyze(spec, run)
 
-    monkeypatch.setattr(
-        "cfmkit.studies.point_evaluation.family",
-        lambda _name: dataclasses.replace(record, models={"quasi-static": broken}),
-    )
+    for module in ("point_evaluation", "variants_in_rows"):
+        monkeypatch.setattr(
+            f"cfmkit.studies.{module}.family",
+            lambda _name: dataclasses.replace(record, models={"quasi-static": broken}, rows=None),
+        )
     with Journal(tmp_path / "journal") as journal:
         records = run(work(FRICTION), journal=journal)
         assert statuses(records) == [Status.COMPLETE, Status.CRASHED]
@@ -354,7 +355,7 @@ def test_a_stopped_study_has_the_rows_that_were_finished():
         def stopping(self):
             return self.count >= 3
 
-    records = run(work("mechanism.profile.friction=0:0.001:11"), monitor=Soon())
+    records = run(work("mechanism.springs.max_elongation=90 mm:100 mm:11", design=True), monitor=Soon())
     assert records.finished == 3
     assert [index.tolist() for index, _ in records.batches()] == [[0, 1, 2]]
 
