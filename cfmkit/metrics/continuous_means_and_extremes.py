@@ -110,7 +110,8 @@ def extremes(
         found = np.where(np.isfinite(found), found, -np.inf)
         counts = few[:, None] if number else True  # of many samples one parabola is enough
         best = np.where(counts, np.maximum(best, found.max(axis=-1)), best)
-        x, y = _around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
+        if number < rounds - 1:
+            x, y = _around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
     curved = end >= 2
     return np.where(curved, best[:, 0], top), np.where(curved, -best[:, 1], bottom)
 

@@ -208,7 +208,9 @@ class RowsInWindow:
     @cached_property
     def many(self) -> ManyWindows:
         """Mean, extremes and deviation."""
-        return ManyWindows(self.inside.motion, self.inside.values, self._extremes, self.curves.error, self.inside.count)
+        inside = self.inside
+        points = None if (inside.count == inside.motion.shape[1]).all() else inside.count
+        return ManyWindows(inside.motion, inside.values, self._extremes, self.curves.error, points)
 
     @cached_property
     def branches(self) -> ManyBranches:

@@ -19,7 +19,17 @@ from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families import origin as family_origin
 from cfmkit.families.run_control import Run
-from cfmkit.metrics import check, evaluate, gaps, other_name, split_name, values_of_family, window_of, windows_judged
+from cfmkit.metrics import (
+    check,
+    evaluate,
+    gaps,
+    metrics_by_name,
+    other_name,
+    split_name,
+    values_of_family,
+    window_of,
+    windows_judged,
+)
 from cfmkit.results import Result, Status
 from cfmkit.specs.data_file_paths import named_in
 from cfmkit.specs.units import to_border
@@ -27,8 +37,10 @@ from cfmkit.store import file_hash, origin, stable_hash
 from cfmkit.studies.serial_and_cluster_executors import lost_to
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
+    from cfmkit.curves import Kind
+    from cfmkit.metrics import Definition
     from cfmkit.metrics.metric_values import Surveys
     from cfmkit.results import Design, Quantity
     from cfmkit.specs.spec import Spec
@@ -110,6 +122,16 @@ class Study:
             return None
         names = {split_name(one)[0] for one in (*self.names, *(one.metric for one in self.spec.part_requirements))}
         return frozenset({*names, *map(other_name, names)})
+
+    def definitions(self, kind: Kind) -> Mapping[str, Definition]:
+        """Return every metric of curves of a kind and every value of the family, by name."""
+        if kind not in self._definitions:
+            self._definitions[kind] = metrics_by_name(kind, values_of_family(family(self.spec.family).values))
+        return self._definitions[kind]
+
+    @cached_property
+    def _definitions(self) -> dict[Kind, Mapping[str, Definition]]:
+        return {}
 
     def reported(self, column: int, value: float) -> float | str | None:
         """Return a metric's value as files say it: in the border unit, or a word; None if there is none."""

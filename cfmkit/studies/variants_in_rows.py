@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.rows import Variants
-from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
+from cfmkit.metrics import other_name, split_name
 from cfmkit.metrics.branches_cut_to_window import TOLERANCE
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
@@ -61,6 +61,7 @@ class SolvedVariants:
         """Read nothing yet."""
         self.study, self.variants, self.members, self.solved = study, variants, rows, solved
         self._values: dict[tuple[str, Ends | None], ByBranch | None] = {}
+        self._windows: dict[Ends | None, tuple[FloatArray, FloatArray] | None] = {}
 
     def __len__(self) -> int:
         """Return the number of variants."""
@@ -94,9 +95,10 @@ class SolvedVariants:
 
     def _window(self, over: Ends | None) -> tuple[FloatArray, FloatArray] | None:
         """Return the window of a metric: its own, else that of the analysis."""
-        if over is not None:
-            return self._places([over])
-        return self._places([getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs])
+        if over not in self._windows:
+            own = [getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs]
+            self._windows[over] = self._places(own if over is None else [over])
+        return self._windows[over]
 
     @cached_property
     def usable(self) -> NDArray[np.bool_]:
@@ -138,10 +140,9 @@ class SolvedVariants:
         """True if rows have every column of the study."""
         return all(self.values(split_name(name)[0], over) is not None for name, over in self._asked)
 
-    @cached_property
+    @property
     def _definitions(self) -> Mapping[str, Definition]:
-        kind = next(iter(self.solved.branches.values())).kind
-        return metrics_by_name(kind, values_of_family(family(self.study.spec.family).values))
+        return self.study.definitions(next(iter(self.solved.branches.values())).kind)
 
     def rows(self) -> ResultRows:
         """Return what the study notes of the variants, as if all of them were usable."""
@@ -168,6 +169,8 @@ class SolvedVariants:
         by_branch = self._by_branch(plain, over)
         if branch is not None:
             return by_branch.get(branch, np.full(len(self), np.nan))
+        if len(by_branch) == 1:
+            return next(iter(by_branch.values()))
         stack = np.stack(list(by_branch.values()))
         target = next(iter(self.solved.branches.values())).target
         chosen = worst_branch(self._definitions[plain].worst, stack, None if np.isnan(target).any() else target)

@@ -56,8 +56,8 @@ class FlankSamples:
             _behind(corner, travel),
             _behind(leaves, there),
             TrackStates(*map(_behind, first.fields(), states.fields())),
-            Forces(*map(_behind, up.fields(), solution.up.fields())),
-            Forces(*map(_behind, down.fields(), solution.down.fields())),
+            _forces_behind(up, solution.up),
+            _forces_behind(down, solution.down),
         )
 
     @property
@@ -85,6 +85,13 @@ class FlankSamples:
         return largest_of_each(np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan))
 
 
+def _forces_behind(first: Forces, rest: Forces) -> Forces:
+    def inside() -> tuple[FloatArray, FloatArray]:
+        return _behind(first.contact, rest.contact), _behind(first.brace, rest.brace)
+
+    return Forces(_behind(first.slider, rest.slider), inside)
+
+
 def _behind(first: Any, rest: Any) -> Any:
     """Return (..., 1) and (..., n) as (..., n + 1)."""
     shape = np.broadcast_shapes(np.shape(first)[:-1], rest.shape[:-1])
@@ -106,8 +113,14 @@ def extreme_next_to(
     return np.where(number > 0, top, np.nan)[:, None], np.take_along_axis(travel, highest, axis=1)
 
 
+def _largest(values: FloatArray) -> FloatArray:
+    most = np.fmax.reduce(values, axis=-1, keepdims=True, initial=-np.inf)
+    if np.isposinf(most).any():
+        most = np.where(np.isfinite(values), values, -np.inf).max(axis=-1, keepdims=True, initial=-np.inf)
+    return np.asarray(most)
+
+
 def largest_of_each(*arrays: FloatArray) -> FloatArray:
     """Return the largest finite value of each row of all arrays, (..., 1); NaN where there is none."""
-    finite = (np.where(np.isfinite(one), one, -np.inf) for one in arrays)
-    found = reduce(np.maximum, (one.max(axis=-1, keepdims=True, initial=-np.inf) for one in finite))
+    found = reduce(np.maximum, map(_largest, arrays))
     return np.where(np.isfinite(found), found, np.nan)

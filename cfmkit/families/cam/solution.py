@@ -6,7 +6,7 @@ Values are computed when they are first read; figures, findings and results impo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,10 +129,15 @@ class Solution(ShortRepr):
         return np.asarray(2.0 * (self.states.x - self.assembly.loads.rest_half_width) - opened)
 
     @property
+    def _ways(self) -> tuple[Forces, ...]:
+        """Up and down; one where they are alike."""
+        return (self.up,) if self.up is self.down else (self.up, self.down)
+
+    @cached_property
     def effort_error(self) -> Any:
         """Rounding of the sum of springs and weights on the slider [N]."""
         weight = self.assembly.loads.slider_weight
-        most = largest_of_each(*(np.abs(one.slider - weight) + np.abs(weight) for one in (self.up, self.down)))
+        most = reduce(np.maximum, (largest_of_each(np.abs(one.slider - weight)) for one in self._ways)) + np.abs(weight)
         return ROUND_OFF * (np.nan_to_num(most) if self.count > 1 else float(np.nan_to_num(most)[0]))
 
     @cached_property
@@ -198,29 +203,23 @@ class Solution(ShortRepr):
             return found
         is_looked_at = np.isnan(self.up.slider).any(axis=-1) | (self.travel.shape[-1] < FEW)
         is_looked_at = np.broadcast_to(is_looked_at, self.count)
+        total = self.column(self.travel[..., -1:])
         for states, some in ((None, ~is_looked_at), (self.states, is_looked_at)):
             rows, track, parts = np.flatnonzero(some), self.assembly.track, (friction, states, losses)
             if not len(rows):
                 continue
-            if self._jam_alike:
-                known = jams(track, friction, states) * len(rows)
-            elif len(rows) == self.count:
-                known = jams(track, *parts, self.count)
+            if losses is None and not np.ndim(friction) and not isinstance(track, TrackRows):
+                # springs and weights do not change leverage
+                (own,) = jams(track, friction, states)
+                known = [_within(own, float(total[0]))] * len(rows)
             else:
-                known = jams(track.of_rows(rows), *rows_of(parts, rows), len(rows))
+                if len(rows) < self.count:
+                    track, parts = track.of_rows(rows), rows_of(parts, rows)
+                each = zip(jams(track, *parts, len(rows)), total[rows].tolist(), strict=True)
+                known = [_within(own, end) for own, end in each]
             for row, own in zip(rows.tolist(), known, strict=True):
                 found[row] = own
-        total = self.column(self.travel[..., -1:]).tolist()
-        return [
-            own and tuple((max(low, 0.0), min(high, end)) for low, high in own if low < end)
-            for own, end in zip(found, total, strict=True)
-        ]
-
-    @property
-    def _jam_alike(self) -> bool:
-        """Whether leverage is the same in all: springs and weights do not change it."""
-        alone = self.assembly.loads.losses is None and not np.ndim(self.mechanism.rolling_friction)
-        return alone and not isinstance(self.assembly.track, TrackRows)
+        return found
 
     @property
     def jam_travel(self) -> FloatArray:
@@ -339,6 +338,11 @@ class Solution(ShortRepr):
             return np.broadcast_to(self.stress(name, places, rows), places.shape)
 
         return StressRows(read, at, self.column(np.nan if allowable is None else allowable))
+
+
+def _within(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[float, float], ...]:
+    """Return intervals as far as the travel goes [m]."""
+    return tuple((max(low, 0.0), min(high, end)) for low, high in jams if low < end)
 
 
 WAYS = {"load": 1.0, "unload": -1.0}

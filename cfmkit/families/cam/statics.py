@@ -29,7 +29,7 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -91,24 +91,34 @@ class Loads:
         return self.losses is None and not any(map(np.any, self.sideways))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Forces(ShortRepr):
     """Forces on one branch, each (n,) or (m, n): on the slider, at a contact, in a brace [N].
 
-    NaN where no finite force holds the mechanism (a jam, or a dead point under load). Where the sides are loaded
-    differently `contact` and `brace` are the larger of both and `least_contact` is the smaller; `lost` is what each
-    kind of friction takes from the force on the slider: rolling, bearings, pins, guide.
+    Those inside (`inside` returns contact and brace) are computed when they are first read. NaN where no finite force
+    holds the mechanism (a jam, or a dead point under load). Where the sides are loaded differently `contact` and
+    `brace` are the larger of both and `least_contact` is the smaller; `lost` is what each kind of friction takes from
+    the force on the slider: rolling, bearings, pins, guide.
     """
 
     slider: FloatArray
-    contact: FloatArray
-    brace: FloatArray
+    inside: Callable[[], tuple[FloatArray, FloatArray]]
     least_contact: FloatArray | None = None
     lost: dict[str, FloatArray] | None = None
 
-    def fields(self) -> tuple[FloatArray, ...]:
-        """Return the arrays that all mechanisms have, in the order in which the class takes them."""
-        return self.slider, self.contact, self.brace
+    @cached_property
+    def _inside(self) -> tuple[FloatArray, FloatArray]:
+        return self.inside()
+
+    @property
+    def contact(self) -> FloatArray:
+        """Force at a contact [N]."""
+        return self._inside[0]
+
+    @property
+    def brace(self) -> FloatArray:
+        """Force in a brace [N]."""
+        return self._inside[1]
 
 
 def load_on_slider(turn: Real, slope: Real, friction: Any, spring: Real, weight: Any = None) -> Real:
@@ -171,21 +181,29 @@ def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -
     turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
     pull = over(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever)
-    contact = over(load_on_contact(slope, tangent, spring, weight), lever)
     at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
     idle = at_rest & (np.abs(lever) < 1e-13)
-    if idle.any() and weight is None:
+    is_limit = bool(idle.any()) and weight is None
+    if is_limit:
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
         with np.errstate(divide="ignore", invalid="ignore"):
-            limit = at_dead_point(slope, states.bend, parts, friction)
-            pressed = load_on_contact(slope, tangent, 0.5 * limit) / turn
-        pull, contact = np.where(idle, limit, pull), np.where(idle, pressed, contact)
-    return Forces(pull + loads.slider_weight, contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent))
+            pull = np.where(idle, at_dead_point(slope, states.bend, parts, friction), pull)
+
+    def inside() -> tuple[FloatArray, FloatArray]:
+        contact = over(load_on_contact(slope, tangent, spring, weight), lever)
+        if is_limit:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                contact = np.where(idle, load_on_contact(slope, tangent, 0.5 * pull) / turn, contact)
+        return contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent)
+
+    return Forces(pull + loads.slider_weight, inside)
 
 
 def over(load: FloatArray, lever: FloatArray) -> FloatArray:
     """Return load / lever; 0 for nothing over anything, NaN where there is no leverage to move the load."""
     moves = lever > 0
+    if moves.all():
+        return np.asarray(load / lever)
     force = load / np.where(moves, lever, 1.0)
     return np.where(moves | (load == 0), force, np.nan)
 
@@ -303,8 +321,7 @@ def _forces_with_losses(states: TrackStates, loads: Loads, rolling: Any, way: fl
     guided = losses.guide.force(free, right.across - left.across + loads.sideways[1], loads.off_plane, way)
     return Forces(
         guided,
-        np.maximum(right.contact, left.contact),
-        np.maximum(np.abs(right.axial), np.abs(left.axial)),
+        lambda: (np.maximum(right.contact, left.contact), np.maximum(np.abs(right.axial), np.abs(left.axial))),
         np.minimum(right.contact, left.contact),
         _lost(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
     )
