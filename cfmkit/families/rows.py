@@ -160,6 +160,8 @@ class Variants(Sequence[Any]):
         By dotted path, SI.
     make : callable
         Returns the specification of one of them, by its index.
+    size : int
+        Number of variants.
     """
 
     def __init__(self, spec: Any, values: Mapping[str, NDArray[Any]], make: Callable[[int], Any], size: int) -> None:

@@ -333,13 +333,13 @@ def test_pictures_are_drawn(tmp_path):
     assert all(draw().axes for draw in figures(found).values())
 
 
-def test_the_model_for_many_variants_leaves_measured_cams_to_this_one(tmp_path):
-    from cfmkit.families.base import Block, Measure
-    from cfmkit.families.cam.many_designs.model import analyze_block
+def test_measured_cams_are_no_rows(tmp_path):
+    from cfmkit.families.cam.cams_in_rows import solve_rows
+    from cfmkit.families.rows import Variants
 
     write(tmp_path, measured())
-    block = Block({"mechanism.rolling_friction": np.array([0.001, 0.002])}, (Measure("force_ripple", None),), 2)
-    assert analyze_block(spec_of(tmp_path), block) is None
+    spec, values = spec_of(tmp_path), {"mechanism.rolling_friction": np.array([0.001, 0.002])}
+    assert not list(solve_rows(Variants(spec, values, lambda _k: spec, 2)))
 
 
 def test_a_study_knows_a_data_file_by_its_content(tmp_path):

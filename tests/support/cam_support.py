@@ -15,7 +15,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.specs.spec import frozen
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.solution import Assembly
+    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.results import Design, Result
 
 MM = 1e-3

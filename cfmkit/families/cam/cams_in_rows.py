@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.families.cam.solution import Assembly, Solution
+    from cfmkit.families.cam.assembly import Assembly
+    from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.rows import Variants
 

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.cam.assembly import CLOSE
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
@@ -35,7 +36,6 @@ from cfmkit.families.cam.mechanism_from_spec import (
     weights_of,
 )
 from cfmkit.families.cam.outline import plate_notes
-from cfmkit.families.cam.solution import CLOSE
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.clearance import nearest_pairs
 from cfmkit.families.cam.part_positions_for_pictures import (
     moment,
@@ -18,7 +19,6 @@ from cfmkit.families.cam.part_positions_for_pictures import (
     start_curve,
     swallowtail,
 )
-from cfmkit.families.cam.solution import constant_force
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, right_axis, top_axis, value_text, write_heading

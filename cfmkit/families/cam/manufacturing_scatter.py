@@ -21,7 +21,7 @@ from cfmkit.families.cam.solution import ForceBand, Sides
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.solution import Assembly
+    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.spec import Manufacturing
     from cfmkit.numerics.rigid_point_registration import CurveFrame
 

@@ -27,6 +27,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
+from cfmkit.families.cam.assembly import Assembly, target_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out, unmeasured
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
@@ -45,7 +46,7 @@ from cfmkit.families.cam.scalar_results import (
     pressure_of,
     values_of_built,
 )
-from cfmkit.families.cam.solution import Assembly, Built, Sides, target_force
+from cfmkit.families.cam.solution import Built, Sides
 from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.families.cam.assembly import CLOSE, Assembly
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.solution import CLOSE, Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm

@@ -21,6 +21,7 @@ import numpy as np
 from cfmkit.arrays import LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import Problem, SpecError
+from cfmkit.families.cam.assembly import CLOSE, Assembly, target_force
 from cfmkit.families.cam.bought_parts import parts_of
 from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
@@ -32,7 +33,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     displacement_origin,
 )
 from cfmkit.families.cam.scalar_results import QUANTITIES, contact_pressure, curve_cut_for
-from cfmkit.families.cam.solution import CLOSE, Assembly, DenseLoop, Solution, target_force
+from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.samples_on_flank import extreme_next_to, largest_of_each
-from cfmkit.families.cam.solution import ON_CORNER, constant_force
+from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
+from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.statics import Losses, normal_turn
 from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
 from cfmkit.families.rows import ScalarQuantity
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.solution import Assembly, Built, Solution
+    from cfmkit.families.cam.assembly import Assembly
+    from cfmkit.families.cam.solution import Built, Solution
     from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Forces
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.cam.assembly import CLOSE, constant_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
-from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
-from cfmkit.families.cam.samples_on_flank import FlankSamples, largest_of_each, pressure_angle
+from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.cam.statics import Forces, Loads, forces, jams, levers, load_on_contact, load_on_slider
 from cfmkit.families.rows import rows_of
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
@@ -28,35 +29,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
-    from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates
-    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.numerics.rigid_point_registration import Registration
-    from cfmkit.results import Finding
 
-
-CLOSE = 1e-6
-"""A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
 
 FEW = 100
 """Of fewer samples than these all are looked at for jams; of more, only places between which a jam may begin."""
 
 ON_CORNER = np.linspace(0.0, 1.0, 34)[1:]
 """Shares of the travel on a corner next to which an extreme of the force is looked for: its end is a kink."""
-
-
-@dataclass(frozen=True)
-class Assembly:
-    """A mechanism put together; several of one kind have columns (m, 1) for numbers that differ."""
-
-    spec: CamSpec  # with every derived value written out
-    profile: CamProfile  # the cam as cut
-    track: Track  # where the roller runs
-    loads: Loads  # springs and weights
-    # travel that the cut profile offers with its own brace [m]; short of the specified stroke where the geometry ends
-    # first
-    stroke: float
-    shortfall: Finding | None = None  # why `stroke` is short, if it is
 
 
 @dataclass(frozen=True)
@@ -78,6 +59,13 @@ class ForceBand:
         errors = self.forces - self.design
         found: FloatArray = np.nanstd(errors, axis=1, ddof=1) / float(np.nanmean(self.design))
         return found
+
+
+def pressure_angle(states: TrackStates, brace_length: Any) -> FloatArray:
+    """Return the angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
+    slope, tangent = states.slope, brace_tangent(states.x, brace_length)
+    angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
+    return angle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,6 +328,74 @@ class Solution(ShortRepr):
         return StressRows(read, at, self.column(np.nan if allowable is None else allowable))
 
 
+@dataclass(frozen=True, eq=False)
+class FlankSamples:
+    """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
+
+    solution: Solution  # the mechanisms
+    travel: FloatArray  # (..., n) increasing [m]
+    there: NDArray[np.bool_]  # (..., n) which of the places are on the flank
+    states: TrackStates  # where the rollers are, (..., n)
+    # up, down: on the way up and on the way down, (..., n) each
+    up: Forces
+    down: Forces
+
+    @classmethod
+    def of(cls, solution: Solution) -> FlankSamples:
+        """Return those of solved mechanisms."""
+        corner, travel, states = np.atleast_1d(solution.corner_travel), solution.travel, solution.states
+        leaves = (corner > 0) & (corner <= travel[..., -1:])
+        there = ~states.on_corner & (~leaves | (travel > corner))
+        if not leaves.any():
+            return cls(solution, travel, there, states, solution.up, solution.down)
+        (first, up), (_, down) = (solution.at_travel(corner, way, flank=True) for way in (1.0, -1.0))
+        return cls(
+            solution,
+            _behind(corner, travel),
+            _behind(leaves, there),
+            TrackStates(*map(_behind, first.fields(), states.fields())),
+            _forces_behind(up, solution.up),
+            _forces_behind(down, solution.down),
+        )
+
+    @property
+    def pressure_angle(self) -> FloatArray:
+        """Angle between the brace's pull and the roller's motion [rad]; NaN elsewhere."""
+        angle = pressure_angle(self.states, self.solution.assembly.track.brace_length)
+        return np.where(self.there, angle, np.nan)
+
+    def pressure(self, travel: FloatArray) -> FloatArray:
+        """Return the pressure of the contact on the way up at travels [Pa]; NaN where there is none."""
+        states, found = self.solution.at_travel(travel, 1.0, flank=True)
+        return flank_pressure(self.solution.assembly, states, found.contact)
+
+    @cached_property
+    def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
+        """Largest pressure of the contact on the way up [Pa], NaN without one, and about where it is [m], (m, 1)."""
+        pressed = flank_pressure(self.solution.assembly, self.states, self.up.contact)
+        return extreme_next_to(self.pressure, self.travel, np.where(self.there, pressed, np.nan), len(self.solution))
+
+    @property
+    def half_gap(self) -> FloatArray:
+        """Largest (up - down)/(up + down), (..., 1)."""
+        up, down = self.up.slider, self.down.slider
+        usable = self.there & np.isfinite(up) & np.isfinite(down) & (up + down > self.solution.effort_error)
+        return largest_of_each(np.where(usable, (up - down) / np.where(usable, up + down, 1.0), np.nan))
+
+
+def _forces_behind(first: Forces, rest: Forces) -> Forces:
+    def inside() -> tuple[FloatArray, FloatArray]:
+        return _behind(first.contact, rest.contact), _behind(first.brace, rest.brace)
+
+    return Forces(_behind(first.slider, rest.slider), inside)
+
+
+def _behind(first: Any, rest: Any) -> Any:
+    """Return (..., 1) and (..., n) as (..., n + 1)."""
+    shape = np.broadcast_shapes(np.shape(first)[:-1], rest.shape[:-1])
+    return np.concatenate([np.broadcast_to(one, (*shape, one.shape[-1])) for one in (first, rest)], axis=-1)
+
+
 def _within(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[float, float], ...]:
     """Return intervals as far as the travel goes [m]."""
     return tuple((max(low, 0.0), min(high, end)) for low, high in jams if low < end)
@@ -347,19 +403,6 @@ def _within(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[fl
 
 WAYS = {"load": 1.0, "unload": -1.0}
 """Up and down, by branch."""
-
-
-def constant_force(assembly: Assembly) -> float:
-    """Return the force that the profile is cut for, with the springs and weights built in [N]."""
-    law, loads = assembly.profile.path.law, assembly.loads
-    return 4.0 * loads.stiffness * law.force_constant + loads.slider_weight
-
-
-def target_force(spec: CamSpec, assembly: Assembly) -> float | None:
-    """Return the constant force that is wanted or that the profile is cut for [N]; None if it follows a curve."""
-    if spec.target_curve is not None or assembly.spec.mechanism.profile.curve is not None:
-        return None
-    return spec.design.force if spec.design else constant_force(assembly)
 
 
 _SHARES = np.concatenate(

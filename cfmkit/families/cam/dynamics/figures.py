@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.solution import constant_force
+from cfmkit.families.cam.assembly import constant_force
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure

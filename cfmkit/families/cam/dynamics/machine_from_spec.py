@@ -12,7 +12,7 @@ from cfmkit.families.cam.statics import GRAVITY
 from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.solution import Assembly
+    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.spec import CamSpec, Dynamics, Errors, LeftMasses, Masses, Mechanism
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import pressure
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.scalar_results import DEFINITIONS
-from cfmkit.families.cam.solution import constant_force
 from cfmkit.families.cam.statics import GRAVITY
 from cfmkit.results import Quantity
 
