@@ -8,6 +8,7 @@ slack at the start and tighten later can be built: the force is zero until they 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,9 +29,14 @@ from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.path import Method
     from cfmkit.families.cam.geometry.slope_law import Real
     from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
     from cfmkit.results import Finding
+
+
+CAMS_KEPT = 8
+"""Cams that are remembered: whoever builds other parts around one asks for the same again."""
 
 
 def resolve(spec: CamSpec) -> CamSpec:
@@ -176,14 +182,20 @@ def assemble(spec: CamSpec) -> Assembly:
     stroke, radius = float(mechanism.profile.stroke or 0.0), float(mechanism.profile.roller_radius or 0.0)
     missing = max(-mechanism.profile.offset, 0.0)
     check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
-    path, end = reach(law, stroke, spec.analysis.path_method)
-    reached = float(path.travel(end))
+    path, end, reached = _reached(law, stroke, spec.analysis.path_method)
     shortfall = _shortfall(law, stroke, end, reached)
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
     track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
     loads = loads_of(spec, mechanism.springs.total, mechanism.springs_rest)
     return Assembly(spec, profile, track, loads, reached, shortfall)
+
+
+@lru_cache(maxsize=CAMS_KEPT)
+def _reached(law: SlopeLaw, stroke: float, method: Method) -> tuple[RollerPath, float, float]:
+    """Return the path of a roller up to a stroke [m], its end, and how far that goes [m]."""
+    path, end = reach(law, stroke, method)
+    return path, end, float(path.travel(end))
 
 
 def assemble_sides(spec: CamSpec) -> tuple[Assembly, Assembly]:
@@ -287,6 +299,7 @@ def turns_vertical(law: SlopeLaw, end: float) -> bool:
     return law.vertical_at < law.brace_length and end >= law.vertical_at * (1 - CLOSE)
 
 
+@lru_cache(maxsize=CAMS_KEPT)
 def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     """Return the flank for a roller along a path up to x = `end` [m].
 
@@ -430,8 +443,7 @@ def check_first_pose(assembly: Assembly) -> None:
     track, mechanism = assembly.track, assembly.spec.mechanism
     if crossing := flanks_crossing(track.profile, max(mechanism.profile.offset, 0.0)):
         raise CannotBuild(crossing)
-    x = float(track.states(np.array([track.start])).x[0])
-    if (gap := 2.0 * (x - mechanism.roller_radius)) < -1e-12 * mechanism.brace_length:
+    if (gap := 2.0 * (track.first_x - mechanism.roller_radius)) < -1e-12 * mechanism.brace_length:
         raise CannotBuild(rollers_overlap(gap))
 
 

@@ -154,7 +154,7 @@ class Track:
             raise NoTrack("crossed", begins)
         if max(x_first, begins) >= brace_length * (1 - 1e-6):
             raise NoTrack("brace", max(x_first, begins))
-        law = profile.path.law
+        law, self._begins = profile.path.law, begins
         self._is_shifted = bool(self.shift)
         self._follows_law = not self.shift and brace_length == law.brace_length
         self._is_ideal = self._follows_law and not law.friction and law.slope_factor == 1
@@ -278,6 +278,13 @@ class Track:
     def pivot(self) -> Pivot:
         """The triangle that a brace and the corner make."""
         return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
+
+    @property
+    def first_x(self) -> float:
+        """The x of the roller's centre at the start of the track [m]."""
+        if self.dead_point < self.start:  # the track begins where the slider is back at its start
+            return float(self.states(np.array([self.start])).x[0])
+        return self._begins
 
     def of_rows(self, _rows: Any) -> Track:
         """Return the track itself: what many mechanisms share is the same for all of them."""
