@@ -20,6 +20,7 @@ from cfmkit.families.beam.proposals_for_wish import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.proposals_for_wish import PUSHED, _strip, largest_printed
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
 from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
@@ -270,6 +271,40 @@ def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
     assert pair["parts"] == 2
     assert 0.4 < pair["depth"] / single["depth"] < 0.7
     assert pair["across"] > 1.9 * single["across"]
+
+
+@pytest.mark.parametrize("crank", [0.02, 0.05, 0.12])
+@pytest.mark.parametrize("lengths", PUSHED)
+def test_the_largest_strip_of_some_proportions_just_fits_its_room(lengths, crank):
+    """Pads of small parts are smaller, those of large ones are not larger: the box is that of the finished drawing."""
+    keys = {"force": "0.5 N", "travel": "2 mm", "room": "[1 m, 1 m, 5 mm]"}
+    spec = _strip(wish(**keys), {"name": "pom"}, lengths, crank, (1e-4, 0.05 * crank)).spec
+    width = {"mechanism.beam.width": 4e-3, "mechanism.beam.thickness": 0.01 * crank}
+    box = family("slider-crank").envelope(cfmkit.analyze(spec.replace({"design": None, **width})))
+    assert largest_printed((box.across, box.along), lengths) == pytest.approx(crank, rel=2e-4)
+    assert largest_printed((2.0 * box.across, box.along), lengths) == pytest.approx(crank, rel=2e-4)
+
+
+def test_a_small_strip_with_pads_in_proportion_is_found():
+    """A strip of half the published size in PETG does this; with pads of the usual size nothing fits."""
+    room = "[50 mm, 78 mm, 2.95 mm]"
+    asked, candidates = offered(
+        "slider-crank", force="0.417 N", travel="14 mm", ripple="2.2 %", room=room, material="petg"
+    )
+    one = made(ProposalJob("slider-crank", next(one for one in candidates if one.variant == "strip"), asked, 0))
+    assert one.passes, one.missed or one.message
+
+
+def test_a_material_without_a_known_strength_gets_designs_whose_stress_is_not_judged():
+    keys = {"force": "13 N", "travel": "1.98 mm", "ripple": "6 %", "room": "[95 mm, 72 mm, 14 mm]"}
+    asked = wish(**keys, material="{youngs_modulus: 1.477 GPa, poisson_ratio: 0.3}")
+    assert [one.materials[0]["yield_strength"] for one in asked.with_strengths] == [0.015 * 1.477e9, 0.04 * 1.477e9]
+    candidate = search.offer_of(family("vcfm"), asked, Run()).candidates[0]
+    one = made(ProposalJob("vcfm", candidate, asked, 0))
+    assert one.passes, one.missed or one.message
+    assert one.spec.mechanism.material.yield_strength is None
+    assert any("no strength is known" in reason for reason in one.unjudged)
+    assert wish().with_strengths == (wish(),)
 
 
 def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
