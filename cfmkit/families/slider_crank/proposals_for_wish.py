@@ -33,6 +33,8 @@ from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.wishes import Wish
@@ -101,7 +103,7 @@ def _of_force(wish: Wish) -> FamilyOffer:
     if found := [one for one in tried if isinstance(one, Candidate)]:
         return FamilyOffer(tuple(_varied(found)))
     reasons = []
-    fits = [largest_printed(wish.room[:2], lengths) for lengths in PUSHED]
+    fits = [largest_printed(wish.room, lengths) for lengths in PUSHED]
     wide = min((strip_width(wish, block, one) for one in fits for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
         reasons.append(f"a strip would have to be about {mm(wide)} wide")
@@ -152,10 +154,10 @@ def _boxes_as_drawn(lengths: Proportions) -> FloatArray:
     return np.array(boxes)
 
 
-def largest_printed(room: tuple[float, float], lengths: Proportions) -> float:
-    """Return the crank's length of the largest strip whose outline fits a room across and along its path [m]."""
+def largest_printed(room: Sequence[float], lengths: Proportions) -> float:
+    """Return the crank's length of the largest strip whose outline fits the first two sides of a room [m]."""
     small, large = _boxes_as_drawn(lengths)
-    wide = np.array(room) * ROUNDED_BOX
+    wide = np.array(room[:2]) * ROUNDED_BOX
     in_proportion = FULL_PADS * float((wide / small).min())
     if in_proportion <= FULL_PADS:
         return in_proportion
@@ -167,7 +169,7 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate | float]:
 
     Or the largest force that springs at pins can hold, where that is less than what is wished [N].
     """
-    printed = largest_printed(wish.room[:2], lengths)
+    printed = largest_printed(wish.room, lengths)
     pinned = min(wish.room[0] / (lengths.offset + 2 * EYE_SHARE), wish.room[1] / (lengths.stretched + 2 * EYE_SHARE))
     pins = overfilled(wish) is None
     found: list[Candidate | float] = []
