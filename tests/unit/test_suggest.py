@@ -414,6 +414,16 @@ def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(room
     assert found.numbers["ripple"] < 0.025
 
 
+def test_two_layers_are_proposed_where_one_does_not_travel_so_far():
+    material = "{youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 76 MPa}"
+    room = "[74.3 mm, 97.5 mm, 10.1 mm]"
+    asked, candidates = offered("beam", force="9.67 N", travel="13 mm", ripple="5.3 %", room=room, material=material)
+    layered = next(one for one in candidates if one.variant == "shape lan-2010 in two layers")
+    one = made(ProposalJob("beam", layered, asked, 0))
+    assert one.passes, one.missed or one.message
+    assert one.spec.mechanism.copies.layers == 2
+
+
 def test_the_reason_is_that_of_a_shape_that_travels_so_far():
     asked = wish(force="60 N", travel="4 mm", ripple="4 %", room="[46 mm, 50 mm, 25 mm]")
     offer = function_named(family("beam").propose)(asked, Run())
