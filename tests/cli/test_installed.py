@@ -23,7 +23,6 @@ COMMANDS = {
     "batch": ("batch", "cam.yaml", "-o", "out", "-j", "1", "--no-plots"),
     "calibrate": ("calibrate", "cam_as_built.yaml", "few.csv", *FRICTION, "-o", "out", "--no-plots"),
     "check": ("check", "cam.yaml"),
-    "clean": ("clean", "."),
     "design": ("design", "cam.yaml", "-o", "out"),
     "doctor": ("doctor",),
     "examples": ("examples",),

@@ -12,7 +12,7 @@ from cfmkit import families
 from cfmkit._version import __version__
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
-VERBS = ["design", "analyze", "export", "check", "new", "show", "schema", "clean", "doctor"]
+VERBS = ["design", "analyze", "export", "check", "new", "show", "schema", "doctor"]
 
 
 def test_version_is_printed(cli):

@@ -233,7 +233,7 @@ def test_without_file_locks_the_mark_of_a_run_that_was_killed_is_taken_over(tmp_
     with program(HOLDER) as first:
         assert first.stdout.readline() == "locked\n"
         first.kill()
-    assert lock.lock_files(tmp_path / "out") == (lock.SOFT_LOCK,)
+    assert lock.SOFT_LOCK in listing(tmp_path / "out")
     with program(ENTER) as second:
         second.communicate()
     assert second.returncode == 0
@@ -267,20 +267,19 @@ def test_without_file_locks_two_runs_in_one_process_conflict(tmp_path, no_locks)
     with RunFolder(tmp_path) as folder:
         with pytest.raises(FolderInUse, match=f"process {os.getpid()}"), RunFolder(tmp_path):
             pass
-        assert folder.lock_file == lock.SOFT_LOCK
         (tmp_path / lock.SOFT_LOCK).unlink()
         with pytest.raises(OutputError, match="was removed during the run"):
             folder.commit(INFO)
 
 
 def test_no_lock_locks_nothing(tmp_path, monkeypatch):
-    with RunFolder(tmp_path / "out") as first, lock.without_locks():
+    with RunFolder(tmp_path / "out"), lock.without_locks():
         run(tmp_path / "out", a_csv=b"1")
-        assert first.lock_file == lock.LOCK
+        assert (tmp_path / "out" / lock.LOCK).exists()
     assert lock.NO_LOCK not in os.environ
     monkeypatch.setenv(lock.NO_LOCK, "1")
     with RunFolder(tmp_path / "out") as folder:
-        assert folder.lock_file == ""
+        assert not [*(tmp_path / "out").glob(".cfmkit*lock")]
         assert listing(tmp_path / "out") == ["a.csv", "manifest.json"]
         folder.commit(INFO)
     assert listing(tmp_path / "out") == ["manifest.json"]
