@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 PASSING = re.compile(r"\b\d+(\.\d+)? (ms|s|min)\b|\d+ points/s|cfm-out\S*|/\S+/")
 """What changes between two runs of one version: times taken, folders."""
-OF_THE_RUN = {"manifest.json", "exit.txt", ".cfmkit-journal.jsonl"}
+OF_THE_RUN = {"manifest.json", "exit.txt", ".cfmkit-journal.sqlite", ".cfmkit-journal.jsonl"}
 """Of the run: times, versions and arguments; records in the order in which processes finished."""
 
 

@@ -92,7 +92,7 @@ class FolderLock:
             If the lock file cannot be made; FileNotFoundError if the folder has gone.
         """
         os.stat(self._folder)
-        if os.environ.get(NO_LOCK, "") in ("", "0"):
+        if locks_wanted():
             self._descriptor = _lock(self._folder / LOCK, self._folder)
             if self._descriptor < 0:
                 self._soft = _lock_softly(self._folder / SOFT_LOCK, self._folder)
@@ -122,6 +122,16 @@ class FolderLock:
         elif self.name:
             _unlock(self._descriptor, self._folder / LOCK)
         self._descriptor, self._soft, self.name = -1, None, ""
+
+
+def locks_can_be_used(folder: Path) -> bool:
+    """Return True if files in a folder may be locked (no ``--no-lock``), and can be."""
+    return locks_wanted() and has_native_locks(folder)
+
+
+def locks_wanted() -> bool:
+    """Return True unless the user said to lock nothing."""
+    return os.environ.get(NO_LOCK, "") in ("", "0")
 
 
 def has_native_locks(folder: Path) -> bool:

@@ -41,7 +41,7 @@ COMMANDS = {
 SECONDS = re.compile(r" +(\w+ )*[\d.]+ (ms|s|min|h)( \d+ s)?$|\d+ files, [\d.]+ MB", re.M)
 """What differs on the page between two runs: how long they took, and how much other tests have put into caches."""
 
-OWN = ("manifest.json", ".cfmkit-journal.jsonl")
+OWN = ("manifest.json", ".cfmkit-journal.sqlite")
 """Files that hold the time, the first, and the hash of such a file, the second."""
 
 
