@@ -27,7 +27,6 @@ COMMANDS = {
     "doctor": ("doctor",),
     "examples": ("examples",),
     "export": ("export", "cam.yaml", "-o", "out"),
-    "figure": ("figure", "one.yaml", "-o", "out"),
     "measure": ("measure", "synthetic/cam_loop.csv", "-o", "out", "--no-plots"),
     "new": ("new", "cam", "-o", "new.yaml"),
     "docs": ("docs", "--json"),
@@ -61,7 +60,6 @@ def test_the_program_says_and_writes_what_the_same_command_does_here(cli, comman
         shutil.copytree(CONFIGS, configs)
         *head, lines = (configs / "synthetic/cam_loop.csv").read_text().split("\n", 2)
         (configs / "few.csv").write_text("\n".join([*head, *lines.splitlines()[::20]]))
-        (configs / "one.yaml").write_text("panels:\n  - {run: cam.yaml, plot: loop}\n")
         cli.folder = configs
         done = run(*command)
         files = {str(path.relative_to(configs)): path for path in configs.rglob("*") if path.is_file()}
