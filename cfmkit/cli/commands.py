@@ -178,13 +178,11 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     """
     try:
         call = _plain(typer.main.get_command(app)).main(_spelled(arguments), "cfmkit", standalone_mode=False)
-    except SystemExit as end:
+    except SystemExit:
         # The reader of the help text has left, or typer has answered a shell.
-        if end.code not in (None, 0):
-            raise UsageError(
-                "there is a completion for bash, zsh, fish and PowerShell; run this in one of them"
-            ) from None
         return None
+    if call == 1:  # of a shell that typer does not know
+        raise UsageError("there is a completion for bash, zsh, fish and PowerShell; run this in one of them")
     return call if isinstance(call, Call) else None
 
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.colorbar import Colorbar
+    from matplotlib.figure import SubFigure
     from numpy.typing import NDArray
 
 P = ParamSpec("P")
@@ -149,7 +150,7 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     return figure
 
 
-def size_mm(figure: Figure) -> tuple[float, float]:
+def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
     """Return width and height of a figure [mm of print]."""
     dots = figure.dpi * MM
     return float(figure.bbox.width) / dots, float(figure.bbox.height) / dots
