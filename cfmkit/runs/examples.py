@@ -30,7 +30,7 @@ class Example:
     name : str
         Path below the folder of all, without its ending: ``cam``, ``studies/cam_tolerance``.
     family : str
-        As the file says; ``figure`` for a figure of several runs.
+        As the file says.
     about : str
         What it is: the first sentence of the file's comment.
     path : Path
@@ -67,7 +67,7 @@ def examples() -> tuple[Example, ...]:
     --------
     >>> import cfmkit
     >>> cfmkit.examples()[0].name, len({example.family for example in cfmkit.examples()})
-    ('beam_cantilever', 5)
+    ('beam_cantilever', 4)
     """
     root = folder()
     files = sorted(root.rglob("*.yaml"), key=lambda path: (len(path.parts), path))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cfmkit.errors import OutputError
 from cfmkit.store.lock import locks_can_be_used
-from cfmkit.store.safe_disk_changes import discard, shown
+from cfmkit.store.safe_disk_changes import discard, reporting, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -36,6 +36,7 @@ _REASONS = {
     "SQLITE_READONLY": "permission denied",
     "SQLITE_CANTOPEN": "permission denied, or it is no ordinary file",
     "SQLITE_IOERR": "the disk reports an input/output error, or a quota is used up",
+    "SQLITE_CORRUPT": "it is damaged; run the same command again",
     "SQLITE_BUSY": "another process is writing to it",
 }
 
@@ -61,7 +62,7 @@ class Journal:
         """Open the file; one that is no sound database is begun anew."""
         if self.path.is_symlink():
             raise OutputError(f"cannot open {shown(self.path)}: it is a link")
-        with self._reporting("open"):
+        with reporting(self.path, "open"), self._reporting("open"):
             try:
                 self._open()
             except sqlite3.DatabaseError as error:
@@ -125,6 +126,8 @@ class Journal:
     def keep_only(self, keys: Iterable[bytes]) -> None:
         """Drop the records of all other keys, and make the file as small as it can be; all or nothing.
 
+        Those of a writer that opened the file later stay.
+
         Raises
         ------
         cfmkit.errors.OutputError
@@ -135,7 +138,8 @@ class Journal:
             with self._db:  # commits, or takes all of it back
                 self._db.execute("BEGIN")
                 self._db.executemany("INSERT OR IGNORE INTO used VALUES (?)", ((key,) for key in keys))
-                dropped = self._db.execute("DELETE FROM records WHERE key NOT IN (SELECT key FROM used)").rowcount
+                unused = "DELETE FROM records WHERE session <= ? AND key NOT IN (SELECT key FROM used)"
+                dropped = self._db.execute(unused, (self._session,)).rowcount
                 self._db.execute("DELETE FROM used")
             if dropped:
                 self._db.execute("VACUUM")

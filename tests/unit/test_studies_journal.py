@@ -178,6 +178,9 @@ def test_what_was_acknowledged_survives_a_kill(path, locks, monkeypatch):
 def test_a_record_that_somebody_took_away_is_an_output_error(path):
     with Journal(path) as journal, Journal(path) as other:
         journal.add(key(0), 0)
+        other.add(key(1), 1)
+        journal.keep_only([bytes.fromhex(key(0))])
+        assert (journal.read(key(0)), other.read(key(1))) == (0, 1), "of a later writer"
         other.keep_only([])
         with pytest.raises(OutputError, match="it was changed during the run"):
             journal.read(key(0))
