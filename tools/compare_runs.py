@@ -48,8 +48,6 @@ def jobs(configs: Path, only: str) -> Iterator[tuple[str, list[str]]]:
     for path in sorted([*configs.glob("*.yaml"), *configs.glob("studies/*.yaml")]):
         if only not in path.name:
             continue
-        if path.name == "figure.yaml":  # no specification: a figure of several runs
-            continue
         blocks = set(re.findall(r"^([a-z_]+):", path.read_text(encoding="utf-8"), flags=re.MULTILINE))
         verbs = [verb for verb in ("design", "sweep", "sensitivity") if verb in blocks]
         for verb in ("analyze", *verbs):

@@ -55,7 +55,7 @@ class Journal:
     def __init__(self, path: Path, fresh: bool = False) -> None:
         """Remember the file; it is made on entry."""
         self.path, self.fresh = path, fresh
-        self._synced = 0.0
+        self._synced, self._session = 0.0, 0
         self.damaged = 0  # records whose checksum did not fit
 
     def __enter__(self) -> Self:
@@ -92,7 +92,7 @@ class Journal:
 
     def find(self, key: str) -> Any:
         """Return the record of a key that was there when the file was opened; None if there is none."""
-        return self._record("AND session < ?", key, 0 if self.fresh else self._session)
+        return self._record("AND session <= ?", key, 0 if self.fresh else self._known)
 
     def read(self, key: str) -> Any:
         """Return the record of a key.
@@ -117,6 +117,9 @@ class Journal:
         """
         packed = zlib.compress(json.dumps(record, separators=(",", ":")).encode(), 1)
         with self._reporting("write"):
+            if not self._session:  # a run that adds nothing leaves the file as it is, to the byte
+                self._session = self._newest_session() + 1
+                self._db.execute(f"PRAGMA user_version={self._session}")
             row = (bytes.fromhex(key), self._session, packed)
             self._db.execute("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", row)
             if time.monotonic() - self._synced > SYNC_INTERVAL:
@@ -139,7 +142,7 @@ class Journal:
                 self._db.execute("BEGIN")
                 self._db.executemany("INSERT OR IGNORE INTO used VALUES (?)", ((key,) for key in keys))
                 unused = "DELETE FROM records WHERE session <= ? AND key NOT IN (SELECT key FROM used)"
-                dropped = self._db.execute(unused, (self._session,)).rowcount
+                dropped = self._db.execute(unused, (self._session or self._known,)).rowcount
                 self._db.execute("DELETE FROM used")
             if dropped:
                 self._db.execute("VACUUM")
@@ -157,12 +160,15 @@ class Journal:
             self._db.execute(_TABLE)
             if self._db.execute("PRAGMA quick_check(1)").fetchone() != ("ok",):
                 raise _Damaged
-            self._session = int(self._db.execute("PRAGMA user_version").fetchone()[0]) + 1
-            self._db.execute(f"PRAGMA user_version={self._session}")
+            self._known = self._newest_session()
         except BaseException:
             self._db.close()
             raise
         self._synced = time.monotonic()
+
+    def _newest_session(self) -> int:
+        """Return the number of the last run that added something; 0 if there was none."""
+        return int(self._db.execute("PRAGMA user_version").fetchone()[0])
 
     def _record(self, condition: str, key: str, *values: int) -> Any:
         with self._reporting("read"):

@@ -43,6 +43,15 @@ def test_a_closed_journal_is_one_file_and_an_empty_one_is_none(path):
     assert [one.name for one in path.parent.iterdir()] == [path.name]
 
 
+def test_a_run_that_adds_nothing_changes_no_byte(path):
+    filled(path)
+    before = path.read_bytes()
+    with Journal(path) as journal:
+        assert journal.find(key(1)) is not None
+        journal.keep_only(bytes.fromhex(key(number)) for number in range(5))
+    assert path.read_bytes() == before
+
+
 def test_a_long_record_comes_back_too(path):
     text = "".join(np.random.default_rng(0).choice(list("abcdefgh"), 3_000_000))
     with Journal(path) as journal:
