@@ -209,12 +209,8 @@ class _Making:
         """Make candidates, or find them in the journal; return whether the time sufficed for all."""
         run, notes = self._run, self._run.notes
         keys = [_key(job) for job in jobs]
-        places = [notes.find(key) for key in keys]
-        self._known = {
-            index: Proposal.of_record(notes.read(place, key))
-            for index, (place, key) in enumerate(zip(places, keys, strict=True))
-            if place >= 0
-        }
+        records = {index: notes.find(key) for index, key in enumerate(keys)}
+        self._known = {index: Proposal.of_record(one) for index, one in records.items() if one is not None}
         self.reused += len(self._known)
         left = [index for index in range(len(jobs)) if index not in self._known]
         work = partial(_made_of, tuple(jobs))
@@ -277,7 +273,7 @@ def _with_nearest(
     names = [one.family for one in answers]
     content = {"wish": repr(wish), "seed": run.seed, "code": code_stamp()}
     keys = {name: stable_hash(content | {"nearest": name})[:32] for name in names}
-    found = {name: run.notes.read(place, keys[name]) for name in names if (place := run.notes.find(keys[name])) >= 0}
+    found = {name: record for name in names if (record := run.notes.find(keys[name])) is not None}
     left = [name for name in names if name not in found]
     clock = Clock(deadline)
     work = partial(_nearest_of, wish, run.seed, clock)
