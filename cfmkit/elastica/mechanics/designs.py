@@ -154,7 +154,7 @@ def _plain(
 
 
 def raise_designs(designs: NetworkDesigns, fine: Discretisation) -> NetworkDesigns:
-    """Return designs that were set up together with the degree of another template, which is `raise_degree` of theirs."""
+    """Return designs that were set up together with the degree of another template: `raise_degree` of their own."""
     assert designs.tables_at is not None
     assert designs.base is None
     return replace(designs, template=fine, tables=designs.tables_at(fine))

@@ -101,7 +101,7 @@ class CompiledEquations(NumpyEquations):
 
     arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
     row: Any = field(init=False)  # counts and addresses
-    code: Any = field(init=False, default_factory=compiled)  # the compiled module
+    code: Any = field(init=False, default_factory=_module)  # the compiled module
 
     def __post_init__(self) -> None:
         """Collect the arrays."""
