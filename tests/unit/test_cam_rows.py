@@ -147,11 +147,11 @@ def test_every_row_of_a_study_is_a_run_of_its_own(stem, number):
 def test_rows_of_cams_that_may_not_exist_or_jam_are_runs_of_their_own(change):
     spec = SPEC.replace(change)
     ranges = {k: v for k, v in RANGES.items() if k not in change and not (spec.design is None and k == "design.force")}
-    many = work(spec, ranges)
+    many = work(spec, ranges, 32)
     assert many.vectorised
     together = check_rows_against_single_runs(many)
-    assert {status for status, _ in together.odd.values()} >= {Status.INVALID, Status.NO_EQUILIBRIUM}
-    assert len(members(many)) > 15
+    assert Status.NO_EQUILIBRIUM in {status for status, _ in together.odd.values()}
+    assert len(members(many)) > 8
 
 
 HEAVY = {
