@@ -15,6 +15,7 @@ import numpy as np
 
 from cfmkit.elastica import PointLoad
 from cfmkit.elastica.model.beam_fits import BeamFits
+from cfmkit.export.beam_sections import SpecifiedPiece, check_outline
 from cfmkit.export.contours import (
     Contour,
     Curve2D,
@@ -32,7 +33,6 @@ from cfmkit.families.beam.drawn_pieces import (
     HOLE,
     STANDS,
     BeamEnd,
-    area_of,
     bars_between_halves,
     both_halves,
     disc,
@@ -53,16 +53,12 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
 FINE = 2e-4
 """How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
 beam: both edges together change its bending stiffness by 1.2e-3 at most."""
-
-EXACT = 1e-5
-"""How far lines may be from the edges of the outline when it is measured, in thicknesses of the thinnest beam."""
 
 SHARP = 1e-4
 """Fillets smaller than this are not drawn, in thicknesses of the thinnest beam."""
@@ -186,7 +182,9 @@ def drawing(spec: BeamSpec, tolerance: float | None = None, check: bool = True) 
     part, fillet = spec.mechanism.part or PartSpec(), drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
     contours = merged(pieces, fine / FINE, fillet, solid.holes)
-    sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, fillet) if check else ()
+    thinnest, holes = fine / FINE, [area for hole in solid.holes for area in hole.covered(fine / FINE)]
+    specified = tuple(_specified(beams, pieces, thinnest)) if check else ()
+    sections = check_outline(contours, specified, thinnest, fillet, holes) if check else ()
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)
@@ -217,42 +215,14 @@ def drawn_fillet(spec: BeamSpec) -> float:
     return fillet if fillet >= SHARP * spec.mechanism.thinnest else 0.0
 
 
-def _checked(
-    beams: dict[str, list[BeamStrip]],
-    pieces: Sequence[OutlinePiece],
-    holes: Sequence[OutlinePiece],
-    contours: Sequence[Contour],
-    thinnest: float,
-    fillet: float,
-) -> tuple[BeamSection, ...]:
-    """Return the sections of beams between joints, all of which the outline has; its area is that of its pieces.
-
-    Of pieces that are not the longest one of their beam, those count that fillets at both ends leave free.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        Where the outline is not what is specified.
-    """
-    from cfmkit.export.beam_sections import areas_of, check_area, free_sections
-
-    covered = [piece.covered(thinnest) for piece in pieces]
-    first = np.cumsum([0, *map(len, covered)])
-    sections, own, number = [], [], 0
-    for name, found in beams.items():  # the first of the pieces are these, in this order
-        longest = max(strip.length for strip in found)
-        for k, strip in enumerate(found):
-            low, high = (min(max(number + k + by, number), number + len(found)) for by in (-1, 2))
-            if strip.length >= min(longest, 4.0 * fillet):
-                sections.append(strip.section(name))
-                own.append(range(int(first[low]), int(first[high])))
-        number += len(found)
-    rings = [one.points(EXACT * thinnest) for one in contours]
-    areas = [area for one in covered for area in one]
-    judged = free_sections(sections, rings, areas, own, fillet)
-    sizes = [(-1.0 if one.hole else 1.0) * area_of(ring) for one, ring in zip(contours, rings, strict=True)]
-    check_area(sum(sizes), *areas_of(pieces, holes, thinnest, fillet))
-    return judged
+def _specified(
+    beams: dict[str, list[BeamStrip]], pieces: Sequence[OutlinePiece], size: float
+) -> Iterator[SpecifiedPiece]:
+    """Yield the pieces that a part is united from, the first of which are the strips of beams, with their sections."""
+    strips_of = [(name, strip) for name, found in beams.items() for strip in found]
+    for number, piece in enumerate(pieces):
+        own = (strips_of[number][1].section(strips_of[number][0]),) if number < len(strips_of) else ()
+        yield SpecifiedPiece(piece.covered(size), own)
 
 
 def _fine(assembly: Assembly) -> float:
