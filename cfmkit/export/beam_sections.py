@@ -122,7 +122,8 @@ def check_outline(
     from shapely import LineString, STRtree, polygons
 
     rings = [one.points(EXACT * thinnest) for one in contours]
-    areas, owner = [], []
+    areas: list[FloatArray] = []
+    owner: list[int] = []
     for number, piece in enumerate(pieces):
         areas += piece.areas
         owner += [number] * len(piece.areas)

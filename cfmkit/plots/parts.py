@@ -11,18 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.export.posed_part import box as box_of
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.label_placement import Label
 from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.posed_part import Body
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -139,6 +141,27 @@ def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
     from matplotlib.patches import Polygon
 
     ax.add_artist(Polygon(mm(outline), closed=True, color=color, linewidth=0.4, zorder=2.0, gid=gid))
+
+
+@styled
+def bodies(ax: Axes, shown: Sequence[Body], pose: int, colors: Mapping[str, str]) -> None:
+    """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
+    rigid = [body for body in shown if body.name not in colors]
+    plate(ax, [body.outline(pose) for body in rigid], "rigid")
+    for body in shown:
+        if body.name in colors:
+            area(ax, body.outline(pose), colors[body.name], body.name)
+
+
+def box_around(shown: Iterable[Body], margins: tuple[float, float, float, float]) -> tuple[Box, float]:
+    """Return the box of bodies in all their poses with room at its left, bottom, right and top, and the unit of that.
+
+    Room is given in parts of the longer side of the box, as is the unit [m].
+    """
+    (left, bottom), (right, top) = box_of(shown).tolist()
+    unit = max(right - left, top - bottom)
+    a, b, c, d = (share * unit for share in margins)
+    return (left - a, bottom - b, right + c, top + d), unit
 
 
 @styled

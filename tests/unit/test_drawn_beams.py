@@ -222,3 +222,36 @@ def test_a_cutter_leaves_arcs_between_all_that_it_touches(size):
         pytest.approx([6.0 - np.sqrt(0.25 - 0.04), 4.7]),
         pytest.approx([6.0, 5.0]),
     ]
+
+
+def test_leaves_and_their_spring_are_measured_in_the_outline():
+    """Every piece of a leaf between steps, on the right of each level, and every leaf of the spring."""
+    spec = config("vcfm_hybrid")
+    judged = [(section.beam, round(section.thickness / MM, 9)) for section in cfmkit.drawing(spec).sections]
+    (levels,) = {spec.mechanism.bistable.half_beams // 2}
+    assert [one for one in judged if one[0] == "leaf"] == levels * [("leaf", 1.0), ("leaf", 4.0), ("leaf", 1.0)]
+    assert [one for one in judged if one[0] == "spring"] == 4 * [("spring", 1.5)]
+
+
+def test_a_leaf_that_fillets_fill_is_refused_with_a_remedy_that_helps():
+    spec = config("vcfm_pla", "mechanism.part.fillet=15 mm")
+    with pytest.raises(GeometryError, match=r"beam 'leaf' is 1\.179 mm thick .* but 1\.01 mm .*part\.fillet=0\.51 mm"):
+        cfmkit.drawing(spec)
+    assert cfmkit.drawing(spec.replace({"mechanism.part.fillet": "0.51 mm"})).sections
+
+
+@pytest.mark.parametrize(("which", "words"), [(0, "beam 'leaf' is"), (1, "beam 'spring' is"), (2, "encloses")])
+def test_leaves_that_are_not_drawn_as_specified_are_refused(which, words, monkeypatch):
+    """The outline of other leaves, of another spring, or of thicker walls: each is compared with the specification."""
+    from cfmkit.families.vcfm import outline
+
+    keys = (
+        "mechanism.bistable.thickness=1.014 mm",
+        "mechanism.positive.thickness=1.505 mm",
+        "mechanism.part.frame={wall: 7 mm}",
+    )
+    contours = outline._contours
+    other = config("vcfm_pla", keys[which])
+    monkeypatch.setattr(outline, "_contours", lambda _: contours(other))
+    with pytest.raises(GeometryError, match=words):
+        cfmkit.drawing(config("vcfm_pla"))

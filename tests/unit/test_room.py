@@ -9,7 +9,6 @@ from beam_support import cantilever
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 
 
 def room_of(name, **changes):
@@ -18,7 +17,7 @@ def room_of(name, **changes):
 
 def box(spec):
     result = cfmkit.analyze(spec)
-    return function_named(family(result.spec.family).room)(result), result
+    return family(result.spec.family).envelope(result), result
 
 
 def test_a_cam_is_as_wide_as_its_rollers_at_the_end_of_the_stroke():
