@@ -132,7 +132,7 @@ def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
 
 
 @styled
-def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
+def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
     """Fill an outline (n, 2) [m]; the limits of the axes do not follow it.
 
     They are those of `to_scale`: to find what a shape of a hundred points spans takes matplotlib five times as long as
@@ -140,7 +140,8 @@ def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
     """
     from matplotlib.patches import Polygon
 
-    ax.add_artist(Polygon(mm(outline), closed=True, color=color, linewidth=0.4, zorder=2.0, gid=gid))
+    look: dict[str, Any] = {"linewidth": 0.4, "zorder": 2.0} | options
+    ax.add_artist(Polygon(mm(outline), closed=True, gid=gid, **look))
 
 
 @styled
@@ -150,7 +151,7 @@ def bodies(ax: Axes, shown: Sequence[Body], pose: int, colors: Mapping[str, str]
     plate(ax, [body.outline(pose) for body in rigid], "rigid")
     for body in shown:
         if body.name in colors:
-            area(ax, body.outline(pose), colors[body.name], body.name)
+            area(ax, body.outline(pose), body.name, color=colors[body.name])
 
 
 def box_around(shown: Iterable[Body], margins: tuple[float, float, float, float]) -> tuple[Box, float]:

@@ -255,3 +255,22 @@ def test_leaves_that_are_not_drawn_as_specified_are_refused(which, words, monkey
     monkeypatch.setattr(outline, "_contours", lambda _: contours(other))
     with pytest.raises(GeometryError, match=words):
         cfmkit.drawing(config("vcfm_pla"))
+
+
+def test_flexures_and_strips_of_slider_cranks_are_measured_in_the_outline():
+    lumped, strip = (cfmkit.drawing(config(f"slider_crank_{name}")).sections for name in ("lumped", "strip"))
+    flexures = config("slider_crank_lumped").mechanism.flexures.all
+    assert [one.beam for one in lumped] == ["pivot", "crank_pin", "slider_pin"]
+    assert [one.thickness for one in lumped] == [pytest.approx(one.thickness) for one in flexures]
+    assert {one.beam for one in strip} == {"strip"}
+
+
+@pytest.mark.parametrize("name", ["lumped", "strip"])
+def test_a_leg_that_is_not_drawn_as_specified_is_refused(name, monkeypatch):
+    from cfmkit.families.slider_crank.printed.part import Leg
+
+    key = "flexures.pivot.thickness" if name == "lumped" else "beam.offset"
+    of, other = Leg.contours.fget, config(f"slider_crank_{name}", f"mechanism.{key}=0.5 mm")
+    monkeypatch.setattr(Leg, "contours", property(lambda _: of(Leg.of(other, as_printed=True))))
+    with pytest.raises(GeometryError, match="thick in the outline"):
+        cfmkit.drawing(config(f"slider_crank_{name}"))
