@@ -27,7 +27,7 @@ N_CIRCLE_POINTS = 73
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PosedBody:
     """All points that are no farther than `half` from a point, a line or the inside of a polygon, in p poses."""
 
     name: str  # of the kind of body: several may have it
@@ -38,12 +38,12 @@ class Body:
     round: bool = False  # whether a line ends in half circles
 
     @classmethod
-    def polygon(cls, name: str, role: Role, corners: FloatArray) -> Body:
+    def polygon(cls, name: str, role: Role, corners: FloatArray) -> PosedBody:
         """Return a polygon (k, 2) or (p, k, 2) [m]."""
         return cls(name, role, np.asarray(corners).reshape(-1, *np.shape(corners)[-2:]), closed=True)
 
     @classmethod
-    def line(cls, name: str, role: Role, points: FloatArray, half: Any, round: bool = False) -> Body:
+    def line(cls, name: str, role: Role, points: FloatArray, half: Any, round: bool = False) -> PosedBody:
         """Return what is around a line, or a point, (k, 2) or (p, k, 2) [m]."""
         return cls(name, role, np.asarray(points).reshape(-1, *np.shape(points)[-2:]), half, round=round)
 
@@ -70,11 +70,11 @@ class Body:
         left = math.atan2(y, x) + 0.5 * math.pi
         return np.vstack([arc(core[-1], half, left - math.pi, math.pi), arc(core[0], half, left, math.pi)])
 
-    def moved(self, x: float, y: float) -> Body:
+    def moved(self, x: float, y: float) -> PosedBody:
         """Return it moved by so much [m]."""
         return replace(self, core=self.core + np.array([x, y]))
 
-    def mirrored(self) -> Body:
+    def mirrored(self) -> PosedBody:
         """Return its mirror image about the y axis; a polygon runs in the same sense."""
         return replace(self, core=(self.core[:, ::-1] if self.closed else self.core) * MIRROR)
 
@@ -112,7 +112,7 @@ def band(line: FloatArray, half: Any) -> FloatArray:
     return np.concatenate([line + aside, (line - aside)[::-1]])
 
 
-def in_poses(each: Sequence[Sequence[Body]]) -> tuple[Body, ...]:
+def in_poses(each: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
     """Return the bodies of several poses, each given as the same bodies in the same order, as bodies in all poses."""
     found = []
     for same in zip(*each, strict=True):
@@ -126,14 +126,14 @@ def in_poses(each: Sequence[Sequence[Body]]) -> tuple[Body, ...]:
 class PosedPart:
     """A mechanism over its motion: where its material is, and what its box says beside the sizes in the plane."""
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[PosedBody, ...]
     direction: float = 0.5 * math.pi  # of the travel [rad]
     depth: float | None = None  # out of the plane [m]; None if nothing is known of it
     pieces: int = 1  # separate pieces that the mechanism is put together from, bought ones included
     assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
 
 
-def box(bodies: Iterable[Body], direction: float = 0.5 * math.pi) -> FloatArray:
+def box(bodies: Iterable[PosedBody], direction: float = 0.5 * math.pi) -> FloatArray:
     """Return the smallest and the largest place of bodies in all their poses, across and along a direction (2, 2) [m].
 
     A line counts as far as it reaches anywhere: a box is a little large rather than small.
@@ -149,7 +149,7 @@ def box(bodies: Iterable[Body], direction: float = 0.5 * math.pi) -> FloatArray:
     return np.array([np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)])
 
 
-def swept(bodies: Iterable[Body]) -> Any:
+def swept(bodies: Iterable[PosedBody]) -> Any:
     """Return what bodies cover in all their poses together, as a geometry of shapely."""
     from shapely import union_all
 

@@ -276,7 +276,6 @@ class Family:
     # ``"module:function"`` with ``part_over_motion(result) -> PosedPart``: where the material of a solved mechanism is
     # in its poses; its box follows. None where that is not known
     part: str | None = None
-    room: str | None = None  # ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in
     levels: tuple[str, ...] = ()  # dotted paths of the forces that its `design` block may ask for
     headline: tuple[str, ...] = ()  # values and metrics that are shown first after a run, in this order
     branches: tuple[str, ...] = ()  # every name that a branch of its curves may have; none where the curve decides
@@ -290,7 +289,7 @@ class Family:
     def __post_init__(self) -> None:
         """Add the findings that every family has, and the values of those that know their box."""
         object.__setattr__(self, "findings", {**self.findings, **SHARED})
-        if self.room or self.part:
+        if self.part:
             object.__setattr__(self, "values", {**self.values, **ENVELOPE})
 
     @property
@@ -322,16 +321,13 @@ class Family:
 
     def with_envelope(self, result: Result, names: Collection[str]) -> Result:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
-        if ENVELOPE.keys().isdisjoint(names) or not (self.room or self.part):
+        if ENVELOPE.keys().isdisjoint(names) or not self.part:
             return result
         return sized(result, self.envelope(result))
 
     def envelope(self, result: Result) -> Room | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
-        if self.part is None:
-            found: Room | None = function_named(self.room)(result) if self.room else None
-            return found
-        part = function_named(self.part)(result)
+        part = function_named(self.part)(result) if self.part else None
         return None if part is None else Room.around(part)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.posed_part import Body
+    from cfmkit.export.posed_part import PosedBody
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -145,16 +145,20 @@ def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
 
 
 @styled
-def bodies(ax: Axes, shown: Sequence[Body], pose: int, colors: Mapping[str, str]) -> None:
+def bodies(ax: Axes, shown: Sequence[PosedBody], pose: int, colors: Mapping[str, str]) -> None:
     """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
-    rigid = [body for body in shown if body.name not in colors]
-    plate(ax, [body.outline(pose) for body in rigid], "rigid")
+    plate(ax, [_counter_clockwise(body.outline(pose)) for body in shown if body.name not in colors], "rigid")
     for body in shown:
         if body.name in colors:
             area(ax, body.outline(pose), body.name, color=colors[body.name])
 
 
-def box_around(shown: Iterable[Body], margins: tuple[float, float, float, float]) -> tuple[Box, float]:
+def _counter_clockwise(points: FloatArray) -> FloatArray:
+    x, y = points.T
+    return points if x @ np.roll(y, -1) > np.roll(x, -1) @ y else points[::-1]
+
+
+def box_around(shown: Iterable[PosedBody], margins: tuple[float, float, float, float]) -> tuple[Box, float]:
     """Return the box of bodies in all their poses with room at its left, bottom, right and top, and the unit of that.
 
     Room is given in parts of the longer side of the box, as is the unit [m].

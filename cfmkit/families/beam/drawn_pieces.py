@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.beam_sections import area_of
+from cfmkit.export.drawn_as_specified import area_of
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.bounding_box import room
+from cfmkit.families.base import Room
 from cfmkit.families.beam.model import analyze
+from cfmkit.families.beam.part import part_over_motion
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Room
     from cfmkit.families.wishes import Wish
     from cfmkit.results import Result
 
@@ -93,10 +93,10 @@ def _followed(name: str) -> Kept:
     text = files("cfmkit").joinpath(f"families/beam/shapes/{name}.yaml").read_text(encoding="utf-8")
     spec = read_document(text, name).bind(BeamSpec)
     result = analyze(spec, Run())
-    space = room(result)
-    assert space is not None
+    part = part_over_motion(result)
+    assert part is not None
     curve = result.curve
-    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, space)
+    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, Room.around(part))
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:

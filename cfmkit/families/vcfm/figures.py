@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.posed_part import Body
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.results import Result
 
@@ -267,14 +267,14 @@ def hangs(solution: Solution) -> bool:
     return springs is not None and springs.kind == "extension"
 
 
-def _pushed_at(shown: Sequence[Body], pose: int) -> parts.Point:
+def _pushed_at(shown: Sequence[PosedBody], pose: int) -> parts.Point:
     """Return where the force pushes the shuttle: the middle of its upper end, or of the bar across it [m]."""
     return max(
         (_end_of([body], "shuttle", pose, True) for body in shown if body.name == "shuttle"), key=lambda at: at[1]
     )
 
 
-def _end_of(shown: Sequence[Body], name: str, pose: int, upper: bool) -> parts.Point:
+def _end_of(shown: Sequence[PosedBody], name: str, pose: int, upper: bool) -> parts.Point:
     """Return the middle of the upper or the lower side of the first body of a name, a rectangle [m]."""
     corners = next(body for body in shown if body.name == name).core_at(pose)
     x, y = corners.mean(axis=0)[0], corners[:, 1]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.beam_sections import check_outline
 from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
+from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.export.posed_part import rectangle
 from cfmkit.families.findings import mm

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.beam_sections import BeamSection, SpecifiedPiece
+from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
+from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.fillets import filleted
-from cfmkit.export.posed_part import MIRROR, Body, PosedPart, band, in_poses, rectangle
+from cfmkit.export.posed_part import MIRROR, PosedBody, PosedPart, band, in_poses, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_sizes
@@ -71,7 +72,7 @@ def _travels(push: Push) -> list[float]:
     return [*back, *np.linspace(0.0, end, N_POSES).tolist()]
 
 
-def bodies(solution: Solution, poses: Sequence[tuple[float, float]]) -> tuple[Body, ...]:
+def bodies(solution: Solution, poses: Sequence[tuple[float, float]]) -> tuple[PosedBody, ...]:
     """Return everything at some travels of the shuttle and preloads [m]."""
     spec = solution.spec
     try:
@@ -86,14 +87,14 @@ def bodies(solution: Solution, poses: Sequence[tuple[float, float]]) -> tuple[Bo
 
 def _pose(
     spec: VcfmSpec, sizes: FrameSizes, leaf: LeafLaw, travel: float, preload: float, farthest: float
-) -> Iterator[Body]:
+) -> Iterator[PosedBody]:
     """Yield everything in one pose."""
     for body in sizes.bodies():
         yield body.moved(0.0, -travel) if body.role == "driven" else body
     line = leaf.bent_line(travel)[::-1] * MIRROR + np.array([sizes.wall, -float(leaf.strip.rise)])
     half, spacing = 0.5 * leaf_thickness(leaf, len(line)), spec.mechanism.frame.spacing
     for number in range(spec.mechanism.bistable.half_beams):
-        one = Body.polygon("leaf", "free", band(line + np.array([0.0, number // 2 * spacing]), half))
+        one = PosedBody.polygon("leaf", "free", band(line + np.array([0.0, number // 2 * spacing]), half))
         yield one.mirrored() if number % 2 else one
     if spec.mechanism.springs is None:
         yield from _leaf_spring(spec, sizes.bottom - travel, travel + preload)
@@ -107,7 +108,7 @@ def leaf_thickness(law: LeafLaw, count: int) -> FloatArray:
     return np.asarray(np.minimum(np.interp(place, shares, heights), np.interp(-place, -shares[::-1], heights[::-1])))
 
 
-def _leaf_spring(spec: VcfmSpec, top: float, compression: float) -> Iterator[Body]:
+def _leaf_spring(spec: VcfmSpec, top: float, compression: float) -> Iterator[PosedBody]:
     """Yield the blocks and leaves of a spring whose upper end is at `top`, at a compression [m]."""
     frame, law = spec.mechanism.frame, _spring(spec)
     foot, blocks = law.blocks(frame.block, frame.corner, spec.mechanism.fillet, top, compression)
@@ -119,16 +120,16 @@ def _leaf_spring(spec: VcfmSpec, top: float, compression: float) -> Iterator[Bod
             yield body.mirrored()
 
 
-def _strip(line: FloatArray, thickness: float) -> Body:
+def _strip(line: FloatArray, thickness: float) -> PosedBody:
     """Return a leaf of a spring, a little of it within the blocks at its ends: their faces are upright, it is not."""
     ends = [line[0] - line[1], line[-1] - line[-2]]
     beyond = [0.5 * thickness * abs(y) / np.hypot(x, y) * np.array([x, y]) / max(abs(x), abs(y)) for x, y in ends]
-    return Body.polygon(
+    return PosedBody.polygon(
         "spring", "free", band(np.vstack([line[0] + beyond[0], line, line[-1] + beyond[1]]), 0.5 * thickness)
     )
 
 
-def _coils(spec: VcfmSpec, bottom: float, head: float, deflection: float, farthest: float) -> Iterator[Body]:
+def _coils(spec: VcfmSpec, bottom: float, head: float, deflection: float, farthest: float) -> Iterator[PosedBody]:
     """Yield bought springs side by side: below the shuttle, or above it where they are pulled.
 
     Sizes that are not stated are such as fit the frame: only the deflection is to scale then.
@@ -149,11 +150,11 @@ def _coils(spec: VcfmSpec, bottom: float, head: float, deflection: float, farthe
     heights = start + (end - start) * phase / phase[-1]
     for middle in middles:
         line = np.column_stack([middle + 0.5 * (across - wire) * np.sin(phase), heights])
-        yield Body.polygon("spring", "free", band(line, 0.5 * wire))
+        yield PosedBody.polygon("spring", "free", band(line, 0.5 * wire))
     left, right = float(middles.min()) - 0.6 * across, float(middles.max()) + 0.6 * across
-    yield Body.polygon("base", "held", rectangle(left, end, right, end + (frame.block if hangs else -frame.block)))
+    yield PosedBody.polygon("base", "held", rectangle(left, end, right, end + (frame.block if hangs else -frame.block)))
     if hangs:  # a beam on the shuttle that they pull on
-        yield Body.polygon("beam", "driven", rectangle(min(left, 0.0), start - 0.5 * frame.block, right, start))
+        yield PosedBody.polygon("beam", "driven", rectangle(min(left, 0.0), start - 0.5 * frame.block, right, start))
 
 
 # --- as made: exact edges ---------------------------------------------------------------------------------------
@@ -187,7 +188,7 @@ def leaf_sections(law: LeafLaw, apex: Point) -> Iterator[BeamSection]:
             yield BeamSection("leaf", place, across, float(0.5 * (one + other)), (end - start) * length)
 
 
-def _section(strip: Body, thickness: float) -> BeamSection:
+def _section(strip: PosedBody, thickness: float) -> BeamSection:
     """Return the section in the middle of a leaf of the spring."""
     left, right = strip.outline()[: (half := len(strip.outline()) // 2)], strip.outline()[half:][::-1]
     line, across = 0.5 * (left + right), (left - right)[half // 2]

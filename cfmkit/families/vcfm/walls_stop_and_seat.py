@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.posed_part import Body, rectangle
+from cfmkit.export.posed_part import PosedBody, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.cut_and_frame_spec import StandingFrame, VcfmPart
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
@@ -52,18 +52,18 @@ class FrameSizes:
         """Lower end of what stands."""
         return self.wall_bottom if self.floor is None else self.floor - self.ground
 
-    def bodies(self) -> Iterator[Body]:
+    def bodies(self) -> Iterator[PosedBody]:
         """Yield shuttle and walls, and a bar across the shuttle, the ground and the seats on it if there are any."""
         low = self.wall_bottom if self.floor is None else self.floor
-        yield Body.polygon("shuttle", "driven", rectangle(-self.half, self.bottom, self.half, self.under))
+        yield PosedBody.polygon("shuttle", "driven", rectangle(-self.half, self.bottom, self.half, self.under))
         if self.stopped:
-            yield Body.polygon("shuttle", "driven", rectangle(-self.out, self.under, self.out, self.head))
+            yield PosedBody.polygon("shuttle", "driven", rectangle(-self.out, self.under, self.out, self.head))
         for x in (self.wall, -self.out):
-            yield Body.polygon("wall", "held", rectangle(x, low, x + self.out - self.wall, self.wall_top))
+            yield PosedBody.polygon("wall", "held", rectangle(x, low, x + self.out - self.wall, self.wall_top))
         if self.floor is not None:
-            yield Body.polygon("ground", "held", rectangle(-self.out, self.foot, self.out, self.floor))
+            yield PosedBody.polygon("ground", "held", rectangle(-self.out, self.foot, self.out, self.floor))
         if len(self.ledge) > 1:
-            seat = Body.polygon("seat", "held", rectangle(*self.ledge[0], *self.ledge[2]))
+            seat = PosedBody.polygon("seat", "held", rectangle(*self.ledge[0], *self.ledge[2]))
             yield from (seat, seat.mirrored())
 
 

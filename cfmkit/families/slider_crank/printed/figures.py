@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.posed_part import Body
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.slider_crank.printed.solution import Solution
     from cfmkit.results import Result
 
@@ -121,14 +121,14 @@ def part(result: Result) -> Figure:
     return figure
 
 
-def _in_view(result: Result, points: NDArray[Any]) -> tuple[tuple[Body, ...], parts.Box, float]:
+def _in_view(result: Result, points: NDArray[Any]) -> tuple[tuple[PosedBody, ...], parts.Box, float]:
     """Return the leg at points of the travel, the box of all poses with a margin, and the margin's unit [m]."""
     _, _, *leg = bodies(result.spec, result.state, points)  # type: ignore[arg-type]
     view, size = parts.box_around(leg, (MARGIN, MARGIN, 2.5 * MARGIN, 2.0 * MARGIN))
     return tuple(leg), view, MARGIN * size
 
 
-def _draw(ax: Axes, leg: Sequence[Body], pose: int, solid: bool) -> None:
+def _draw(ax: Axes, leg: Sequence[PosedBody], pose: int, solid: bool) -> None:
     """Draw a leg in a pose: filled, or as a ghost."""
     look = {"facecolor": BLUE, "edgecolor": INK} if solid else {"facecolor": "#d9dde2", "edgecolor": GREY}
     for body in leg:

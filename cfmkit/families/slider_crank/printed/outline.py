@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.arc_outlines import check_simple
-from cfmkit.export.beam_sections import check_outline
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
+from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import filleted, sharp_notes
-from cfmkit.export.posed_part import Body, swept
+from cfmkit.export.posed_part import PosedBody, swept
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
 from cfmkit.families.slider_crank.printed.part import STRAIGHT, Leg, bodies, chosen
 from cfmkit.specs.units import format_short
@@ -140,19 +140,19 @@ def _frame(spec: SliderCrankSpec, leg: Leg) -> tuple[FloatArray, ...]:
     ).pieces
 
 
-def _moving(spec: SliderCrankSpec, leg: Leg) -> Iterator[Body]:
+def _moving(spec: SliderCrankSpec, leg: Leg) -> Iterator[PosedBody]:
     """Yield leg and pad at the slider at rest and over the travel; all of the leg as wide as its widest piece."""
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.model import analyze
 
-    yield Body.line("leg", "free", leg.points, leg.widest)
-    yield Body.polygon("pad", "driven", leg.pads[1])
+    yield PosedBody.line("leg", "free", leg.points, leg.widest)
+    yield PosedBody.polygon("pad", "driven", leg.pads[1])
     fidelity = {"analysis.fidelity": None} if spec.analysis.fidelity == "solid" else {}
     solution: Any = analyze(spec.replace(fidelity), Run()).state
     if solution is not None:
         _, slider, *found = bodies(spec, solution, chosen(solution, SWEPT))
         yield slider
-        yield Body.line("leg", "free", np.concatenate([one.core for one in found], axis=1), leg.widest)
+        yield PosedBody.line("leg", "free", np.concatenate([one.core for one in found], axis=1), leg.widest)
 
 
 def _dimensions(points: FloatArray) -> Iterator[DrawnDimension]:

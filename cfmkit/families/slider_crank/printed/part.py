@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.beam_sections import BeamSection, SpecifiedPiece
-from cfmkit.export.contours import TOLERANCE, Contour, Line, polygon
-from cfmkit.export.posed_part import Body, PosedPart
+from cfmkit.export.beam_sections import BeamSection
+from cfmkit.export.contours import Contour, Line, polygon
+from cfmkit.export.drawn_as_specified import SpecifiedPiece
+from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURES, STRIP
@@ -175,44 +176,40 @@ def _pad_sizes(spec: SliderCrankSpec) -> tuple[float, float, float]:
 
 
 def part_over_motion(result: Result) -> PosedPart:
-    """Return a printed part as it is cut, and as it moves; legs lie above each other.
-
-    A mirrored pair is drawn apart from each other, and so needs a little less than is said.
-    """
-    from cfmkit.families.slider_crank.outline import drawing
-
+    """Return one leg as it moves; legs lie above each other."""
     spec: Any = result.spec
-    cut = [one for one in drawing(spec).contours if one.layer == "cut" and not one.hole]
-    drawn = [Body.polygon("as cut", "free", one.points(TOLERANCE)) for one in cut]
+    depth = spec.mechanism.legs * float(Leg.of(spec).width.max())
     moving = bodies(spec, result.state, chosen(result.state, N_POSES))
-    leg, mechanism = Leg.of(spec), spec.mechanism
-    depth = mechanism.legs * float(leg.width.max())
-    return PosedPart((*drawn, *moving), direction=0.0, depth=depth, pieces=mechanism.sets)
+    return PosedPart(moving, direction=0.0, depth=depth, pieces=spec.mechanism.sets)
 
 
-def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> tuple[Body, ...]:
+def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> tuple[PosedBody, ...]:
     """Return the pads, and the flexures with the links between them, or the strip, at points of the travel.
 
     The leg's pieces come in their order, from the ground to the slider.
     """
     leg, path = Leg.of(spec, as_printed=True), solution.pressed.path
     at = [int(path.at_requested[point]) for point in points]
-    found: list[Body] = []
+    found: list[PosedBody] = []
     for name, beam in path.network.beams.items():
         line = np.array([path.shape(name, point) for point in at])
         if found:
             link = np.stack([found[-1].core[:, -1], line[:, 0]], axis=1)
-            found.append(Body.line("link", "free", link, leg.widest))
+            found.append(PosedBody.line("link", "free", link, leg.widest))
         place, thickness = path.places(name), beam.section.thickness
         if isinstance(thickness, float):
             half: FloatArray = np.full(len(place), 0.5 * thickness)
         else:
             half = 0.5 * np.interp(place, thickness.stations, np.real(thickness.values))
-        found.append(Body.line("flexure", "free", line, half))
+        found.append(PosedBody.line("flexure", "free", line, half))
     ground, slider = leg.pads
     angle = travel_direction(linkage_of(spec.mechanism))
     travel = solution.travel[points, None] * np.array([np.cos(angle), np.sin(angle)])
-    return (Body.polygon("pad", "held", ground), Body.polygon("pad", "driven", slider + travel[:, None]), *found)
+    return (
+        PosedBody.polygon("pad", "held", ground),
+        PosedBody.polygon("pad", "driven", slider + travel[:, None]),
+        *found,
+    )
 
 
 def chosen(solution: Solution, count: int) -> NDArray[np.intp]:

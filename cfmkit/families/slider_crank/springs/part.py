@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.posed_part import Body, PosedPart
+from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
@@ -40,14 +40,14 @@ def part_over_motion(result: Result) -> PosedPart:
     )
 
 
-def bodies(spec: SliderCrankSpec, solution: Solution, units: UnitCurves) -> Iterator[Body]:
+def bodies(spec: SliderCrankSpec, solution: Solution, units: UnitCurves) -> Iterator[PosedBody]:
     """Yield links and springs where the joints are, the slider's spring as far as it stands out around its pin."""
     pins, (half, _) = joints(solution, units), eye_and_hole(spec)
     for name, k in (("crank", 0), ("coupler", 1)):
-        yield Body.line(name, "driven" if k == 0 else "free", np.stack(pins[k : k + 2], axis=1), half, round=True)
+        yield PosedBody.line(name, "driven" if k == 0 else "free", np.stack(pins[k : k + 2], axis=1), half, round=True)
     for pin, names in zip(pins, (("pivot",), ("crank_pin",), ("slider_pin", "slider")), strict=True):
         sizes = [0.5 * coil.outer_diameter for name in names for coil in spec.mechanism.springs.coils_at(name)]
-        yield Body.line("spring", "free", pin[:, None], max([half, *sizes]))
+        yield PosedBody.line("spring", "free", pin[:, None], max([half, *sizes]))
 
 
 def joints(solution: Solution, units: UnitCurves) -> tuple[FloatArray, FloatArray, FloatArray]:

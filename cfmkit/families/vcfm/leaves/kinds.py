@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Section
-    from cfmkit.export.posed_part import Body
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
     Edge = list[Any]  # corners (x, y) [m], and arcs of `cfmkit.export.contours`
@@ -177,22 +177,22 @@ class LeafSpring(ABC):
 
     def blocks(
         self, block: float, corner: float, fillet: float, top: float, compression: float
-    ) -> tuple[float, list[Body]]:
+    ) -> tuple[float, list[PosedBody]]:
         """Return the height at which its `bent_lines` begin [m], and its rigid blocks at a compression [m].
 
         Of those beside x = 0 the right ones; `edges` describes the other parameters.
         """
-        from cfmkit.export.posed_part import Body, rectangle
+        from cfmkit.export.posed_part import PosedBody, rectangle
 
         lines, height = self.bent_lines(compression, corner)
         half, rim, foot = 0.5 * block, self.rim(fillet), top - block - height
         over = 0.5 * self.strip.thickness / float(np.cos(self.strip.angle))
         found = [
-            Body.polygon("block", "driven", rectangle(-half, top - block - over, half, top)),
-            Body.polygon("base", "held", rectangle(-half, foot - block, half, foot + over)),
+            PosedBody.polygon("block", "driven", rectangle(-half, top - block - over, half, top)),
+            PosedBody.polygon("base", "held", rectangle(-half, foot - block, half, foot + over)),
         ]
         for x, y in ((half + line[-1, 0], foot + line[-1, 1]) for line in lines[:-1]):
-            found.append(Body.polygon("corner", "free", rectangle(x, y - rim, x + block, y + corner + rim)))
+            found.append(PosedBody.polygon("corner", "free", rectangle(x, y - rim, x + block, y + corner + rim)))
         return foot, found
 
     def room(self, _corner: float) -> float:

@@ -31,7 +31,7 @@ from cfmkit.families.vcfm.leaves.s_form import s_force
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Section, Support
-    from cfmkit.export.posed_part import Body
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
@@ -317,15 +317,15 @@ class StraightSpring(LeafSpring):
 
     def blocks(
         self, block: float, _corner: float, _fillet: float, top: float, compression: float
-    ) -> tuple[float, list[Body]]:
+    ) -> tuple[float, list[PosedBody]]:
         """Return the height of its driven middle [m], and that block and the right one of the two that stand."""
-        from cfmkit.export.posed_part import Body, rectangle
+        from cfmkit.export.posed_part import PosedBody, rectangle
 
         half, middle = 0.5 * block, top - block
         x, end = half + self.strip.length, middle + compression
         return middle, [
-            Body.polygon("block", "driven", rectangle(-half, middle - half, half, top)),
-            Body.polygon("base", "held", rectangle(x, end - half, x + block, end + half)),
+            PosedBody.polygon("block", "driven", rectangle(-half, middle - half, half, top)),
+            PosedBody.polygon("base", "held", rectangle(x, end - half, x + block, end + half)),
         ]
 
     def bent_lines(self, compression: float, _corner: float) -> tuple[list[FloatArray], float]:
