@@ -243,7 +243,7 @@ def _as_made(assembly: Assembly) -> Iterator[PosedBody]:
     """Yield the boxes of all that a part is united from, and of the frame around it."""
     beams = strips_of(assembly, COARSE)
     for piece in drawn_parts(assembly, beams, SHARE * COARSE).pieces:
-        yield PosedBody.polygon("as cut", "free", rectangle(*Contour(piece.edges, "cut").extents))
+        yield PosedBody.polygon("as cut", "free", rectangle(*Contour(piece.edges, "cut").box))
     yield from (PosedBody.polygon("frame", "held", shape) for shape in drawn_frame(assembly, beams, COARSE))
 
 
