@@ -318,6 +318,12 @@ class Drawing(ShortRepr):
         return replace(self, contours=(*self.contours, reference_square(size, corner)))
 
 
+def signed_area(points: FloatArray) -> float:
+    """Return the area within a closed chain of points (n, 2) [m2], negative where it runs clockwise."""
+    x, y = (points - points[0]).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
 def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list[FloatArray]:
     """Return the closed contours of one layer as closed chains of points, for pictures only.
 
@@ -339,9 +345,7 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
     found = []
     for contour in chosen:
         chain = np.concatenate([_chain(edge, points) for edge in contour.edges])
-        x, y = chain[:, 0], chain[:, 1]
-        counter_clockwise = bool(x @ np.roll(y, -1) > np.roll(x, -1) @ y)
-        found.append(chain if counter_clockwise != contour.hole else chain[::-1])
+        found.append(chain if (signed_area(chain) > 0.0) != contour.hole else chain[::-1])
     return found
 
 

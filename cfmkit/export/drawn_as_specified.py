@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.beam_sections import ALLOWED, lines_of
+from cfmkit.export.contours import signed_area
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -83,7 +84,9 @@ def check_outline(
         remedy = f"--set 'mechanism.part.fillet={smaller}'" if fillet > 0 else "move its neighbours away"
         section.check(sum(cut), "outline", remedy)
         found.append(section)
-    enclosed = sum((-1.0 if one.hole else 1.0) * area_of(ring) for one, ring in zip(contours, rings, strict=True))
+    enclosed = sum(
+        (-1.0 if one.hole else 1.0) * abs(signed_area(ring)) for one, ring in zip(contours, rings, strict=True)
+    )
     _check_area(enclosed, *_areas(areas, holes, fillet))
     return tuple(found)
 
@@ -124,9 +127,3 @@ def _areas(pieces: Sequence[FloatArray], holes: Sequence[FloatArray], fillet: fl
     whole, cut = (union_all([Polygon(area).buffer(0.0) for area in areas]) for areas in (pieces, holes))
     filled = whole.buffer(fillet, quad_segs=32).buffer(-fillet, quad_segs=32) if fillet > 0 else whole
     return float(whole.difference(cut).area), float(filled.difference(cut).area)
-
-
-def area_of(shape: FloatArray) -> float:
-    """Return the area of a polygon (n, 2) [m2]."""
-    x, y = (shape - shape[0]).T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))

@@ -90,9 +90,9 @@ class PosedBody:
         return LineString(core).buffer(self.reach, cap_style="round" if self.round else "flat")
 
 
-def arc(center: Any, radius: float, begin: float, turn: float) -> FloatArray:
+def arc(center: Any, radius: float, begin: float, turn: float, points: int = N_CIRCLE_POINTS) -> FloatArray:
     """Return points of an arc from an angle on, counter-clockwise (n, 2) [m]."""
-    angle = begin + np.linspace(0.0, turn, N_CIRCLE_POINTS)
+    angle = begin + np.linspace(0.0, turn, points)
     return np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 

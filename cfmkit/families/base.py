@@ -170,13 +170,12 @@ class Room:
     # across, along: in the plane, across and along the direction of travel [m]
     across: float
     along: float
-    depth: float | None = None  # out of the plane [m]; None if nothing is known of it
-    parts: int = 1  # separate pieces that the mechanism is put together from, bought ones included
-    assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
-    corner: tuple[float, float] = (0.0, 0.0)  # its lower left corner in the drawings of the mechanism [m]
-    sideways: bool = False  # whether the travel is along x in the drawings, not along y
-    # width and height of the box along x and y of the drawings [m], where the travel is along neither
-    drawn: tuple[float, float] | None = None
+    depth: float | None  # out of the plane [m]; None if nothing is known of it
+    parts: int  # separate pieces that the mechanism is put together from, bought ones included
+    assumed: str  # what of it no value of the specification says, in one clause; empty if all of it does
+    corner: tuple[float, float]  # its lower left corner in the drawings of the mechanism [m]
+    sideways: bool  # whether the travel is along x in the drawings, or nearly, not along y
+    drawn: tuple[float, float]  # width and height of the box along x and y of the drawings [m]
 
     @classmethod
     def around(cls, part: PosedPart) -> Room:
@@ -192,9 +191,7 @@ class Room:
     @property
     def sides(self) -> tuple[float, float, float | None]:
         """Sizes along x and y of the drawings, and out of their plane [m]."""
-        width, height = (self.along, self.across) if self.sideways else (self.across, self.along)
-        width, height = self.drawn or (width, height)
-        return width, height, self.depth
+        return *self.drawn, self.depth
 
 
 ENVELOPE = {

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.export.contours import signed_area
+from cfmkit.export.posed_part import arc
 from cfmkit.export.posed_part import box as box_of
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.label_placement import Label
@@ -147,15 +149,11 @@ def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
 @styled
 def bodies(ax: Axes, shown: Sequence[PosedBody], pose: int, colors: Mapping[str, str]) -> None:
     """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
-    plate(ax, [_counter_clockwise(body.outline(pose)) for body in shown if body.name not in colors], "rigid")
+    rigid = [body.outline(pose) for body in shown if body.name not in colors]
+    plate(ax, [one if signed_area(one) > 0.0 else one[::-1] for one in rigid], "rigid")
     for body in shown:
         if body.name in colors:
             area(ax, body.outline(pose), body.name, color=colors[body.name])
-
-
-def _counter_clockwise(points: FloatArray) -> FloatArray:
-    x, y = points.T
-    return points if x @ np.roll(y, -1) > np.roll(x, -1) @ y else points[::-1]
 
 
 def box_around(shown: Iterable[PosedBody], margins: tuple[float, float, float, float]) -> tuple[Box, float]:
@@ -246,5 +244,4 @@ def part_name(text: str, points: Any, toward: Point, color: str = INK, prefer: f
 
 def ring(center: Point, radius: float, points: int = 73) -> FloatArray:
     """Return a circle's points, counter-clockwise from the left, (n, 2), in the unit of its centre."""
-    turn = np.linspace(-np.pi, np.pi, points)
-    return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    return arc(center, radius, -np.pi, 2.0 * np.pi, points)

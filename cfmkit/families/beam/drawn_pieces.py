@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.drawn_as_specified import area_of
+from cfmkit.export.contours import signed_area
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
@@ -283,7 +283,7 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
         pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
         for other in ends:
             pad = _behind(pad, other) if other is not end else pad
-        if len(pad) > 2 and area_of(pad) > LEAST * depth * half:
+        if len(pad) > 2 and abs(signed_area(pad)) > LEAST * depth * half:
             yield pad, end
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.export.contours import polygons
-from cfmkit.export.posed_part import PosedBody, PosedPart, rectangle
+from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
@@ -169,15 +169,11 @@ class Scene:
 
 def scene(solution: Solution) -> Scene:
     """Return the parts that do not move, and what the mechanism sweeps over the whole solution."""
-    plate, path = polygons(_plate(solution), "cut"), roller_path(solution)
-    radius, outline = solution.assembly.spec.mechanism.roller_radius, np.concatenate(plate)
-    across = max(float(path[:, 0].max()) + radius, float(outline[:, 0].max()))
-    bottom = min(float(path[:, 1].min()) - radius, float(outline[:, 1].min()))
-    top = max(float(pin_path(solution)[-1, 1]), float(outline[:, 1].max()))
+    (_, bottom), (across, top) = box(bodies(solution)).tolist()
     height = top - bottom
     half = max(1.06 * across, SLENDER * height)
-    box = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
-    return Scene(plate, surface(solution), path, box)
+    view = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
+    return Scene(polygons(_plate(solution), "cut"), surface(solution), roller_path(solution), view)
 
 
 def swallowtail(solution: Solution, points: int = 200) -> FloatArray:
