@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.errors import GeometryError
 from cfmkit.export.beam_sections import ALLOWED, lines_of
 from cfmkit.export.contours import signed_area
+from cfmkit.export.union import GRID
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def check_outline(
     enclosed = sum(
         (-1.0 if one.hole else 1.0) * abs(signed_area(ring)) for one, ring in zip(contours, rings, strict=True)
     )
-    _check_area(enclosed, *_areas(areas, holes, fillet))
+    _check_area(enclosed, *_areas(areas, holes, fillet, GRID * thinnest))
     return tuple(found)
 
 
@@ -120,10 +121,14 @@ def _check_area(measured: float, least: float, largest: float) -> None:
     )
 
 
-def _areas(pieces: Sequence[FloatArray], holes: Sequence[FloatArray], fillet: float) -> tuple[float, float]:
+def _areas(
+    pieces: Sequence[FloatArray], holes: Sequence[FloatArray], fillet: float, grid: float
+) -> tuple[float, float]:
     """Return the area of the union of polygons less holes [m2]: without fillets, and with all that they may fill."""
     from shapely import Polygon, union_all
 
-    whole, cut = (union_all([Polygon(area).buffer(0.0) for area in areas]) for areas in (pieces, holes))
+    # without a grid the union of strips that only just overlap may lose one of them
+    shapes = ([Polygon(area).buffer(0.0) for area in areas] for areas in (pieces, holes))
+    whole, cut = (union_all(own, grid_size=grid) for own in shapes)
     filled = whole.buffer(fillet, quad_segs=32).buffer(-fillet, quad_segs=32) if fillet > 0 else whole
     return float(whole.difference(cut).area), float(filled.difference(cut).area)

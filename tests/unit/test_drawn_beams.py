@@ -274,3 +274,26 @@ def test_a_leg_that_is_not_drawn_as_specified_is_refused(name, monkeypatch):
     monkeypatch.setattr(Leg, "contours", property(lambda _: of(Leg.of(other, as_printed=True))))
     with pytest.raises(GeometryError, match="thick in the outline"):
         cfmkit.drawing(config(f"slider_crank_{name}"))
+
+
+def test_strips_that_only_just_overlap_are_one_area():
+    """The union of these strips lost one of them, and a part that is as specified was refused."""
+    thickness = [
+        1.0830258843272022, 0.9461045645991758, 2.294927211424994, 1.8403562248599425, 3.102241448824241,
+        2.3998682572284775, 2.131509416829178, 1.754170154117468, 2.001168071213906, 1.2489348287665729,
+        0.5929737987593309, 2.3626878879347652,
+    ]  # fmt: skip
+    spec = config("slider_crank_tapered").replace(
+        {
+            "mechanism.beam.thickness": [MM * one for one in thickness],
+            "mechanism.unloaded_angle": 0.40164450983504646,
+            "requirements": [],
+        }
+    )
+    assert cfmkit.drawing(spec).sections
+
+
+def test_thick_leaves_of_a_spring_between_small_blocks_are_on_both_sides():
+    keys = ("positive.thickness=4.3 mm", "positive.angle=18 deg", "frame.block=2.3 mm")
+    spec = config("vcfm_pla", *(f"mechanism.{key}" for key in keys), "requirements=[]")
+    assert [one.beam for one in cfmkit.drawing(spec).sections].count("spring") == 4

@@ -116,7 +116,8 @@ def _leaf_spring(spec: VcfmSpec, top: float, compression: float) -> Iterator[Pos
     strips = [_strip(line + np.array([0.5 * frame.block, foot]), law.strip.thickness) for line in lines]
     for body in (*blocks, *strips):
         yield body
-        if body.core[..., 0].min() > 0.0 and spec.mechanism.flexures.loaded == "whole":
+        in_the_middle = body.name in ("block", "base") and body.core[..., 0].min() < 0.0
+        if spec.mechanism.flexures.loaded == "whole" and not in_the_middle:
             yield body.mirrored()
 
 

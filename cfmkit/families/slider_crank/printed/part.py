@@ -36,6 +36,12 @@ PAD = (0.012, 0.010)
 STRAIGHT, MITRE = 1e-9, 2.0
 """Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
 
+SAME_PLACE = 1e-9
+"""Points nearer to each other than this are one, in lengths of the centre line."""
+
+COMPLEX = np.array([1.0, 1j])
+"""From x and y to x + iy."""
+
 LINK_RATIO = 5.0
 """Width of a rigid link in flexure thicknesses."""
 
@@ -137,29 +143,28 @@ class Leg:
 
     def specified_pieces(self) -> Iterator[SpecifiedPiece]:
         """Yield what it is united from, with the sections of flexures or of the strip."""
-        turns = np.tan(0.5 * np.abs(_turns(self.points)))
-        last = len(self.pieces) - 1
-        for k, piece in enumerate(self.pieces):
-            ends, half = self.points[piece.start : piece.start + 2], np.array(piece.half)
-            length = float(np.hypot(*(ends[1] - ends[0])))
-            way = (ends[1] - ends[0]) / length
-            across = np.array([-way[1], way[0]])
-            # at a bend the outer edges meet beyond the ends
-            beyond = [
-                half[0] * turns[k - 1] if k > 0 and self.pieces[k - 1].half[1] == half[0] else 0.0,
-                half[1] * turns[k] if k < last and self.pieces[k + 1].half[0] == half[1] else 0.0,
-            ]
-            line = np.array([ends[0] - beyond[0] * way, ends[1] + beyond[1] * way])
-            area = np.vstack([line + half[:, None] * across, (line - half[:, None] * across)[::-1]])
-            section = BeamSection(piece.name, ends.mean(axis=0), across, float(half.sum()), length)
-            yield SpecifiedPiece((area,), (section,) if piece.name else ())
+        ends = (
+            self.points[[piece.start for piece in self.pieces]],
+            self.points[[piece.start + 1 for piece in self.pieces]],
+        )
+        length = np.hypot(*(ends[1] - ends[0]).T)
+        # places that differ by rounding have no piece between them
+        kept = np.flatnonzero(length > SAME_PLACE * self.place[-1])
+        way = (ends[1] - ends[0])[kept] / length[kept, None]
+        half = np.array([self.pieces[k].half for k in kept])
+        # at a bend without a step the outer edges meet beyond the ends
+        turn = np.abs(np.angle((way[1:] @ COMPLEX) / (way[:-1] @ COMPLEX)))
+        beyond = np.where(half[:-1, 1] == half[1:, 0], half[1:, 0] * np.tan(0.5 * turn), 0.0)
+        before, after = np.append(0.0, beyond), np.append(beyond, 0.0)
+        for number, k in enumerate(kept.tolist()):
+            along, across = way[number], np.array([-way[number, 1], way[number, 0]])
+            line = np.array([ends[0][k] - before[number] * along, ends[1][k] + after[number] * along])
+            aside = half[number][:, None] * across
+            middle, thickness = 0.5 * (ends[0][k] + ends[1][k]), float(half[number].sum())
+            section = BeamSection(self.pieces[k].name, middle, across, thickness, float(length[k]))
+            area = np.vstack([line + aside, (line - aside)[::-1]])
+            yield SpecifiedPiece((area,), (section,) if self.pieces[k].name else ())
         yield from (SpecifiedPiece((pad,)) for pad in self.pads)
-
-
-def _turns(points: FloatArray) -> FloatArray:
-    """Return by how much a chain turns at each of its inner points [rad]."""
-    way = np.diff(points, axis=0) @ np.array([1.0, 1j])
-    return np.asarray(np.angle(way[1:] / way[:-1]))
 
 
 def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:
