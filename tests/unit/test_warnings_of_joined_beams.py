@@ -187,8 +187,9 @@ def test_levels_of_cosine_leaves_touch_where_they_are_steepest():
 
     def between(spacing: float) -> Any:
         wider = mechanism.replace({"mechanism.frame.spacing": f"{spacing} mm"})
-        edges = [np.concatenate([item.points for item in part._edge(part._leaf(wider), side, (0.0, level * 1e-3 * spacing))])
-                 for side, level in ((1.0, 0), (-1.0, 1))]  # fmt: skip
+        law, sides = part._leaf(wider), ((1.0, 0), (-1.0, 1))
+        edges = [np.concatenate([item.points for item in part._edge(law, side, (0.0, level * 1e-3 * spacing))])
+                 for side, level in sides]  # fmt: skip
         return Polygon(np.concatenate([edges[0], edges[1][::-1]]))
 
     assert between(1.01 * least).is_valid

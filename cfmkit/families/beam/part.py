@@ -232,14 +232,14 @@ def part_over_motion(result: Result) -> PosedPart | None:
     assembly, mechanism = solution.assembly, solution.spec.mechanism
     legs = mechanism.copies.legs if mechanism.copies else 1
     return PosedPart(
-        (*_as_made(assembly), *bodies(solution, chosen(solution, N_POSES), regions(solution.spec, COARSE))),
+        (*as_made(assembly), *bodies(solution, chosen(solution, N_POSES), regions(solution.spec, COARSE))),
         direction=assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi,
         depth=legs * max([mechanism.width or 0.0, *mechanism.of_beams("width").values()]),
         pieces=legs,
     )
 
 
-def _as_made(assembly: Assembly) -> Iterator[PosedBody]:
+def as_made(assembly: Assembly) -> Iterator[PosedBody]:
     """Yield the boxes of all that a part is united from, and of the frame around it."""
     beams = strips_of(assembly, COARSE)
     for piece in drawn_parts(assembly, beams, SHARE * COARSE).pieces:
