@@ -7,7 +7,7 @@ at which the part runs on into another beam or a block, and short pieces beside 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -72,73 +72,3 @@ class BeamSection:
 def lines_of(rings: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return starts and ends (n, 2) of the lines of closed rings (k, 2) of points [m]."""
     return np.concatenate(list(rings)), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
-
-
-def free_sections(
-    sections: Sequence[BeamSection],
-    rings: Sequence[FloatArray],
-    areas: Sequence[FloatArray],
-    own: Sequence[Sequence[int]],
-    fillet: float,
-) -> tuple[BeamSection, ...]:
-    """Return those of some sections that are free of joints, once the outline is as thick as each of them.
-
-    Parameters
-    ----------
-    sections : sequence of BeamSection
-    rings : sequence of (k, 2) arrays
-        The outline [m].
-    areas : sequence of (n, 2) arrays
-        Polygons of everything that was united [m].
-    own : sequence, as long as `sections`, of sequences of int
-        Which of these are of the beam there.
-    fillet : float
-        Radius of inside corners [m].
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        Where the outline differs from the specification.
-    """
-    from shapely import LineString, STRtree, polygons
-
-    starts, ends = lines_of(rings)
-    tree = STRtree([polygons(area) for area in areas])
-    found = []
-    for section, mine in zip(sections, own, strict=True):
-        cut = section.cut(starts, ends)
-        if np.isfinite(cut).all():
-            met = tree.query(LineString(section.line(cut)), "intersects")
-            if not {*met.tolist()} <= {*mine}:
-                continue
-        smaller = format_short(min(0.5 * section.thickness, 0.125 * section.length, 0.5 * fillet), "length", 2)
-        remedy = f"--set 'mechanism.part.fillet={smaller}'" if fillet > 0 else "move its neighbours away"
-        section.check(sum(cut), "outline", remedy)
-        found.append(section)
-    return tuple(found)
-
-
-def check_area(measured: float, least: float, largest: float) -> None:
-    """Refuse an outline that encloses another area than its pieces do, fillets between them included [m2].
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        With the areas.
-    """
-    if least * (1.0 - ALLOWED) <= measured <= largest * (1.0 + ALLOWED):
-        return
-    raise GeometryError(
-        f"the outline encloses {1e6 * measured:.6g} mm2, but its beams and blocks {1e6 * least:.6g} to "
-        f"{1e6 * largest:.6g} mm2: beams may lie on each other; move them apart, or use another 'mechanism.part.fillet'"
-    )
-
-
-def areas_of(pieces: Sequence[Any], holes: Sequence[Any], size: float, fillet: float) -> tuple[float, float]:
-    """Return the area of the union of pieces less holes [m2]: without fillets, and with all that they may fill."""
-    from shapely import Polygon, union_all
-
-    whole = union_all([Polygon(area).buffer(0.0) for piece in pieces for area in piece.covered(size)])
-    cut = union_all([Polygon(area).buffer(0.0) for hole in holes for area in hole.covered(size)])
-    filled = whole.buffer(fillet, quad_segs=32).buffer(-fillet, quad_segs=32) if fillet > 0 else whole
-    return float(whole.difference(cut).area), float(filled.difference(cut).area)

@@ -133,6 +133,12 @@ class Contour:
         corners = np.concatenate([_corners(edge) for edge in self.edges])
         return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
 
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Smallest x and y, largest x and y of the edges [m], of arcs as far as they go."""
+        corners = np.concatenate([_farthest(edge) for edge in self.edges])
+        return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+
     def points(self, sagitta: float, turn: float = math.inf) -> FloatArray:
         """Return points (n, 2) [m] along closed edges, smooth ones' own among them, within `sagitta` [m] of all edges.
 
@@ -148,6 +154,16 @@ def _corners(edge: Edge) -> FloatArray:
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end])
     return np.array(edge.center) + edge.radius * np.array([[-1.0, -1.0], [1.0, 1.0]])
+
+
+def _farthest(edge: Edge) -> FloatArray:
+    """Return points of an edge (n, 2) [m] that its box is around: its own, and of an arc those along both axes."""
+    if not isinstance(edge, Arc):
+        return _corners(edge)
+    low, high = sorted((edge.start, edge.end))
+    quarters = 0.5 * math.pi * np.arange(math.ceil(low / (0.5 * math.pi)), math.floor(high / (0.5 * math.pi)) + 1)
+    angle = np.array([low, high, *quarters])
+    return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
@@ -290,7 +306,7 @@ class Drawing(ShortRepr):
     @property
     def extents(self) -> tuple[float, float, float, float]:
         """Smallest x and y, largest x and y of what is cut [m]."""
-        boxes = np.array([one.extents for one in self.contours if one.layer not in UNCUT])
+        boxes = np.array([one.box for one in self.contours if one.layer not in UNCUT])
         return (*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:
@@ -300,6 +316,12 @@ class Drawing(ShortRepr):
         boxes = np.array([contour.extents for contour in self.contours])
         corner = (float(boxes[:, 2].max()) + size / 5, float(boxes[:, 1].min()))
         return replace(self, contours=(*self.contours, reference_square(size, corner)))
+
+
+def signed_area(points: FloatArray) -> float:
+    """Return the area within a closed chain of points (n, 2) [m2], negative where it runs clockwise."""
+    x, y = (points - points[0]).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list[FloatArray]:
@@ -323,9 +345,7 @@ def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list
     found = []
     for contour in chosen:
         chain = np.concatenate([_chain(edge, points) for edge in contour.edges])
-        x, y = chain[:, 0], chain[:, 1]
-        counter_clockwise = bool(x @ np.roll(y, -1) > np.roll(x, -1) @ y)
-        found.append(chain if counter_clockwise != contour.hole else chain[::-1])
+        found.append(chain if (signed_area(chain) > 0.0) != contour.hole else chain[::-1])
     return found
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import Arc, Contour, Line, Smooth
+from cfmkit.export.contours import Arc, Contour, Line, Smooth, signed_area
 from cfmkit.numerics.biarcs import cubic, slope
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, .
     """
     if radius <= 0 or len(contour.edges) < 2:
         return contour, ()
-    side = 1.0 if (_area(contour) > 0) != contour.hole else -1.0
+    side = 1.0 if (signed_area(contour.points(1e-5)) > 0) != contour.hole else -1.0
     edges = [edge for edge in contour.edges if not _used_up(edge)]
     # before any corner is rounded: an arc may use up a whole line, which has no direction then
     turns = [float(np.angle(_direction(edges[k], 0) / _direction(edges[k - 1], -1))) for k in range(len(edges))]
@@ -58,11 +58,6 @@ def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, .
 def _used_up(edge: Edge) -> bool:
     """Return True if an edge is a line without a length."""
     return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) <= 1e-12
-
-
-def _area(contour: Contour) -> float:
-    x, y = contour.points(1e-5).T
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _direction(edge: Edge, end: int) -> complex:

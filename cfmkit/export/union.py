@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
+from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth, signed_area
 from cfmkit.export.traced_edges import TracedEdge, pair, xy
 
 if TYPE_CHECKING:
@@ -58,8 +58,7 @@ class OutlinePiece:
     @classmethod
     def polygon(cls, corners: FloatArray) -> OutlinePiece:
         """Return a polygon (n, 2) [m], in whichever sense it runs."""
-        x, y = (np.asarray(corners) - corners[0]).T
-        ring = corners if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else corners[::-1]
+        ring = corners if signed_area(np.asarray(corners)) > 0 else corners[::-1]
         ends = [(float(x), float(y)) for x, y in ring]
         return cls(tuple(Line(a, b) for a, b in zip(ends, [*ends[1:], ends[0]], strict=True) if a != b))
 

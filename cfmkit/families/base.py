@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.posed_part import PosedPart
     from cfmkit.families.rows import SolvedRows
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
@@ -132,20 +134,28 @@ class Room:
     # across, along: in the plane, across and along the direction of travel [m]
     across: float
     along: float
-    depth: float | None = None  # out of the plane [m]; None if nothing is known of it
-    parts: int = 1  # separate pieces that the mechanism is put together from, bought ones included
-    assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
-    corner: tuple[float, float] = (0.0, 0.0)  # its lower left corner in the drawings of the mechanism [m]
-    sideways: bool = False  # whether the travel is along x in the drawings, not along y
-    # width and height of the box along x and y of the drawings [m], where the travel is along neither
-    drawn: tuple[float, float] | None = None
+    depth: float | None  # out of the plane [m]; None if nothing is known of it
+    parts: int  # separate pieces that the mechanism is put together from, bought ones included
+    assumed: str  # what of it no value of the specification says, in one clause; empty if all of it does
+    corner: tuple[float, float]  # its lower left corner in the drawings of the mechanism [m]
+    sideways: bool  # whether the travel is along x in the drawings, or nearly, not along y
+    drawn: tuple[float, float]  # width and height of the box along x and y of the drawings [m]
+
+    @classmethod
+    def around(cls, part: PosedPart) -> Room:
+        """Return the box around a mechanism over its motion, along its travel and along x and y."""
+        from cfmkit.export.posed_part import box
+
+        across, along = (end - start for start, end in box(part.bodies, part.direction).T.tolist())
+        low, high = box(part.bodies).tolist()
+        sideways = abs(math.cos(part.direction)) > abs(math.sin(part.direction))
+        drawn = (high[0] - low[0], high[1] - low[1])
+        return cls(across, along, part.depth, part.pieces, part.assumed, (low[0], low[1]), sideways, drawn)
 
     @property
     def sides(self) -> tuple[float, float, float | None]:
         """Sizes along x and y of the drawings, and out of their plane [m]."""
-        width, height = (self.along, self.across) if self.sideways else (self.across, self.along)
-        width, height = self.drawn or (width, height)
-        return width, height, self.depth
+        return *self.drawn, self.depth
 
 
 ENVELOPE = {
@@ -219,7 +229,9 @@ class Family:
     elastic_networks: str | None = None
     # ``"module:function"``, ``propose(wish, run) -> FamilyOffer``: what it could do with a wish, by scaling laws
     propose: str | None = None
-    room: str | None = None  # ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in
+    # ``"module:function"`` with ``part_over_motion(result) -> PosedPart``: where the material of a solved mechanism is
+    # in its poses; its box follows. None where that is not known
+    part: str | None = None
     levels: tuple[str, ...] = ()  # dotted paths of the forces that its `design` block may ask for
     headline: tuple[str, ...] = ()  # values and metrics that are shown first after a run, in this order
     branches: tuple[str, ...] = ()  # every name that a branch of its curves may have; none where the curve decides
@@ -233,7 +245,7 @@ class Family:
     def __post_init__(self) -> None:
         """Add the findings that every family has, and the values of those that know their box."""
         object.__setattr__(self, "findings", {**self.findings, **SHARED})
-        if self.room:
+        if self.part:
             object.__setattr__(self, "values", {**self.values, **ENVELOPE})
 
     @property
@@ -265,14 +277,14 @@ class Family:
 
     def with_envelope(self, result: Result, names: Collection[str]) -> Result:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
-        if ENVELOPE.keys().isdisjoint(names) or not self.room:
+        if ENVELOPE.keys().isdisjoint(names) or not self.part:
             return result
         return sized(result, self.envelope(result))
 
     def envelope(self, result: Result) -> Room | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
-        found: Room | None = function_named(self.room)(result) if self.room else None
-        return found
+        part = function_named(self.part)(result) if self.part else None
+        return None if part is None else Room.around(part)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""

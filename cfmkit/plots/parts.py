@@ -11,18 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.export.contours import signed_area
+from cfmkit.export.posed_part import arc
+from cfmkit.export.posed_part import box as box_of
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.label_placement import Label
 from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.posed_part import PosedBody
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -130,7 +134,7 @@ def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
 
 
 @styled
-def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
+def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
     """Fill an outline (n, 2) [m]; the limits of the axes do not follow it.
 
     They are those of `to_scale`: to find what a shape of a hundred points spans takes matplotlib five times as long as
@@ -138,7 +142,29 @@ def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
     """
     from matplotlib.patches import Polygon
 
-    ax.add_artist(Polygon(mm(outline), closed=True, color=color, linewidth=0.4, zorder=2.0, gid=gid))
+    look: dict[str, Any] = {"linewidth": 0.4, "zorder": 2.0} | options
+    ax.add_artist(Polygon(mm(outline), closed=True, gid=gid, **look))
+
+
+@styled
+def bodies(ax: Axes, shown: Sequence[PosedBody], pose: int, colors: Mapping[str, str]) -> None:
+    """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
+    rigid = [body.outline(pose) for body in shown if body.name not in colors]
+    plate(ax, [one if signed_area(one) > 0.0 else one[::-1] for one in rigid], "rigid")
+    for body in shown:
+        if body.name in colors:
+            area(ax, body.outline(pose), body.name, color=colors[body.name])
+
+
+def box_around(shown: Iterable[PosedBody], margins: tuple[float, float, float, float]) -> tuple[Box, float]:
+    """Return the box of bodies in all their poses with room at its left, bottom, right and top, and the unit of that.
+
+    Room is given in parts of the longer side of the box, as is the unit [m].
+    """
+    (left, bottom), (right, top) = box_of(shown).tolist()
+    unit = max(right - left, top - bottom)
+    a, b, c, d = (share * unit for share in margins)
+    return (left - a, bottom - b, right + c, top + d), unit
 
 
 @styled
@@ -218,5 +244,4 @@ def part_name(text: str, points: Any, toward: Point, color: str = INK, prefer: f
 
 def ring(center: Point, radius: float, points: int = 73) -> FloatArray:
     """Return a circle's points, counter-clockwise from the left, (n, 2), in the unit of its centre."""
-    turn = np.linspace(-np.pi, np.pi, points)
-    return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    return arc(center, radius, -np.pi, 2.0 * np.pi, points)

@@ -177,7 +177,7 @@ ROOMS = {
     "draw": "figures",
     "outline": "outline",
     "propose": "proposals_for_wish",
-    "room": "bounding_box",
+    "part": "part",
     "free": "redesign_variables_and_process_errors",
     "errors": "redesign_variables_and_process_errors",
     "sampled": "force_at_few_poses",

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 import cfmkit
 from cfmkit.families import family
 from cfmkit.families.cam.figures import draw_mechanism, figures, regions
-from cfmkit.families.cam.part_positions_for_pictures import scene, start_curve, surface, swallowtail
+from cfmkit.families.cam.part import scene, start_curve, surface, swallowtail
 from cfmkit.plots.figures import figures as pictures
 from cfmkit.plots.style import axes_mm, new_figure, style
 

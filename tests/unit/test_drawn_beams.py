@@ -222,3 +222,78 @@ def test_a_cutter_leaves_arcs_between_all_that_it_touches(size):
         pytest.approx([6.0 - np.sqrt(0.25 - 0.04), 4.7]),
         pytest.approx([6.0, 5.0]),
     ]
+
+
+def test_leaves_and_their_spring_are_measured_in_the_outline():
+    """Every piece of a leaf between steps, on the right of each level, and every leaf of the spring."""
+    spec = config("vcfm_hybrid")
+    judged = [(section.beam, round(section.thickness / MM, 9)) for section in cfmkit.drawing(spec).sections]
+    (levels,) = {spec.mechanism.bistable.half_beams // 2}
+    assert [one for one in judged if one[0] == "leaf"] == levels * [("leaf", 1.0), ("leaf", 4.0), ("leaf", 1.0)]
+    assert [one for one in judged if one[0] == "spring"] == 4 * [("spring", 1.5)]
+
+
+def test_a_leaf_that_fillets_fill_is_refused_with_a_remedy_that_helps():
+    spec = config("vcfm_pla", "mechanism.part.fillet=15 mm")
+    with pytest.raises(GeometryError, match=r"beam 'leaf' is 1\.179 mm thick .* but 1\.01 mm .*part\.fillet=0\.51 mm"):
+        cfmkit.drawing(spec)
+    assert cfmkit.drawing(spec.replace({"mechanism.part.fillet": "0.51 mm"})).sections
+
+
+@pytest.mark.parametrize(("which", "words"), [(0, "beam 'leaf' is"), (1, "beam 'spring' is"), (2, "encloses")])
+def test_leaves_that_are_not_drawn_as_specified_are_refused(which, words, monkeypatch):
+    """The outline of other leaves, of another spring, or of thicker walls: each is compared with the specification."""
+    from cfmkit.families.vcfm import outline
+
+    keys = (
+        "mechanism.bistable.thickness=1.014 mm",
+        "mechanism.positive.thickness=1.505 mm",
+        "mechanism.part.frame={wall: 7 mm}",
+    )
+    contours = outline._contours
+    other = config("vcfm_pla", keys[which])
+    monkeypatch.setattr(outline, "_contours", lambda _: contours(other))
+    with pytest.raises(GeometryError, match=words):
+        cfmkit.drawing(config("vcfm_pla"))
+
+
+def test_flexures_and_strips_of_slider_cranks_are_measured_in_the_outline():
+    lumped, strip = (cfmkit.drawing(config(f"slider_crank_{name}")).sections for name in ("lumped", "strip"))
+    flexures = config("slider_crank_lumped").mechanism.flexures.all
+    assert [one.beam for one in lumped] == ["pivot", "crank_pin", "slider_pin"]
+    assert [one.thickness for one in lumped] == [pytest.approx(one.thickness) for one in flexures]
+    assert {one.beam for one in strip} == {"strip"}
+
+
+@pytest.mark.parametrize("name", ["lumped", "strip"])
+def test_a_leg_that_is_not_drawn_as_specified_is_refused(name, monkeypatch):
+    from cfmkit.families.slider_crank.printed.part import Leg
+
+    key = "flexures.pivot.thickness" if name == "lumped" else "beam.offset"
+    of, other = Leg.contours.fget, config(f"slider_crank_{name}", f"mechanism.{key}=0.5 mm")
+    monkeypatch.setattr(Leg, "contours", property(lambda _: of(Leg.of(other, as_printed=True))))
+    with pytest.raises(GeometryError, match="thick in the outline"):
+        cfmkit.drawing(config(f"slider_crank_{name}"))
+
+
+def test_strips_that_only_just_overlap_are_one_area():
+    """The union of these strips lost one of them, and a part that is as specified was refused."""
+    thickness = [
+        1.0830258843272022, 0.9461045645991758, 2.294927211424994, 1.8403562248599425, 3.102241448824241,
+        2.3998682572284775, 2.131509416829178, 1.754170154117468, 2.001168071213906, 1.2489348287665729,
+        0.5929737987593309, 2.3626878879347652,
+    ]  # fmt: skip
+    spec = config("slider_crank_tapered").replace(
+        {
+            "mechanism.beam.thickness": [MM * one for one in thickness],
+            "mechanism.unloaded_angle": 0.40164450983504646,
+            "requirements": [],
+        }
+    )
+    assert cfmkit.drawing(spec).sections
+
+
+def test_thick_leaves_of_a_spring_between_small_blocks_are_on_both_sides():
+    keys = ("positive.thickness=4.3 mm", "positive.angle=18 deg", "frame.block=2.3 mm")
+    spec = config("vcfm_pla", *(f"mechanism.{key}" for key in keys), "requirements=[]")
+    assert [one.beam for one in cfmkit.drawing(spec).sections].count("spring") == 4

@@ -128,3 +128,11 @@ def test_a_drawing_says_how_far_apart_the_clamps_are(name, across):
 
 def test_one_clamp_is_at_no_distance_from_another():
     assert [one.name for one in part_of(cfmkit.load(CONFIGS / "beam_cantilever.yaml")).dimensions] == ["tip from root"]
+
+
+@pytest.mark.parametrize("name", ["beam_lan2010", "beam_design_lan", "vcfm_ding2022", "slider_crank_lumped"])
+def test_the_overall_size_of_a_part_with_fillets_is_that_of_its_material(name):
+    """Circles that fillets are arcs of lie in the waste: they counted, and the size and the datum of holes were off."""
+    drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml").replace({"mechanism.part.fillet": "0.4 mm"}))
+    points = np.concatenate([one.points(1e-9) for one in drawing.contours if one.layer == "cut"])
+    assert drawing.extents == pytest.approx((*points.min(axis=0), *points.max(axis=0)), abs=2e-9)

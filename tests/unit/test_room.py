@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from beam_support import cantilever
 
@@ -18,7 +19,7 @@ def room_of(name, **changes):
 
 def box(spec):
     result = cfmkit.analyze(spec)
-    return function_named(family(result.spec.family).room)(result), result
+    return family(result.spec.family).envelope(result), result
 
 
 def test_a_cam_is_as_wide_as_its_rollers_at_the_end_of_the_stroke():
@@ -103,3 +104,33 @@ def test_what_proposals_draw_of_a_linkage_is_what_its_box_counts():
     assert low == pytest.approx(corner, abs=0.3)
     assert high == pytest.approx([corner[0] + 1e3 * room.along, corner[1] + 1e3 * room.across], abs=0.3)
     assert moving(result).draw_as_made is not None
+
+
+def test_the_box_of_a_part_with_fillets_ends_where_its_material_does():
+    room, result = room_of("beam_lan2010")
+    points = np.concatenate([one.points(1e-8) for one in cfmkit.drawing(result.spec).contours if one.layer == "cut"])
+    assert room.corner[1] == pytest.approx(points[:, 1].min(), abs=1e-7)
+
+
+def test_the_box_of_a_straight_spring_counts_its_middle_block_as_it_is_drawn():
+    """The block reaches one and a half blocks below the shuttle; it counted as one."""
+    room, result = room_of("vcfm_straight")
+    frame = result.spec.mechanism.frame
+    lowest = -frame.clearance - 1.5 * frame.block - float(result.curve.motion[-1])
+    assert room.corner[1] == pytest.approx(lowest, rel=1e-9)
+
+
+def test_films_stay_within_the_box_of_what_moves():
+    from cfmkit.export.posed_part import box as box_of
+
+    for name in ("vcfm_pla", "beam_lan2010", "slider_crank_lumped", "cam"):
+        room, result = room_of(name)
+        part = function_named(family(result.spec.family).part)(result)
+        (left, bottom), (right, top) = box_of(part.bodies)
+        assert room.drawn == pytest.approx((right - left, top - bottom))
+        assert {body.role for body in part.bodies} >= {"held", "driven"}
+        for body in part.bodies:
+            for pose in range(len(body.core)):
+                outline = body.outline(pose)
+                assert (outline >= np.array([left, bottom]) - 1e-9).all()
+                assert (outline <= np.array([right, top]) + 1e-9).all()

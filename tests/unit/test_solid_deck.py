@@ -15,7 +15,7 @@ from cfmkit.errors import UsageError
 from cfmkit.export.beam_deck_for_abaqus import beam_deck
 from cfmkit.families import family
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
-from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
+from cfmkit.families.vcfm.part import solved_leaf, solved_spring
 from cfmkit.families.vcfm.plane_fem_analysis import part_of
 
 QUICK = ("analysis.solid.error=0.1", "analysis.solid.poses=8", "analysis.travel=0.8 mm", "analysis.fidelity=solid")

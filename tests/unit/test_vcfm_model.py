@@ -14,7 +14,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
-from cfmkit.families.vcfm.bounding_box import room
+from cfmkit.families import family
 from cfmkit.families.vcfm.flattening_widths_or_window import extreme_sums
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
-from cfmkit.families.vcfm.pose_outlines import leaf_thickness
+from cfmkit.families.vcfm.part import leaf_thickness
 from cfmkit.families.vcfm.quantities import QUANTITIES
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
 from cfmkit.metrics import Window, evaluate
@@ -697,6 +697,7 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
 
 
 def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_walls_as_thick_as_stated():
+    room = family("vcfm").envelope
     plain, pushed = (room(analyzed("analysis.points=21", preloads=one)) for one in ("[0 mm]", "[0 mm, 7.5 mm]"))
     (rest,) = rests_of(LawSampler(parts(table_i())), [7.5 * MM], np.array([0.0]))
     assert rest == pytest.approx(-0.955 * MM, rel=1e-3)

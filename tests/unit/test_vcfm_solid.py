@@ -10,7 +10,8 @@ from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.findings import sharp_inside
-from cfmkit.families.vcfm.outline import sharp_corners, solved_leaf, solved_spring
+from cfmkit.families.vcfm.outline import sharp_corners
+from cfmkit.families.vcfm.part import solved_leaf, solved_spring
 from cfmkit.results import Status
 from cfmkit.solid.equilibrium import SolidProblem
 

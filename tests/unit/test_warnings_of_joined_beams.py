@@ -178,7 +178,7 @@ def test_levels_of_cosine_leaves_touch_where_they_are_steepest():
     """The contours of leaves that just do not overlap do not cross, those of a bit less do."""
     from shapely import Polygon
 
-    from cfmkit.families.vcfm import outline
+    from cfmkit.families.vcfm import part
 
     mechanism = cfmkit.load(CONFIGS / "vcfm_cosine.yaml")
     with pytest.raises(GeometryError) as refused:
@@ -187,8 +187,9 @@ def test_levels_of_cosine_leaves_touch_where_they_are_steepest():
 
     def between(spacing: float) -> Any:
         wider = mechanism.replace({"mechanism.frame.spacing": f"{spacing} mm"})
-        edges = [np.concatenate([item.points for item in outline._edge(wider, side, (0.0, level * 1e-3 * spacing))])
-                 for side, level in ((1.0, 0), (-1.0, 1))]  # fmt: skip
+        law, sides = part._leaf(wider), ((1.0, 0), (-1.0, 1))
+        edges = [np.concatenate([item.points for item in part._edge(law, side, (0.0, level * 1e-3 * spacing))])
+                 for side, level in sides]  # fmt: skip
         return Polygon(np.concatenate([edges[0], edges[1][::-1]]))
 
     assert between(1.01 * least).is_valid

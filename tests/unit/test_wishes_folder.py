@@ -9,7 +9,6 @@ import yaml
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.specs.units import read_quantity
 
 FOLDER = Path(__file__).parents[1] / "wishes"
@@ -29,7 +28,7 @@ def test_a_source_fulfils_its_wish_with_a_tenth_to_spare(name):
     result = cfmkit.analyze(cfmkit.load(FOLDER / "sources" / f"{name}.yaml"))
     found = cfmkit.evaluate(result, ["force_mean", "force_ripple"])
     low, high = (float(end) for end in result.spec.analysis.window)
-    room = function_named(family(result.spec.family).room)(result)
+    room = family(result.spec.family).envelope(result)
     assert max(one.value for one in found.values() if one.dimension == "ratio") < 0.9 * read_quantity(
         wish["ripple"], "ratio"
     )

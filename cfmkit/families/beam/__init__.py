@@ -32,7 +32,7 @@ FAMILY = Family(
     elastic_networks="cfmkit.families.beam.plane_fem_analysis:elastic_networks",
     levels=("design.rescale.force", "design.optimise.force.target"),
     propose="cfmkit.families.beam.proposals_for_wish:propose",
-    room="cfmkit.families.beam.bounding_box:room",
+    part="cfmkit.families.beam.part:part_over_motion",
     headline=(
         "nominal_force",
         "range_start",

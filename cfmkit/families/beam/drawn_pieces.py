@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.export.contours import signed_area
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
@@ -282,7 +283,7 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
         pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
         for other in ends:
             pad = _behind(pad, other) if other is not end else pad
-        if len(pad) > 2 and area_of(pad) > LEAST * depth * half:
+        if len(pad) > 2 and abs(signed_area(pad)) > LEAST * depth * half:
             yield pad, end
 
 
@@ -297,12 +298,6 @@ def _behind(shape: FloatArray, end: BeamEnd) -> FloatArray:
         if one * other < 0:
             found.append(a + one / (one - other) * (b - a))
     return np.array(found).reshape(-1, 2)
-
-
-def area_of(shape: FloatArray) -> float:
-    """Return the area of a polygon (n, 2) [m2]."""
-    x, y = (shape - shape[0]).T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
 def _bar(a: FloatArray, b: FloatArray, width: float, ends: Sequence[BeamEnd] = ()) -> FloatArray:

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.beam_fits import BeamFits
+from cfmkit.families.beam.drawn_pieces import both_halves
 from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
-from cfmkit.families.beam.strips_and_gaps import mirrored, strips
+from cfmkit.families.beam.part import SPARSE, strips_of
+from cfmkit.families.beam.strips_and_gaps import mirrored
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
 
@@ -53,15 +54,11 @@ def _described(assembly: Assembly, points: FloatArray) -> FloatArray:
 def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
     """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
     network, axis = assembly.network, mirror_axis(assembly)
-    fits = BeamFits(network)
     exact = EXACT * min(thinnest_of(beam.section) for beam in network.beams.values())
-    beams = {
-        name: [polygon for strip in strips(network, fits, name, exact) for polygon in strip.polygons]
-        for name in network.beams
-    }
+    halves = both_halves(assembly, strips_of(assembly, exact / SPARSE))
+    beams = {name: [polygon for strip in found for polygon in strip.polygons] for name, found in halves.items()}
     nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
     if axis is not None:
-        beams |= {f"{name}'": [mirrored(one, *axis) for one in own] for name, own in beams.items()}
         others = {name: mirrored(place[None], *axis)[0] for name, place in nodes.items()}
         nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > exact}
     return beams, nodes

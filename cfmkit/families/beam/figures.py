@@ -10,8 +10,10 @@ import numpy as np
 
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
+from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.network_from_spec import mirror_axis
+from cfmkit.families.beam.part import COARSE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.beam.tip_on_uneven_surface import ride
@@ -29,7 +31,7 @@ from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -109,9 +111,10 @@ def shapes(result: Result) -> Figure:
     """Return the mechanism to scale: as cut, and bent at several places of the travel."""
     solution: Solution = result.state
     poses = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))[1:]
-    drawn = {int(pose): _lines(solution, int(solution.keep[pose])) for pose in poses}
-    plates, springs = _plates(solution), _both(solution, spring_lines(solution.path))
-    box = _box([*plates, *springs, *(line for lines in drawn.values() for line in lines)])
+    shown, made = bodies(solution, poses, centre_line=bent), made_strips(solution.assembly)
+    drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
+    springs = _both(solution, spring_lines(solution.path))
+    box = _box([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
     heading = Heading.of(result, "shapes to scale, as cut and during the travel")
@@ -119,8 +122,7 @@ def shapes(result: Result) -> Figure:
     write_heading(figure, heading)
     room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)
     ax = axes_mm(figure, room)
-    for plate in plates:
-        parts.plate(ax, [_counter_clockwise(plate)])
+    parts.bodies(ax, made, 0, {})
     for number, line in enumerate(_both(solution, rigid_parts(solution.path, None))):
         parts.edge(ax, line, f"rigid-{number}", color=GREY, linewidth=2.4, zorder=1.3, solid_capstyle="round")
     for number, line in enumerate(springs):
@@ -183,34 +185,14 @@ def _names(solution: Solution) -> list[Label]:
     return found
 
 
-def _lines(solution: Solution, point: int) -> list[FloatArray]:
-    """Return the bent centre lines at a point of the path, those of a mirrored half included [m]."""
-    return _both(solution, [bent(solution.path, name, point) for name in solution.path.network.beams])
-
-
-def _plates(solution: Solution) -> list[FloatArray]:
-    path = solution.path
-    found = [strip.polygon for name in path.network.beams for strip in strips(path.network, path.fits, name)]
-    return _both(solution, found)
-
-
 def _both(solution: Solution, lines: list[FloatArray]) -> list[FloatArray]:
     """Return lines of what is described, and those of its mirrored half."""
     axis = mirror_axis(solution.assembly)
     return lines if axis is None else [*lines, *(mirrored(line, *axis) for line in lines)]
 
 
-def _counter_clockwise(points: FloatArray) -> FloatArray:
-    x, y = points.T
-    return points if x @ np.roll(y, -1) > np.roll(x, -1) @ y else points[::-1]
-
-
-def _box(outlines: list[FloatArray]) -> tuple[float, float, float, float]:
-    points = np.concatenate(outlines)
-    low, high = points.min(axis=0), points.max(axis=0)
-    margin = 0.08 * float(np.max(high - low))
-    low, high = low - margin, high + margin
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+def _box(shown: Sequence[PosedBody]) -> parts.Box:
+    return parts.box_around(shown, (0.08, 0.08, 0.08, 0.08))[0]
 
 
 def _supports(solution: Solution, ax: Axes) -> None:
@@ -333,15 +315,13 @@ def moving(result: Result) -> Moving | None:
         return None
     solution: Solution = result.state
     points = chosen(len(solution.keep))
-    lines = [_lines(solution, int(solution.keep[point])) for point in points]
-    plates = _plates(solution)
-    box = _box([*plates, *(line for pose in lines for line in pose)])
+    made = made_strips(solution.assembly)
+    shown = bodies(solution, points, regions(solution.spec, COARSE), bent)
+    box = _box([*made, *shown])
 
     def draw(ax: Axes, number: int) -> None:
-        for plate in plates:
-            parts.plate(ax, [_counter_clockwise(plate)])
-        for line in lines[number]:
-            parts.edge(ax, line, "beam", color=BLUE, linewidth=1.8, zorder=2.5)
+        parts.bodies(ax, made, 0, {})
+        parts.bodies(ax, shown, number, {"beam": BLUE})
         for line in _both(solution, rigid_parts(solution.path, int(solution.keep[points[number]]))):
             parts.edge(ax, line, "rigid", color=GREY, linewidth=2.4, zorder=2.4, solid_capstyle="round")
         _supports(solution, ax)

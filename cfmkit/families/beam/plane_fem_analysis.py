@@ -20,7 +20,8 @@ from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.network_from_spec import assemble, constant_load, mirror_axis, on_axis, resolve, thinnest_of
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
-from cfmkit.families.beam.outline import drawing, drawn_fillet, regions, standing_frame
+from cfmkit.families.beam.outline import drawing
+from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.beam.network_from_spec import Assembly
-    from cfmkit.families.beam.outline import HeldPlace
+    from cfmkit.families.beam.part import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run

@@ -19,9 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.bounding_box import COARSE, room
+from cfmkit.export.posed_part import box
+from cfmkit.families.base import Room
 from cfmkit.families.beam.model import analyze
-from cfmkit.families.beam.outline import drawing
+from cfmkit.families.beam.network_from_spec import assemble
+from cfmkit.families.beam.part import as_made, part_over_motion
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
@@ -36,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Room
     from cfmkit.families.wishes import Wish
     from cfmkit.results import Result
 
@@ -98,17 +99,16 @@ def _followed(name: str) -> Kept:
     text = files("cfmkit").joinpath(f"families/beam/shapes/{name}.yaml").read_text(encoding="utf-8")
     spec = read_document(text, name).bind(BeamSpec)
     result = analyze(spec, Run())
-    space = room(result)
-    assert space is not None
+    part = part_over_motion(result)
+    assert part is not None
     curve = result.curve
-    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, space)
+    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, Room.around(part))
 
 
 def _in_two_layers(kept: Kept) -> Kept:
     """Return two of a shape in series: twice the travel at the same force and stress."""
     spec = kept.spec.replace({"mechanism.copies.layers": 2})
-    heights = [drawing(one, COARSE, check=False).contours for one in (kept.spec, spec)]
-    one, both = (max(contour.extents[3] for contour in contours if contour.layer == "cut") for contours in heights)
+    one, both = (float(box(as_made(assemble(stacked)))[1, 1]) for stacked in (kept.spec, spec))
     space = replace(kept.room, along=kept.room.along + both - one)
     return replace(kept, name=f"{kept.name} in two layers", spec=spec, motion=2.0 * kept.motion, room=space)
 

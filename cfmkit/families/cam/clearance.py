@@ -14,6 +14,7 @@ from cfmkit.arrays import FloatArray
 from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.part import pin_path
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.families.findings import mm
 from cfmkit.results import Quantity
@@ -39,8 +40,7 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     sizes, radius = mechanism.envelope, mechanism.roller_radius
     if sizes is None:
         return
-    x, y, length = states.x, states.y, mechanism.brace_length
-    pin = y + np.sqrt((length - x) * (length + x))
+    x, y, pin = states.x, states.y, pin_path(solution)[:, 1]
     profile = solution.assembly.profile
     contours = plate_contours((profile, profile), mechanism.plate)
     yield "roller and roller", 2.0 * (x - radius)

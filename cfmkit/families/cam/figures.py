@@ -10,12 +10,12 @@ import numpy as np
 
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.clearance import nearest_pairs
-from cfmkit.families.cam.part_positions_for_pictures import (
+from cfmkit.families.cam.part import (
+    count_of,
     moment,
     pivoting,
     pose,
     scene,
-    spring_count,
     start_curve,
     swallowtail,
 )
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.part_positions_for_pictures import Scene
+    from cfmkit.families.cam.part import Scene
     from cfmkit.families.cam.solution import Built, Solution
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
@@ -164,7 +164,11 @@ def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]
 
 
 def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
-    here, number, height = pose(solution, index), spring_count(solution), view.box[3] - view.box[1]
+    here, number, height = (
+        pose(solution, index),
+        count_of(solution.assembly.spec.mechanism.springs),
+        view.box[3] - view.box[1],
+    )
     radius, (x, y) = solution.assembly.spec.mechanism.roller_radius, here.roller
     roller, pin = np.array(here.roller), np.array(here.slider)
     spring = np.column_stack([np.linspace(-0.5, 0.5, 20) * x, np.full(20, y - 0.45 * radius)])
@@ -249,7 +253,10 @@ def springs(result: Result) -> Figure:
     line, over = [Series(solution.elongation, "", BLUE)], solution.travel + solution.origin
     diagram = Diagram(over, TRAVEL, Scale("elongation", "length"), line, limits, regions(solution))
     figure = diagram_figure(Heading.of(result, "elongation of the springs"), [diagram], right_mm=17.0)
-    stiffness, count = float(to_border(solution.assembly.loads.stiffness, "stiffness")), spring_count(solution)
+    stiffness, count = (
+        float(to_border(solution.assembly.loads.stiffness, "stiffness")),
+        count_of(solution.assembly.spec.mechanism.springs),
+    )
     words = "the spring" if count == 1 else f"the {count} springs"
     tension = count * solution.assembly.spec.mechanism.springs.initial_tension
     right_axis(figure.axes[0], stiffness, f"force of {words} [N]", float(to_border(tension, "force")))

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.bounding_box import count_of, depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
+from cfmkit.families.cam.part import count_of, depth_of
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
@@ -172,7 +172,7 @@ def _candidate(wish: Wish, size: dict[str, float]) -> Candidate | None:
 def with_wire(spec: CamSpec, _wish: Wish) -> CamSpec:
     """Return a designed cam whose springs have wire, coil and turns: the slimmest that fit between the rollers.
 
-    They are those that its depth counts with (`bounding_box.depth_of`).
+    They are those that its depth counts with (`part.depth_of`).
     """
     from cfmkit.families.cam.model import analyze
     from cfmkit.families.run_control import Run

@@ -15,7 +15,6 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm, percent
-from cfmkit.families.slider_crank.bounding_box import PLATES, height_of
 from cfmkit.families.slider_crank.flattest_springs_that_fit import STILL, SprungMotion, flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
@@ -23,6 +22,7 @@ from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
+from cfmkit.families.slider_crank.springs.part import PLATES, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINTS

@@ -28,7 +28,7 @@ FAMILY = Family(
     elastic_networks="cfmkit.families.vcfm.exact_model:elastic_networks",
     levels=("design.force",),
     propose="cfmkit.families.vcfm.proposals_for_wish:propose",
-    room="cfmkit.families.vcfm.bounding_box:room",
+    part="cfmkit.families.vcfm.part:part_over_motion",
     rows=when_called("cfmkit.families.vcfm.model:solve_rows"),
     headline=(
         "constant_force",

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Curve
+from cfmkit.export.posed_part import box
 from cfmkit.families.fem_results import numbered
 from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.model import rests_of
-from cfmkit.families.vcfm.pose_outlines import scene
+from cfmkit.families.vcfm.part import bodies
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -37,19 +38,22 @@ from cfmkit.plots.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.pose_outlines import Scene
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.results import Result
 
 TRAVEL = Scale("displacement", "length")
 FINE = 241
 """Places from which on the start of a window is looked for."""
+
+COLORS = {"leaf": BLUE, "spring": OCHRE}
+"""Of what bends."""
 
 PRELOADS = 41
 """Preloads of the map."""
@@ -228,33 +232,53 @@ def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale in four poses: bent as the leaves really bend."""
     solution: Solution = result.state
     poses = _poses(solution)
-    scenes = [scene(solution, travel, preload) for _, travel, preload in poses]
-    boxes = np.array([one.box for one in scenes])
-    left, bottom = boxes[:, :2].min(axis=0)
-    right, top = boxes[:, 2:].max(axis=0)
-    room = 0.12 * (top - bottom)
-    box = (left - 0.02 * (right - left), bottom - room, right + 0.02 * (right - left), top + room)
+    shown = bodies(solution, [(travel, preload) for _, travel, preload in poses])
+    (left, bottom), (right, top) = box(shown).tolist()
+    room, aside = 0.12 * (top - bottom), 0.02 * (right - left)
+    view = (left - aside, bottom - room, right + aside, top + room)
     heading = Heading.of(result, "mechanism to scale")
     across = 68.0
-    up = across * (box[3] - box[1]) / (box[2] - box[0])
+    up = across * (view[3] - view[1]) / (view[2] - view[0])
     figure = new_figure(160.0, heading.height_mm + 12.0 + 2.0 * (up + 8.0))
     write_heading(figure, heading)
-    for number, (one, (text, travel, preload)) in enumerate(zip(scenes, poses, strict=True)):
+    for number, (text, travel, preload) in enumerate(poses):
         row, column = divmod(number, 2)
         ax = axes_mm(figure, (14.0 + column * (across + 5.0), 12.0 + (1 - row) * (up + 8.0), across, up))
-        _draw(ax, one)
+        parts.bodies(ax, shown, number, COLORS)
         if travel > 0:
-            parts.force_arrow(ax, (one.top[0], one.top[1] + 0.9 * room), one.top, "force")
+            tip = _pushed_at(shown, number)
+            parts.force_arrow(ax, (tip[0], tip[1] + 0.9 * room), tip, "force")
         if preload:
-            away = (one.base[0], one.base[1] - np.sign(preload) * 0.9 * room)
-            tail, tip = (away, one.base) if preload > 0 else (one.base, away)
+            base = _end_of(shown, "base", number, upper=hangs(solution))
+            away = (base[0], base[1] - np.sign(preload) * 0.9 * room)
+            tail, tip = (away, base) if preload > 0 else (base, away)
             parts.force_arrow(ax, tail, tip, "preload")
-        parts.to_scale(ax, box)
+        parts.to_scale(ax, view)
         ax.set_title(text, fontsize=SMALL, loc="left")
         ax.set_xlabel("x [mm]" if row else "")
         ax.set_ylabel("" if column else "y [mm]")
         ax.tick_params(labelbottom=bool(row), labelleft=not column)
     return figure
+
+
+def hangs(solution: Solution) -> bool:
+    """Return True if the spring hangs above the shuttle."""
+    springs = solution.spec.mechanism.springs
+    return springs is not None and springs.kind == "extension"
+
+
+def _pushed_at(shown: Sequence[PosedBody], pose: int) -> parts.Point:
+    """Return where the force pushes the shuttle: the middle of its upper end, or of the bar across it [m]."""
+    return max(
+        (_end_of([body], "shuttle", pose, True) for body in shown if body.name == "shuttle"), key=lambda at: at[1]
+    )
+
+
+def _end_of(shown: Sequence[PosedBody], name: str, pose: int, upper: bool) -> parts.Point:
+    """Return the middle of the upper or the lower side of the first body of a name, a rectangle [m]."""
+    corners = next(body for body in shown if body.name == name).core_at(pose)
+    x, y = corners.mean(axis=0)[0], corners[:, 1]
+    return float(x), float(y.max() if upper else y.min())
 
 
 def _poses(solution: Solution) -> list[tuple[str, float, float]]:
@@ -277,29 +301,18 @@ def _poses(solution: Solution) -> list[tuple[str, float, float]]:
     ]
 
 
-def _draw(ax: Axes, one: Scene) -> None:
-    """Draw the parts in one pose."""
-    parts.plate(ax, one.rigid, "rigid")
-    for name, outlines, color in (("leaf", one.leaves, BLUE), ("spring", one.spring, OCHRE)):
-        for outline in outlines:
-            parts.area(ax, outline, color, name)
-
-
 def moving(result: Result) -> Moving:
     """Return the mechanism over the travel of its nominal curve, for a film."""
     solution: Solution = result.state
     nominal = solution.first
     points = chosen(len(nominal.travel))
-    scenes = [scene(solution, float(nominal.travel[point]), nominal.preload) for point in points]
-    boxes = np.array([one.box for one in scenes])
-    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    room = 0.06 * float((high - low).max())
-    box = (low[0] - room, low[1] - room, high[0] + room, high[1] + 2.0 * room)
+    shown = bodies(solution, [(float(nominal.travel[point]), nominal.preload) for point in points])
+    view, size = parts.box_around(shown, (0.06, 0.06, 0.06, 0.12))
 
     def draw(ax: Axes, number: int) -> None:
-        _draw(ax, scenes[number])
-        top = scenes[number].top
-        parts.force_arrow(ax, (top[0], top[1] + room), top)
-        parts.to_scale(ax, box)
+        parts.bodies(ax, shown, number, COLORS)
+        x, y = _pushed_at(shown, number)
+        parts.force_arrow(ax, (x, y + 0.06 * size), (x, y))
+        parts.to_scale(ax, view)
 
-    return Moving(result.curve.motion[points], box, draw)
+    return Moving(result.curve.motion[points], view, draw)

@@ -24,7 +24,8 @@ from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
-from cfmkit.families.vcfm.outline import drawing, sharp_corners, solved_leaf, solved_spring
+from cfmkit.families.vcfm.outline import drawing, sharp_corners
+from cfmkit.families.vcfm.part import solved_leaf, solved_spring
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
 from cfmkit.stock.material_and_part_spec import usual_fillet
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.outline import SolvedPiece
+    from cfmkit.families.vcfm.part import SolvedPiece
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart
@@ -166,7 +167,8 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
         )
         for number, one in enumerate(piece.held, start=1)
     ]
-    return Part(rings_of((piece.contour,), about.thickness), about.thickness, about.width, law, (shuttle, *walls))
+    rings, places = rings_of((piece.contour,), about.thickness), (shuttle, *walls)
+    return Part(rings, about.thickness, about.width, law, places, sections=piece.sections)
 
 
 def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import GeometryError
+from cfmkit.export.posed_part import PosedBody, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.cut_and_frame_spec import StandingFrame, VcfmPart
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
@@ -22,6 +23,10 @@ Point = tuple[float, float]
 class FrameSizes:
     """Places of walls, stop and ground [m]; the as-made apex of the lowest leaves is the origin."""
 
+    # half, bottom, top: half the width of the shuttle, its lower end, and its upper one without a bar across it
+    half: float
+    bottom: float
+    top: float
     # wall, out: faces of the right wall at the leaves and outside
     wall: float
     out: float
@@ -36,6 +41,30 @@ class FrameSizes:
     floor: float | None  # upper face of the ground; None without one
     # corners of raised seats on the right half of the ground, from the wall on, and its middle
     ledge: tuple[Point, ...] = ()
+
+    @property
+    def head(self) -> float:
+        """Upper end of the shuttle, its bar included."""
+        return self.under + self.shuttle if self.stopped else self.top
+
+    @property
+    def foot(self) -> float:
+        """Lower end of what stands."""
+        return self.wall_bottom if self.floor is None else self.floor - self.ground
+
+    def bodies(self) -> Iterator[PosedBody]:
+        """Yield shuttle and walls, and a bar across the shuttle, the ground and the seats on it if there are any."""
+        low = self.wall_bottom if self.floor is None else self.floor
+        yield PosedBody.polygon("shuttle", "driven", rectangle(-self.half, self.bottom, self.half, self.under))
+        if self.stopped:
+            yield PosedBody.polygon("shuttle", "driven", rectangle(-self.out, self.under, self.out, self.head))
+        for x in (self.wall, -self.out):
+            yield PosedBody.polygon("wall", "held", rectangle(x, low, x + self.out - self.wall, self.wall_top))
+        if self.floor is not None:
+            yield PosedBody.polygon("ground", "held", rectangle(-self.out, self.foot, self.out, self.floor))
+        if len(self.ledge) > 1:
+            seat = PosedBody.polygon("seat", "held", rectangle(*self.ledge[0], *self.ledge[2]))
+            yield from (seat, seat.mirrored())
 
 
 def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None) -> FrameSizes:
@@ -65,6 +94,9 @@ def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None
         wall_top = under - given.stop
     floor, ledge = _floor(spec, given, spring, (bottom, wall_bottom, wall))
     return FrameSizes(
+        half=0.5 * frame.shuttle_width,
+        bottom=bottom,
+        top=top,
         wall=wall,
         out=wall + thick,
         wall_top=wall_top,

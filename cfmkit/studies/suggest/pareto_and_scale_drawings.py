@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.plots.style import BAND, GREY, INK, LINES, NORMAL, SMALL, axes_mm, new_figure, styled
 from cfmkit.studies.suggest.proposal_making_and_judging import by_own_model
@@ -138,7 +137,7 @@ def _drawn(proposal: Proposal) -> Any:
     """Return what draws a proposal, and its own room."""
     record = family(proposal.family)
     result = record.analyze(by_own_model(proposal), Run())
-    return import_module(str(record.draw)).moving(result), function_named(str(record.room))(result)
+    return import_module(str(record.draw)).moving(result), record.envelope(result)
 
 
 def _room_in_the_drawing(space: Any, wish: Wish) -> tuple[float, float]:

@@ -9,23 +9,26 @@ import numpy as np
 
 from cfmkit.families.fem_results import numbered
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
+from cfmkit.families.slider_crank.printed.part import bodies, chosen
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving
+from cfmkit.plots.poses_in_one_svg import chosen as film_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.slider_crank.printed.solution import Solution
     from cfmkit.results import Result
 
@@ -33,8 +36,8 @@ if TYPE_CHECKING:
 POSES = 4
 """Poses drawn, evenly over the travel."""
 
-LINK = 2.4e-3
-"""Width of rigid links in pictures [m]."""
+MARGIN = 0.08
+"""Room around the part in pictures, in parts of its longer side."""
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
@@ -90,84 +93,57 @@ def guide(result: Result) -> Figure:
 def part(result: Result) -> Figure:
     """Return the part to scale at some travels, with the place of the largest stress at the end."""
     solution: Solution = result.state
-    chosen = np.unique(np.linspace(0, len(solution.travel) - 1, POSES).astype(int))
-    shapes, box, room = _shapes_in_box(solution, chosen)
+    points = chosen(solution, POSES)
+    shown, view, room = _in_view(result, points)
     figure = new_figure(160.0, 120.0)
     heading = Heading.of(result, "the part to scale while it is pressed")
     write_heading(figure, heading)
     ax = axes_mm(figure, (17.0, 12.0, 138.0, 106.0 - heading.height_mm))
-    for number, shape in enumerate(shapes):
-        for points, half in shape:
-            _body(ax, points, half, number == len(shapes) - 1)
-    ends = [shape[-1][0][-1] for shape in shapes]
+    last = len(points) - 1
+    for number in range(len(points)):
+        _draw(ax, shown, number, number == last)
+    ends = shown[-1].core[:, -1]
     height = float(ends[0][1])
     ax.axhline(float(parts.mm(height)), color=GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1, gid="guide")
     parts.slider(ax, tuple(ends[-1]), 0.5 * room)
-    worst = _place(solution, shapes[-1], float(solution.place[chosen[-1]]))
+    worst = _place(solution, [body.core_at(last) for body in shown], float(solution.place[points[-1]]))
     parts.contact(ax, tuple(worst))
-    parts.to_scale(ax, box)
+    parts.to_scale(ax, view)
     ax.set_ylabel("y [mm]")
     names = [
         Label(value_text(float(solution.travel[k]), "length"), INK, parts.mm(end)[None], toward=(0.0, 1.0))
-        for k, end in zip(chosen, ends, strict=True)
-        if k in (chosen[0], chosen[-1]) or abs(end[0] - ends[0][0]) > 2.0 * room * np.flatnonzero(chosen == k)[0]
+        for number, (k, end) in enumerate(zip(points, ends, strict=True))
+        if number in (0, last) or abs(end[0] - ends[0][0]) > 2.0 * room * number
     ]
-    top = value_text(float(solution.stress[chosen[-1]]), "stress")
+    top = value_text(float(solution.stress[points[-1]]), "stress")
     names.append(Label(f"largest stress, {top}", VERMILLION, parts.mm(worst)[None], toward=(-1.0, 1.0)))
     place_labels(ax, names)
     return figure
 
 
-def _shapes_in_box(
-    solution: Solution, points: NDArray[Any]
-) -> tuple[list[list[tuple[FloatArray, FloatArray]]], parts.Box, float]:
-    """Return the `_shapes` at points of the travel, the box of all with a margin, and the margin's unit [m]."""
-    shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[point]))) for point in points]
-    everything = np.concatenate([line for shape in shapes for line, _ in shape])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    room = 0.08 * float((high - low).max())
-    return shapes, (low[0] - room, low[1] - room, high[0] + 2.5 * room, high[1] + 2.0 * room), room
+def _in_view(result: Result, points: NDArray[Any]) -> tuple[tuple[PosedBody, ...], parts.Box, float]:
+    """Return the leg at points of the travel, the box of all poses with a margin, and the margin's unit [m]."""
+    _, _, *leg = bodies(result.spec, result.state, points)  # type: ignore[arg-type]
+    view, size = parts.box_around(leg, (MARGIN, MARGIN, 2.5 * MARGIN, 2.0 * MARGIN))
+    return tuple(leg), view, MARGIN * size
 
 
-def _shapes(solution: Solution, index: int) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield centre lines and half thicknesses from the ground to the slider at one point of the path [m]."""
-    path = solution.pressed.path
-    names, last = list(path.network.beams), None
-    for name in names:
-        points = path.shape(name, index)
-        thickness = path.network.beams[name].section.thickness
-        place = path.places(name)
-        if isinstance(thickness, float):
-            half = np.full(len(points), 0.5 * thickness)
-        else:
-            half = 0.5 * np.interp(place, thickness.stations, np.real(thickness.values))
-        if last is not None:
-            yield np.array([last, points[0]]), np.full(2, 0.5 * LINK)
-        yield points, half
-        last = points[-1]
-
-
-def _body(ax: Axes, points: FloatArray, half: FloatArray, solid: bool) -> None:
-    """Draw a body around a centre line: filled, or as a ghost."""
-    from matplotlib.patches import Polygon
-
-    way = np.gradient(points, axis=0)
-    way /= np.maximum(np.hypot(*way.T), 1e-300)[:, None]
-    normal = np.column_stack([-way[:, 1], way[:, 0]])
-    around = parts.mm(np.concatenate([points + half[:, None] * normal, (points - half[:, None] * normal)[::-1]]))
+def _draw(ax: Axes, leg: Sequence[PosedBody], pose: int, solid: bool) -> None:
+    """Draw a leg in a pose: filled, or as a ghost."""
     look = {"facecolor": BLUE, "edgecolor": INK} if solid else {"facecolor": "#d9dde2", "edgecolor": GREY}
-    ax.add_artist(Polygon(around, closed=True, linewidth=0.5, zorder=3 if solid else 2, **look))
+    for body in leg:
+        parts.area(ax, body.outline(pose), body.name, linewidth=0.5, zorder=3 if solid else 2, **look)
 
 
-def _place(solution: Solution, shape: list[tuple[FloatArray, FloatArray]], along: float) -> FloatArray:
-    """Return the point of a drawn shape at a length along the unloaded part [m]."""
+def _place(solution: Solution, lines: Sequence[FloatArray], along: float) -> FloatArray:
+    """Return the point of a leg at a length along the unloaded part [m]."""
     names = list(solution.pressed.path.network.beams)
     if names == [STRIP]:
-        points = shape[0][0]
+        points = lines[0]
         return np.asarray(points[round(along / _length(solution.chain.points) * (len(points) - 1))])
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(solution.chain.points, axis=0).T))])
-    piece = int(np.clip(np.searchsorted(marks, along, side="right") - 1, 0, len(shape) - 1))
-    points = shape[piece][0]
+    piece = int(np.clip(np.searchsorted(marks, along, side="right") - 1, 0, len(lines) - 1))
+    points = lines[piece]
     share = (along - marks[piece]) / (marks[piece + 1] - marks[piece])
     return np.asarray(points[round(share * (len(points) - 1))])
 
@@ -181,15 +157,14 @@ def moving(result: Result) -> Moving | None:
     if result.spec.at("analysis.fidelity") == "solid":
         return None
     solution: Solution = result.state
-    points = chosen(len(solution.travel))
-    shapes, box, room = _shapes_in_box(solution, points)
+    points = film_poses(len(solution.travel))
+    shown, view, room = _in_view(result, points)
 
     def draw(ax: Axes, number: int) -> None:
-        for line, half in shapes[number]:
-            _body(ax, line, half, True)
-        end = shapes[number][-1][0][-1]
+        _draw(ax, shown, number, True)
+        end = shown[-1].core_at(number)[-1]
         ax.axhline(float(parts.mm(float(end[1]))), color=GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1)
         parts.slider(ax, tuple(end), 0.5 * room)
-        parts.to_scale(ax, box)
+        parts.to_scale(ax, view)
 
-    return Moving(solution.travel[points], box, draw)
+    return Moving(solution.travel[points], view, draw)

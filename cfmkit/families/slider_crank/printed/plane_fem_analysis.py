@@ -168,7 +168,8 @@ def part_of(spec: SliderCrankSpec) -> Part:
     law = LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
     regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
     rings = rings_of((piece.contour, *piece.holes), piece.thinnest)
-    return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST, piece.frame)
+    width = float(piece.sheet.thickness or 0.0)
+    return Part(rings, piece.thinnest, width, law, places, regions, LARGEST, piece.frame, piece.sections)
 
 
 def driven_part(spec: SliderCrankSpec) -> DrivenPart:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.slider_crank.bounding_box import radii_at_pins
 from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
+from cfmkit.families.slider_crank.springs.part import bodies
+from cfmkit.families.slider_crank.springs.part import joints as joints_at
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -86,10 +87,9 @@ class PanelView:
 
 def key(solution: Solution, name: str, motion: float) -> KeyPosition:
     """Return the linkage at one place of its motion."""
-    units, link = solution.assembly.units(np.array([motion])), solution.assembly.linkage
-    angle = float(units.angle[0])
-    pin = link.crank * math.cos(angle), link.crank * math.sin(angle)
-    return KeyPosition(name, motion, angle, pin, (float(units.position[0]), link.offset))
+    units = solution.assembly.units(np.array([motion]))
+    _, pin, end = (tuple(at[0].tolist()) for at in joints_at(solution, units))
+    return KeyPosition(name, motion, float(units.angle[0]), pin, end)
 
 
 def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
@@ -380,18 +380,20 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     solution: Solution = result.state
     spec: Any = result.spec
     half, hole = eye_and_hole(spec)
-    rates, offset, joints = solution.assembly.rates, solution.assembly.linkage.offset, key.joints
+    rates, offset = solution.assembly.rates, solution.assembly.linkage.offset
     way = np.array([[at, offset] for at in (solution.units.position.min(), solution.units.position.max())])
     parts.edge(ax, way, "guide", color=GREY, linewidth=0.6)
     parts.slider(ax, key.slider_pin, 2.0 * half)
-    for start, end, name in ((joints[0], joints[1], "crank"), (joints[1], joints[2], "coupler")):
-        parts.plate(ax, [_round_ended(start, end, half)], name)
-    for joint in joints[:2]:
+    *links, pivot, crank_pin, slider_pin = bodies(spec, solution, solution.assembly.units(np.array([key.motion])))
+    for link in links:
+        parts.plate(ax, [link.outline()], link.name)
+    for joint in key.joints[:2]:
         parts.roller(ax, joint, hole, "pin")
-    for rate, joint, direction, radius in zip(rates[:3], joints, key.directions, radii_at_pins(spec), strict=True):
+    coils = (pivot, crank_pin, slider_pin)
+    for rate, joint, direction, coil in zip(rates[:3], key.joints, key.directions, coils, strict=True):
         if rate > 0.0:
-            coil = np.vstack([torsion_spring(joint, direction, radius), _arc(joint, radius, direction, TURN)])
-            parts.edge(ax, coil, "torsion-spring", color=OCHRE, zorder=3.6)
+            spiral = np.vstack([torsion_spring(joint, direction, coil.reach), coil.outline()])
+            parts.edge(ax, spiral, "torsion-spring", color=OCHRE, zorder=3.6)
     if rates[3] > 0.0:
         wide = max((coil.outer_diameter for coil in spec.mechanism.springs.coils_at("slider")), default=half)
         parts.spring(ax, key.slider_pin, (view.wall, offset), wide, "spring-slider")
@@ -400,18 +402,3 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
         tail, tip = (key.slider_pin[0] + 2.6 * out, offset), (key.slider_pin[0] + 0.6 * out, offset)
         parts.force_arrow(ax, tail, tip)
     parts.to_scale(ax, view.box)
-
-
-def _round_ended(start: Point, end: Point, half: float) -> FloatArray:
-    """Return the outline of a link with round ends, (n, 2) [m]."""
-    left = math.atan2(end[1] - start[1], end[0] - start[0]) + 0.5 * math.pi
-    return np.vstack([_arc(end, half, left + math.pi, 0.5 * TURN), _arc(start, half, left, 0.5 * TURN)])
-
-
-TURN = 2.0 * math.pi
-
-
-def _arc(center: Point, radius: float, begin: float, turn: float) -> FloatArray:
-    """Return an arc that turns to the left, (n, 2) [m]."""
-    angle = begin + np.linspace(0.0, turn, 41)
-    return np.column_stack([center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)])

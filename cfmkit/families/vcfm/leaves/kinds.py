@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Section
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
     Edge = list[Any]  # corners (x, y) [m], and arcs of `cfmkit.export.contours`
@@ -169,6 +170,30 @@ class LeafSpring(ABC):
     @abstractmethod
     def bent_lines(self, compression: float, corner: float) -> tuple[list[FloatArray], float]:
         """Return the centre lines of the right chain from below, between rigid corners, and its height [m]."""
+
+    def rim(self, _fillet: float) -> float:
+        """Return how far its rigid corners reach beyond the middles of their leaves [m]; zero if it has none."""
+        return 0.0
+
+    def blocks(
+        self, block: float, corner: float, fillet: float, top: float, compression: float
+    ) -> tuple[float, list[PosedBody]]:
+        """Return the height at which its `bent_lines` begin [m], and its rigid blocks at a compression [m].
+
+        Of those beside x = 0 the right ones; `edges` describes the other parameters.
+        """
+        from cfmkit.export.posed_part import PosedBody, rectangle
+
+        lines, height = self.bent_lines(compression, corner)
+        half, rim, foot = 0.5 * block, self.rim(fillet), top - block - height
+        over = 0.5 * self.strip.thickness / float(np.cos(self.strip.angle))
+        found = [
+            PosedBody.polygon("block", "driven", rectangle(-half, top - block - over, half, top)),
+            PosedBody.polygon("base", "held", rectangle(-half, foot - block, half, foot + over)),
+        ]
+        for x, y in ((half + line[-1, 0], foot + line[-1, 1]) for line in lines[:-1]):
+            found.append(PosedBody.polygon("corner", "free", rectangle(x, y - rim, x + block, y + corner + rim)))
+        return foot, found
 
     def room(self, _corner: float) -> float:
         """Return by how much it can be compressed until its blocks meet [m]; infinite if they do not."""

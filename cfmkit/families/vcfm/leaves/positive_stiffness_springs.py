@@ -31,6 +31,7 @@ from cfmkit.families.vcfm.leaves.s_form import s_force
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Section, Support
+    from cfmkit.export.posed_part import PosedBody
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
@@ -98,14 +99,20 @@ class Diamond(LeafSpring):
 
         return leaf_chain(self.strip, section, Support(rotation=True), 0.5, 2.0 * self.pairs * self.share)
 
+    def rim(self, fillet: float) -> float:
+        """Return how far its rigid corners reach beyond the middles of their leaves [m]: as a fillet needs it.
+
+        Where the spring closes, the inner edges of the corners meet, not these.
+        """
+        thickness, angle = self.strip.thickness, self.strip.angle
+        beside = float(np.tan(0.25 * np.pi + 0.5 * angle)) * fillet
+        return float(max(RIM * thickness, 0.5 * thickness / np.cos(angle) + FITS * beside))
+
     def edges(self, block: float, corner: float, fillet: float, top: float) -> Edges:
         """Return outer and inner edge of the right chain from its top down, and its lowest point [m]."""
         strip = self.strip
         half, x = 0.5 * block, 0.5 * block + float(strip.reach)
-        rise, v = float(strip.rise), 0.5 * strip.thickness / float(np.cos(strip.angle))
-        # high enough for the fillet beside it; where the spring closes, its inner edges meet, not these
-        room = float(np.tan(0.25 * np.pi + 0.5 * strip.angle)) * fillet
-        rim = max(RIM * strip.thickness, v + FITS * room)
+        rise, v, rim = float(strip.rise), 0.5 * strip.thickness / float(np.cos(strip.angle)), self.rim(fillet)
         high = top - block
         up, down = high - rise, high - rise - corner
         base, out = down - rise, x + block
@@ -307,6 +314,19 @@ class StraightSpring(LeafSpring):
         """Return the right half, which is held by its end block."""
         outer, _, low = edges
         return [*outer, (half, low), (0.0, low)], low, outer[2:6], False
+
+    def blocks(
+        self, block: float, _corner: float, _fillet: float, top: float, compression: float
+    ) -> tuple[float, list[PosedBody]]:
+        """Return the height of its driven middle [m], and that block and the right one of the two that stand."""
+        from cfmkit.export.posed_part import PosedBody, rectangle
+
+        half, middle = 0.5 * block, top - block
+        x, end = half + self.strip.length, middle + compression
+        return middle, [
+            PosedBody.polygon("block", "driven", rectangle(-half, middle - half, half, top)),
+            PosedBody.polygon("base", "held", rectangle(x, end - half, x + block, end + half)),
+        ]
 
     def bent_lines(self, compression: float, _corner: float) -> tuple[list[FloatArray], float]:
         """Return the centre line of the right leaf, from the driven middle at (0, 0) to its end, and its height [m]."""

@@ -1,4 +1,4 @@
-"""Where the parts of a cam mechanism are, as its pictures need it; lengths in metres."""
+"""Where plate, rollers, slider and springs of a cam mechanism are over its motion; lengths in metres."""
 
 from __future__ import annotations
 
@@ -9,18 +9,109 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.export.contours import polygons
+from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
+from cfmkit.stock.springs.made_to_measure import extension_spring
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.springs_spec import Springs
+    from cfmkit.results import Result
 
 Point = tuple[float, float]
 
 SLENDER = 0.2
 """A picture of the mechanism is at least this fraction of its height wide to each side: words need room."""
+
+
+PLATE = 0.008
+"""Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
+
+
+def part_over_motion(result: Result) -> PosedPart | None:
+    """Return a solved mechanism over its travel; None of a motion in time, or of a cam as built.
+
+    In the depth there are the plate, a brace on both sides of it, and outside of these the springs.
+    """
+    solution = result.state
+    if not hasattr(solution, "states"):
+        return None
+    mechanism = result.spec.at("mechanism")
+    thick = PLATE if mechanism.contact is None else mechanism.contact.width
+    depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
+    wound = (
+        f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
+    )
+    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, {wound}"
+    if depth is None:
+        reported = "no steel spring fits between the rollers"
+    # plate, two rollers, two braces, slider
+    pieces = 6 + count_of(mechanism.springs)
+    return PosedPart(bodies(solution), depth=depth, pieces=pieces, assumed=reported)
+
+
+def bodies(solution: Solution) -> tuple[PosedBody, ...]:
+    """Return the boxes of the plate and its holes, the rollers, and the slider's pin as large, at every point."""
+    radius = solution.assembly.spec.mechanism.roller_radius
+    plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in _plate(solution)]
+    right = PosedBody.line("roller", "contact", roller_path(solution)[:, None], radius)
+    return (*plate, right, right.mirrored(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
+
+
+def _plate(solution: Solution) -> tuple[Contour, ...]:
+    """Return the outline of the plate and its holes."""
+    profile = solution.assembly.track.profile
+    return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
+
+
+def roller_path(solution: Solution) -> FloatArray:
+    """Return the positions of the right roller's axis over the solution, (n, 2) [m]."""
+    return np.column_stack([solution.states.x, solution.states.y])
+
+
+def pin_path(solution: Solution) -> FloatArray:
+    """Return the positions of the slider's pin over the solution, (n, 2) [m]."""
+    (x, y), length = roller_path(solution).T, solution.assembly.track.brace_length
+    return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
+
+
+BRACE = 0.010
+"""Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
+
+
+def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
+    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits.
+
+    Parameters
+    ----------
+    thick : float
+        Of the plate, and of each brace up to `BRACE` [m].
+    springs : Springs
+        How many of what stiffness: half of them on either side, above each other.
+    stretch, half_width : float
+        Their largest elongation, and half their length at rest [m].
+    """
+    count = count_of(springs)
+    if springs.wound is not None:
+        outer = springs.wound.coil + springs.wound.wire
+    else:
+        coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
+        if coil is None:
+            return None
+        outer = coil.outer_diameter
+    return thick + 2.0 * min(thick, BRACE) + min(count, 2) * outer
+
+
+def count_of(springs: Springs) -> int:
+    """Return how many springs there are."""
+    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1
+
+
+# --- for pictures -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -41,11 +132,8 @@ class PartsPose:
 
 def pose(solution: Solution, index: int) -> PartsPose:
     """Return the positions of the parts at one point of the solution."""
-    states, assembly = solution.states, solution.assembly
-    x, y = float(states.x[index]), float(states.y[index])
-    length = assembly.track.brace_length
-    slider = (0.0, y + float(np.sqrt((length - x) * (length + x))))
-    return PartsPose((x, y), slider, _contact(solution, index), bool(states.on_corner[index]))
+    (x, y), (_, pin) = (path(solution)[index].tolist() for path in (roller_path, pin_path))
+    return PartsPose((x, y), (0.0, pin), _contact(solution, index), bool(solution.states.on_corner[index]))
 
 
 def _contact(solution: Solution, index: int) -> Point:
@@ -69,11 +157,6 @@ def surface(solution: Solution, points: int = 400) -> FloatArray:
     return np.column_stack(profile.shifted(u, offset))
 
 
-def roller_path(solution: Solution) -> FloatArray:
-    """Return the positions of the right roller's axis over the solution, (n, 2) [m]."""
-    return np.column_stack([solution.states.x, solution.states.y])
-
-
 @dataclass(frozen=True)
 class Scene:
     """Shapes that stay the same at every position, in metres: outlines of the plate, right flank and path, limits."""
@@ -86,18 +169,11 @@ class Scene:
 
 def scene(solution: Solution) -> Scene:
     """Return the parts that do not move, and what the mechanism sweeps over the whole solution."""
-    assembly = solution.assembly
-    profile = assembly.track.profile
-    plate = polygons(plate_contours((profile, profile), assembly.spec.mechanism.plate), "cut")
-    path, radius = roller_path(solution), assembly.spec.mechanism.roller_radius
-    outline = np.concatenate(plate)
-    across = max(float(path[:, 0].max()) + radius, float(outline[:, 0].max()))
-    bottom = min(float(path[:, 1].min()) - radius, float(outline[:, 1].min()))
-    top = max(pose(solution, -1).slider[1], float(outline[:, 1].max()))
+    (_, bottom), (across, top) = box(bodies(solution)).tolist()
     height = top - bottom
     half = max(1.06 * across, SLENDER * height)
-    box = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
-    return Scene(plate, surface(solution), path, box)
+    view = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
+    return Scene(polygons(_plate(solution), "cut"), surface(solution), roller_path(solution), view)
 
 
 def swallowtail(solution: Solution, points: int = 200) -> FloatArray:
@@ -134,9 +210,3 @@ def moment(solution: Solution, index: int) -> str:
         return f"{travel}\nno finite force"
     up_text, down_text = (format_short(value, "force", 3) for value in (up, down))
     return f"{travel}\n{up_text}" if up_text == down_text else f"{travel}\n{up_text} up, {down_text} down"
-
-
-def spring_count(solution: Solution) -> int:
-    """Return the number of springs in parallel."""
-    springs = solution.assembly.spec.mechanism.springs
-    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1

@@ -1,0 +1,156 @@
+"""A part in poses: named bodies of material, each held, driven, free or in contact.
+
+Boxes, pictures, films and the frame around what moves are views of these bodies: a family says once where its material
+is in a pose, and a new view is written once for all families.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from cfmkit.arrays import FloatArray
+
+Role = Literal["held", "driven", "free", "contact"]
+"""Whether a body stands, moves as the drive says, moves as the mechanism lets it, or rolls or slides on another one."""
+
+MIRROR = np.array([-1.0, 1.0])
+"""Factors of x and y of the mirror image about the y axis."""
+
+N_CIRCLE_POINTS = 73
+
+
+@dataclass(frozen=True, eq=False)
+class PosedBody:
+    """All points that are no farther than `half` from a point, a line or the inside of a polygon, in p poses."""
+
+    name: str  # of the kind of body: several may have it
+    role: Role
+    core: FloatArray  # (p, k, 2) points of the line, or corners of the polygon [m]; p = 1 for what does not move
+    half: Any = 0.0  # half of its thickness: a number, or (k,) at the points of a line [m]
+    closed: bool = False  # whether the core is a polygon
+    round: bool = False  # whether a line ends in half circles
+
+    @classmethod
+    def polygon(cls, name: str, role: Role, corners: FloatArray) -> PosedBody:
+        """Return a polygon (k, 2) or (p, k, 2) [m]."""
+        return cls(name, role, np.asarray(corners).reshape(-1, *np.shape(corners)[-2:]), closed=True)
+
+    @classmethod
+    def line(cls, name: str, role: Role, points: FloatArray, half: Any, round: bool = False) -> PosedBody:
+        """Return what is around a line, or a point, (k, 2) or (p, k, 2) [m]."""
+        return cls(name, role, np.asarray(points).reshape(-1, *np.shape(points)[-2:]), half, round=round)
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of its material from the core [m]."""
+        return float(np.max(self.half))
+
+    def core_at(self, pose: int) -> FloatArray:
+        """Return the core in a pose (k, 2) [m]."""
+        core: FloatArray = self.core[pose if len(self.core) > 1 else 0]
+        return core
+
+    def outline(self, pose: int = 0) -> FloatArray:
+        """Return its outline in a pose (n, 2) [m]."""
+        core = self.core_at(pose)
+        if self.closed:
+            return core
+        if len(core) == 1:
+            return arc(core[0], self.reach, 0.0, math.tau)
+        if not self.round:
+            return band(core, self.half)
+        (x, y), half = core[-1] - core[0], self.reach
+        left = math.atan2(y, x) + 0.5 * math.pi
+        return np.vstack([arc(core[-1], half, left - math.pi, math.pi), arc(core[0], half, left, math.pi)])
+
+    def moved(self, x: float, y: float) -> PosedBody:
+        """Return it moved by so much [m]."""
+        return replace(self, core=self.core + np.array([x, y]))
+
+    def mirrored(self) -> PosedBody:
+        """Return its mirror image about the y axis; a polygon runs in the same sense."""
+        return replace(self, core=(self.core[:, ::-1] if self.closed else self.core) * MIRROR)
+
+    def shape(self, pose: int) -> Any:
+        """Return what it covers in a pose, as a geometry of shapely; a line as far as it reaches anywhere."""
+        from shapely import LineString, Point, Polygon
+
+        core = self.core_at(pose)
+        if self.closed:
+            return Polygon(core).buffer(0)
+        if len(core) == 1:
+            return Point(core[0]).buffer(self.reach)
+        return LineString(core).buffer(self.reach, cap_style="round" if self.round else "flat")
+
+
+def arc(center: Any, radius: float, begin: float, turn: float, points: int = N_CIRCLE_POINTS) -> FloatArray:
+    """Return points of an arc from an angle on, counter-clockwise (n, 2) [m]."""
+    angle = begin + np.linspace(0.0, turn, points)
+    return np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def rectangle(left: float, bottom: float, right: float, top: float) -> FloatArray:
+    """Return the corners of a rectangle, counter-clockwise (4, 2) [m]; its sides may be given in either order."""
+    (x0, x1), (y0, y1) = sorted((left, right)), sorted((bottom, top))
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+
+
+def band(line: FloatArray, half: Any) -> FloatArray:
+    """Return the outline (2n, 2) of a strip around a line (n, 2); half of its thickness is a number or (n,) [m]."""
+    along = np.gradient(line, axis=0)
+    along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
+    aside = np.broadcast_to(np.asarray(half, dtype=float), len(line))[:, None] * np.column_stack(
+        [-along[:, 1], along[:, 0]]
+    )
+    return np.concatenate([line + aside, (line - aside)[::-1]])
+
+
+def in_poses(each: Sequence[Sequence[PosedBody]]) -> tuple[PosedBody, ...]:
+    """Return the bodies of several poses, each given as the same bodies in the same order, as bodies in all poses."""
+    found = []
+    for same in zip(*each, strict=True):
+        cores = np.concatenate([one.core for one in same])
+        still = bool((cores == cores[:1]).all())
+        found.append(replace(same[0], core=cores[:1] if still else cores))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class PosedPart:
+    """A mechanism over its motion: where its material is, and what its box says beside the sizes in the plane."""
+
+    bodies: tuple[PosedBody, ...]
+    direction: float = 0.5 * math.pi  # of the travel [rad]
+    depth: float | None = None  # out of the plane [m]; None if nothing is known of it
+    pieces: int = 1  # separate pieces that the mechanism is put together from, bought ones included
+    assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
+
+
+def box(bodies: Iterable[PosedBody], direction: float = 0.5 * math.pi) -> FloatArray:
+    """Return the smallest and the largest place of bodies in all their poses, across and along a direction (2, 2) [m].
+
+    A line counts as far as it reaches anywhere: a box is a little large rather than small.
+    """
+    sine, cosine = math.sin(direction), math.cos(direction)
+    axes = np.array([[sine, -cosine], [cosine, sine]])
+    if abs(cosine) < 1e-15:  # upwards: x and y themselves
+        axes = np.eye(2)
+    ends = []
+    for body in bodies:
+        places = body.core.reshape(-1, 2) @ axes.T
+        ends.append((places.min(axis=0) - body.reach, places.max(axis=0) + body.reach))
+    return np.array([np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)])
+
+
+def swept(bodies: Iterable[PosedBody]) -> Any:
+    """Return what bodies cover in all their poses together, as a geometry of shapely."""
+    from shapely import union_all
+
+    return union_all([body.shape(pose) for body in bodies for pose in range(len(body.core))])

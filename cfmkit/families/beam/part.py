@@ -1,0 +1,312 @@
+"""Where the material of a beam mechanism is: strips and blocks as made, what of them is held, and all as it moves.
+
+At clamps and at the part that is guided the beams end in pads, at pinned supports in eyes with a hole; rigid links and
+what joins two mirrored halves are bars. Stages in series are drawn above each other, legs side by side once.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica import Path, PointLoad
+from cfmkit.elastica.model.beam_fits import BeamFits
+from cfmkit.export.contours import Contour
+from cfmkit.export.ground_frame import ground_frame, moved
+from cfmkit.export.posed_part import PosedBody, PosedPart, rectangle, swept
+from cfmkit.families.beam.drawn_pieces import (
+    EYE,
+    HOLE,
+    BeamEnd,
+    bars_between_halves,
+    disc,
+    drawn_parts,
+    ends_at,
+    is_padded,
+    mitre_direction,
+    pads_behind,
+    section_at_bend,
+)
+from cfmkit.families.beam.network_elements_spec import PartSpec
+from cfmkit.families.beam.network_from_spec import (
+    assemble,
+    mirror_axis,
+    moving_nodes,
+    on_axis,
+    thickest_of,
+    thinnest_of,
+)
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
+from cfmkit.families.run_control import Run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.export.posed_part import Role
+    from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.results import Result
+
+FINE = 2e-4
+"""How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
+beam: both edges together change its bending stiffness by 1.2e-3 at most."""
+
+SHARP = 1e-4
+"""Fillets smaller than this are not drawn, in thicknesses of the thinnest beam."""
+
+N_SWEPT = 25
+"""Poses at which what moves must be clear of the frame: in between beams go by less than their thickness."""
+
+N_POSES = 13
+"""Poses that a box counts: between two of them, a twelfth of the travel apart, beams bulge by next to nothing."""
+
+COARSE = 5e-5
+"""Tolerance of the outline of a box: it is wanted to a tenth of a millimetre [m]."""
+
+SHARE = 0.2
+"""Part of the tolerance that polygons of eyes may be off."""
+
+SPARSE = 5.0
+"""How far lines between the points of a beam may be from its edges, in tolerances: edges are cubics between the points,
+which are nearer by the square of that again."""
+
+
+@dataclass(frozen=True)
+class HeldPlace:
+    """A place of the part that is held or driven and moves as one rigid piece."""
+
+    name: str  # of its node; of the mirrored half with a prime
+    node: str
+    at: FloatArray  # (2,) where the node is [m]
+    # polygons that it covers [m]; a line (2, 2) across a beam where the node is neither a pad nor an eye
+    shapes: tuple[FloatArray, ...]
+    seams: tuple[FloatArray, ...] = ()  # lines at which it begins [m]
+    padded: bool = False  # whether its shapes are pads
+
+
+def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, ...]:
+    """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        Whose part is drawn.
+    tolerance : float, optional
+        As for `drawing` [m].
+    """
+    assembly = assemble(spec)
+    tolerance = tolerance or fine_tolerance(assembly)
+    beams = strips_of(assembly, tolerance)
+    loaded = {load.node for load in assembly.network.loads if isinstance(load, PointLoad)}
+    return tuple(held_places(assembly, beams, tolerance, loaded))
+
+
+def strips_of(assembly: Assembly, tolerance: float = np.inf) -> dict[str, list[BeamStrip]]:
+    """Return every beam in smooth pieces, as exact as a drawing of some tolerance [m] needs them."""
+    network = assembly.network
+    fits = BeamFits(network)
+    return {name: strips(network, fits, name, SPARSE * tolerance) for name in network.beams}
+
+
+def held_places(
+    assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float, loaded: Collection[str] = ()
+) -> Iterator[HeldPlace]:
+    """Yield where a part is held or driven, or loaded at some nodes; `strips_of` gives its beams."""
+    network, axis = assembly.network, mirror_axis(assembly)
+    moving = moving_nodes(assembly)
+    bars = bars_between_halves(assembly, beams, *axis) if axis is not None else {}
+    for node, about in network.nodes.items():
+        ends = ends_at(assembly, beams, node)
+        held = about.support.along or about.support.across or about.support.rotation
+        if not ends or not (held or node in moving or node in loaded):
+            continue
+        region = _region(assembly, node, ends, SHARE * tolerance)
+        joined = (bars[node],) if node in bars else ()
+        yield replace(region, shapes=(*region.shapes, *joined))
+        if axis is not None and not on_axis(assembly, node):
+            yield HeldPlace(
+                f"{node}'",
+                node,
+                mirrored(region.at[None], *axis)[0],
+                tuple(mirrored(shape, *axis) for shape in region.shapes),
+                tuple(mirrored(seam, *axis) for seam in region.seams),
+                region.padded,
+            )
+
+
+def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) -> HeldPlace:
+    """Return the place of the described half at which a node is held or driven."""
+    about = assembly.network.nodes[node]
+    at = np.array([about.x, about.y])
+    pads = [] if not is_padded(assembly, node) else list(pads_behind(assembly, node, ends))
+    if pads:
+        return HeldPlace(node, node, at, tuple(pad for pad, _ in pads), tuple(end.cap for _, end in pads), True)
+    end = ends[0]
+    if about.support.across and not about.support.rotation and not on_axis(assembly, node):
+        return HeldPlace(node, node, at, (disc(end.at, HOLE * end.thickness, bulge),))
+    axis = mirror_axis(assembly)
+    mitre = axis[1] if axis is not None and on_axis(assembly, node) else mitre_direction(ends)
+    section = end.cap if mitre is None else section_at_bend(ends, mitre, drawn_fillet(assembly.spec))
+    return HeldPlace(node, node, at, (section,), (section,))
+
+
+def drawn_fillet(spec: BeamSpec) -> float:
+    """Return the radius of inside corners as drawn [m]: those much smaller than the beams are sharp corners."""
+    fillet = spec.mechanism.fillet
+    return fillet if fillet >= SHARP * spec.mechanism.thinnest else 0.0
+
+
+def fine_tolerance(assembly: Assembly) -> float:
+    """Return how far an outline may be from the exact one where nobody states it [m]."""
+    return FINE * min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+
+
+def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
+    """Return the polygons of the frame around the part and of the bars to its pads [m], if one is requested."""
+    assembly = assemble(spec)
+    tolerance = fine_tolerance(assembly)
+    return drawn_frame(assembly, strips_of(assembly, tolerance), tolerance)
+
+
+def drawn_frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
+    """Return the same for a mechanism that is built."""
+
+    part = assembly.spec.mechanism.part or PartSpec()
+    if part.frame is None or part.frame.ground is None:
+        return ()
+    nodes, moving = assembly.network.nodes, moving_nodes(assembly)
+    pads: dict[str, FloatArray] = {}
+    covered: list[FloatArray] = []
+    places = tuple(held_places(assembly, beams, tolerance))
+    for place in places:
+        about = nodes[place.node].support
+        clamped = about.along and about.across and about.rotation and place.node not in moving
+        if clamped and place.padded:
+            pads |= {f"{place.name} ({k})" if k else place.name: shape for k, shape in enumerate(place.shapes)}
+        else:
+            covered += list(place.shapes)
+            covered += [place.at + EYE / HOLE * (shape - place.at) for shape in place.shapes if len(shape) > 4]
+    return ground_frame(
+        pads, _swept(assembly, places), covered, part.frame.ground, part.frame.clearance, part.frame.inside
+    ).pieces
+
+
+def _swept(assembly: Assembly, places: Sequence[HeldPlace]) -> Any:
+    """Return all that beams, and pads that move, cover at rest and over the travel; all beams as thick as any."""
+    from cfmkit.families.beam.model import solve
+
+    spec = assembly.spec
+    solid = spec.analysis.fidelity == "solid"
+    solution = solve(spec.replace({"analysis.fidelity": "inextensible"}) if solid else spec)
+    rest = list(itertools.chain.from_iterable(strips_of(assembly).values()))
+    half = 0.5 * max(float(one.thickness.max()) for one in rest)
+    lines = with_image(assembly, [PosedBody.line("beam", "free", one.points, half) for one in rest])
+    poses = bodies(solution, chosen(solution, N_SWEPT), places)
+    moving = (body if body.closed else replace(body, half=half) for body in poses if body.role != "held")
+    return swept([*lines, *moving])
+
+
+# --- over the motion --------------------------------------------------------------------------------------------
+
+
+def part_over_motion(result: Result) -> PosedPart | None:
+    """Return a solved mechanism as it is cut, and as it moves along its drive; equal legs stand side by side in depth.
+
+    A part that was solved as a solid moves as its beams do, to a fraction of a thickness. None if nothing was solved.
+    """
+    if hasattr(result.state, "fine"):
+        from cfmkit.families.beam.model import analyze
+
+        given: Any = result.spec
+        result = analyze(given.replace({"analysis.fidelity": "reissner", "requirements": ()}), Run())
+    if result.state is None:
+        return None
+    solution: Solution = result.state
+    assembly, mechanism = solution.assembly, solution.spec.mechanism
+    legs = mechanism.copies.legs if mechanism.copies else 1
+    return PosedPart(
+        (*as_made(assembly), *bodies(solution, chosen(solution, N_POSES), regions(solution.spec, COARSE))),
+        direction=assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi,
+        depth=legs * max([mechanism.width or 0.0, *mechanism.of_beams("width").values()]),
+        pieces=legs,
+    )
+
+
+def as_made(assembly: Assembly) -> Iterator[PosedBody]:
+    """Yield the boxes of all that a part is united from, and of the frame around it."""
+    beams = strips_of(assembly, COARSE)
+    for piece in drawn_parts(assembly, beams, SHARE * COARSE).pieces:
+        yield PosedBody.polygon("as cut", "free", rectangle(*Contour(piece.edges, "cut").box))
+    yield from (PosedBody.polygon("frame", "held", shape) for shape in drawn_frame(assembly, beams, COARSE))
+
+
+def bodies(
+    solution: Solution,
+    points: NDArray[Any],
+    places: Sequence[HeldPlace] = (),
+    centre_line: Callable[[Path, str, int], FloatArray] = Path.shape,
+) -> tuple[PosedBody, ...]:
+    """Return beams and pads, those of a mirrored half included, at points of the curve.
+
+    Parameters
+    ----------
+    solution : Solution
+    points : (p,) array of int
+    places : sequence of HeldPlace
+        Whose pads are returned, as they move.
+    centre_line : callable
+        From a path, a beam and a point of the path to its line (n, 2) [m].
+    """
+    assembly, path = solution.assembly, solution.path
+    at = [int(solution.keep[point]) for point in points]
+    beams = []
+    for name, beam in path.network.beams.items():
+        line = np.array([centre_line(path, name, point) for point in at]).reshape(len(at), -1, 2)
+        beams.append(PosedBody.line("beam", "free", line, 0.5 * thickest_of(beam.section)))
+    return (*with_image(assembly, beams), *(body for place in places for body in _moved(assembly, path, place, at)))
+
+
+def _moved(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence[int]) -> Iterator[PosedBody]:
+    """Yield the shapes of what moves as one rigid piece."""
+    motion, axis = path.motion(place.node), mirror_axis(assembly)
+    role: Role = "driven" if place.node == assembly.driven else "free"
+    if not np.abs(motion).max(initial=0.0) > 0.0:
+        role = "held"
+    poses = []
+    for x, y, turn in motion[at].tolist():
+        by = np.array([x, y])
+        if place.name != place.node and axis is not None:
+            by, turn = mirrored(by[None], 0j, axis[1])[0], -turn
+        poses.append((by, turn))
+    for shape in (shape for shape in place.shapes if len(shape) > 2):
+        cores = [moved(shape, by, turn, place.at) for by, turn in poses] if role != "held" else [shape]
+        yield PosedBody.polygon("pad", role, np.array(cores).reshape(-1, *shape.shape))
+
+
+def made_strips(assembly: Assembly) -> list[PosedBody]:
+    """Return the smooth pieces of all beams as made."""
+    made = [PosedBody.polygon("strip", "free", one.polygon) for found in strips_of(assembly).values() for one in found]
+    return with_image(assembly, made)
+
+
+def with_image(assembly: Assembly, described: Sequence[PosedBody]) -> list[PosedBody]:
+    """Return bodies of the described half, and those of its mirror image."""
+    axis = mirror_axis(assembly)
+    if axis is None:
+        return list(described)
+    images = [mirrored(one.core.reshape(-1, 2), *axis).reshape(one.core.shape) for one in described]
+    return [*described, *(replace(one, core=image) for one, image in zip(described, images, strict=True))]
+
+
+def chosen(solution: Solution, count: int) -> NDArray[Any]:
+    """Return so many points of the curve, evenly, its ends included; none if it has none."""
+    if not len(solution.keep):
+        return np.zeros(0, int)
+    return np.unique(np.linspace(0, len(solution.keep) - 1, count).astype(int))

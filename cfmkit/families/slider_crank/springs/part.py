@@ -1,0 +1,92 @@
+"""Where the material of a slider-crank with springs is over its motion: links with eyes at their pins, and springs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.export.posed_part import PosedBody, PosedPart
+from cfmkit.families.slider_crank.springs.outline import eye_and_hole
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.families.slider_crank.springs.spec import Springs
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
+    from cfmkit.results import Result
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
+
+PLATES = 3
+"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
+
+
+def part_over_motion(result: Result) -> PosedPart:
+    """Return links and pins, and springs whose wire is known, over the motion of the curve."""
+    spec: Any = result.spec
+    solution: Solution = result.state
+    rates = solution.assembly.rates
+    depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0])
+    return PosedPart(
+        tuple(bodies(spec, solution, solution.units)),
+        direction=0.0,
+        depth=depth,
+        pieces=3 + int(np.count_nonzero(rates)),
+        assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
+    )
+
+
+def bodies(spec: SliderCrankSpec, solution: Solution, units: UnitCurves) -> Iterator[PosedBody]:
+    """Yield links and springs where the joints are, the slider's spring as far as it stands out around its pin."""
+    pins, (half, _) = joints(solution, units), eye_and_hole(spec)
+    for name, k in (("crank", 0), ("coupler", 1)):
+        yield PosedBody.line(name, "driven" if k == 0 else "free", np.stack(pins[k : k + 2], axis=1), half, round=True)
+    for pin, names in zip(pins, (("pivot",), ("crank_pin",), ("slider_pin", "slider")), strict=True):
+        sizes = [0.5 * coil.outer_diameter for name in names for coil in spec.mechanism.springs.coils_at(name)]
+        yield PosedBody.line("spring", "free", pin[:, None], max([half, *sizes]))
+
+
+def joints(solution: Solution, units: UnitCurves) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
+    link, angle, slid = solution.assembly.linkage, np.atleast_2d(units.angle)[0], np.atleast_2d(units.position)[0]
+    pin = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.zeros_like(pin), pin, np.column_stack([slid, np.full(slid.size, link.offset)])
+
+
+def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray) -> tuple[float | None, str]:
+    """Return the depth of links and springs [m], and what of it is taken; None, and why, where a part has no size.
+
+    Crank and coupler lie above each other, the crank on the ground. The pivot's spring is below, all others are above:
+    they stand beside each other.
+    """
+    springs, part = spec.mechanism.springs, spec.mechanism.part
+    if part is None or part.sheet is None:
+        return None, "; the depth of links is not known (mechanism.part.sheet)"
+    high = {}
+    for name, turn in ((name, turn) for name, rate, turn in zip(JOINTS, rates, turns, strict=True) if rate):
+        coils = springs.coils_at(name)
+        if not coils:
+            return None, f"; the spring at the {name.replace('_', ' ')} has no size"
+        high[name] = max(height_of(name, coil, float(turn)) for coil in coils)
+    below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
+    return PLATES * part.sheet + below + above, f"; {PLATES} sheets and the springs on both sides of them"
+
+
+def height_of(name: str, coil: Wound, turn: float) -> float:
+    """Return how far the spring of a joint stands out from the links [m]: lying beside the coupler, or at a pin.
+
+    There it is longest when it is wound up by `turn` [rad].
+    """
+    return coil.outer_diameter if name == "slider" else coil.body_length_wound_up(turn)
+
+
+def _sizes(springs: Springs) -> str:
+    found = [coil for name in JOINTS[:3] for coil in springs.coils_at(name)]
+    if not found:
+        return "springs at pins have no size"
+    wide, long = (1e3 * max(getattr(one, name) for one in found) for name in ("outer_diameter", "body_length"))
+    return f"torsion springs up to {wide:.3g} mm wide and {long:.3g} mm deep"
