@@ -240,8 +240,8 @@ def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
 
 def _shown(result: Result) -> dict[str, Any]:
     """Return a result as data for the page."""
+    from cfmkit.documents.run_outcome import report_on
     from cfmkit.families import family
-    from cfmkit.runs.run_outcome import report_on
     from cfmkit.specs.units import border_unit, format_short
 
     report = report_on(result)

@@ -21,8 +21,8 @@ from cfmkit.tables.json_writing import json_bytes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.documents.run_outcome import Report
     from cfmkit.export.contours import Drawing
-    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
 
 

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.documents.run_outcome import Report
     from cfmkit.results import Quantity, Result
-    from cfmkit.runs.run_outcome import Report
 
 NAME = "report.html"
 

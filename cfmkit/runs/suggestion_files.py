@@ -219,9 +219,9 @@ def _made(
 ) -> list[tuple[str, bytes]]:
     """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
     from cfmkit import api
+    from cfmkit.documents.run_outcome import report_on
     from cfmkit.results import Design, Status
     from cfmkit.runs.files_a_run_writes import files
-    from cfmkit.runs.run_outcome import report_on
 
     proposal = proposals[index]
     if deadlines.files.late():

@@ -9,10 +9,10 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
+from cfmkit.cli.page_block_types import Paragraph, Written
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.cli.page_block_types import Paragraph, Written
 from cfmkit.cli.verbs.suggest import _page
 
 WISHES = Path(__file__).parents[1] / "wishes"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from cfmkit.cli.page_block_types import CellGrid, GridColumn
 
 from cfmkit.cli.output import Terminal
-from cfmkit.cli.page_block_types import CellGrid, GridColumn
 
 
 @pytest.mark.parametrize("width", [40, 60, 108])

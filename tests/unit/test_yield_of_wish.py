@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from cfmkit.cli.page_block_types import Written
 
 import cfmkit
-from cfmkit.cli.page_block_types import Written
 from cfmkit.cli.verbs import suggest as verb
 from cfmkit.families import family
 from cfmkit.families.base import function_named

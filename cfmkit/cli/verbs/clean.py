@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, NoLock, Quiet, argument, flag
-from cfmkit.cli.page_block_types import Verbatim, whole_line
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import Document, Verbatim, whole_line
 from cfmkit.errors import ExitCode, FolderInUse, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import TextLine
+    from cfmkit.documents.document import TextLine
     from cfmkit.runs.remove_files_that_runs_wrote import Remains
 
 PLACE = 80
@@ -32,7 +31,7 @@ class CleanOptions(Common):
     no_lock: NoLock = False
 
 
-def run(options: CleanOptions, terminal: Terminal) -> Answer:
+def run(options: CleanOptions, terminal: Terminal) -> Document:
     """List the files that runs have written below a folder, ask for confirmation, and remove them.
 
     Only files that a manifest or a journal lists are removed. Files that were edited, and all others, stay.
@@ -47,7 +46,7 @@ def run(options: CleanOptions, terminal: Terminal) -> Answer:
     removed, busy = _removed(found, options.folder) if agreed else ([], [])
     message = _message(found, removed)
 
-    return Answer(
+    return Document(
         _data(removed, found) | {"message": message},
         (Verbatim(f"{message}\n"),),
         ExitCode.IN_USE if busy else ExitCode.OK,

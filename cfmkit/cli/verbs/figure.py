@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Changing, FigureChoice, Jobs, NoLock, Quiet, argument, flag, option
-from cfmkit.cli.page_block_types import Written
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import Document, Written
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
@@ -39,7 +38,7 @@ class FigureOptions(Changing, FigureChoice):
     no_lock: NoLock = False
 
 
-def run(options: FigureOptions, terminal: Terminal) -> Answer:
+def run(options: FigureOptions, terminal: Terminal) -> Document:
     """Combine plots of several runs in one figure with lettered panels; a file states the plots and the width."""
     from cfmkit.errors import UsageError
     from cfmkit.runs.composed_figure import panels, read
@@ -64,4 +63,4 @@ def run(options: FigureOptions, terminal: Terminal) -> Answer:
         about = {"command": "figure", "arguments": list(terminal.arguments), "spec": {"source": options.file}}
         manifest = folder.commit({**about, "status": "complete", "exit_code": 0})
     written = Written(out, (*manifest.files, "manifest.json"))
-    return Answer(dict(written.data), (written.block(terminal.verbose > 0),))
+    return Document(dict(written.data), title="figure", files=written)
