@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -76,15 +77,46 @@ class Terminal:
 
     @contextmanager
     def progress(self) -> Iterator[Report]:
-        """Yield what reports progress: a bar, if somebody watches standard error."""
-        if self.json or self.quiet or not sys.stderr.isatty():
+        """Yield what reports progress: a bar on a terminal, else a line with the time left now and then."""
+        if self.json or self.quiet:
             yield lambda _fraction, _text: None
+            return
+        if not sys.stderr.isatty():
+            yield ProgressLines().report
             return
         bar = Bar()
         try:
             yield bar.report
         finally:
             bar.close()
+
+
+LINE_EVERY = 10.0
+"""Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""
+
+
+class ProgressLines:
+    """A line on standard error now and then, with the time that is left."""
+
+    def __init__(self) -> None:
+        """Begin to count the time."""
+        self._start = self._reported = time.monotonic()
+        self._most = 0.0
+
+    def report(self, fraction: float, text: str) -> None:
+        """Tell how far a run is, by the share that is done, if the last line is old enough."""
+        now, self._most = time.monotonic(), max(self._most, fraction)
+        if now - self._reported >= LINE_EVERY and 0.0 < self._most < 1.0:
+            self._reported = now
+            left = (now - self._start) * (1.0 - self._most) / self._most
+            streams.complain(f"{100 * self._most:.0f} %, {duration(left)} left: {text}\n")
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words: ``40 s``, ``3 min``, ``2.5 h``."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 class Bar:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from cfmkit.documents.document import (
     BAD,
@@ -85,7 +87,9 @@ def _row(one: Entry) -> tuple[str | Span, ...]:
     word = outcome(one)
     good = word == "ok"
     tone = GOOD if good else FAINT if one.skipped else BAD
-    return visible(one.spec), one.verb, Span(word if good or one.skipped else word.upper(), tone), detail(one)
+    link = quote(str(PurePosixPath(one.folder) / "report.html")) if one.written else ""
+    spec = Span(visible(one.spec), link=link)
+    return spec, one.verb, Span(word if good or one.skipped else word.upper(), tone), detail(one)
 
 
 def detail(one: Entry) -> str:

@@ -34,6 +34,7 @@ class Span(NamedTuple):
 
     text: str
     tone: str = PLAIN
+    link: str = ""  # where it leads on a page that has links
 
 
 class TextLine(NamedTuple):

@@ -45,11 +45,8 @@ LABELS = {
 """What values are called where there is little room."""
 
 FACTS = (
-    "deviation_from_curve",
-    "usable_stroke",
     "force_ripple",
     "torque_ripple",
-    "hysteresis_area",
     "allowable_stress",
     "safety_factor",
 )
@@ -258,7 +255,9 @@ def _facts(report: Report) -> Iterator[Row]:
         yield size
     if spec.target_curve is not None:
         known |= {"force_ripple", "torque_ripple"}
-    for name in dict.fromkeys(("usable_stroke", "hysteresis_area", *family(spec.family).headline, *FACTS)):
+    for name in dict.fromkeys(
+        ("deviation_from_curve", "usable_stroke", "hysteresis_area", *family(spec.family).headline, *FACTS)
+    ):
         if name not in known and _has_value(report, name):
             text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
             about = report.metrics[name].definition

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from cfmkit.documents.document import (
     Document,
     GridColumn,
     Note,
+    Span,
     Table,
     WarningEntry,
     Written,
@@ -136,11 +138,11 @@ def _silent(one: Mapping[str, Any]) -> tuple[str, str]:
     return one["family"], (one["reason"] or "no mechanism fits") + (f"; nearest: {nearest}" if nearest else "")
 
 
-def _row(number: int, one: Mapping[str, Any], record: Mapping[str, Any]) -> tuple[str, ...]:
+def _row(number: int, one: Mapping[str, Any], record: Mapping[str, Any]) -> tuple[str | Span, ...]:
     unit = "N*mm" if "torque" in record["wish"] else "N"
     sides = [one["across"], one["along"], one["depth"]]
     return (
-        f"{number} {one['family']}",
+        Span(f"{number} {one['family']}", link=quote(f"{one['folder']}/report.html")),
         one["variant"],
         f"{one['mean']:.4g} {unit}",
         "-" if one["ripple"] is None else f"{100 * one['ripple']:.2g} %",

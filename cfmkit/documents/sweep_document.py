@@ -123,9 +123,12 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
         else:
             row, others = (spaced(name), low, high, shown), rows
         (leading if name in (*first, *asked) else others).append(row)
-    if leading or rows or constant:
+    if leading or rows:
         columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in ("from", "to", "best point")))
-        yield Table("", columns, (*leading, *rows, *constant), MAX_RANGES)
+        yield Table("", columns, (*leading, *rows), MAX_RANGES)
+    if constant:
+        columns = (GridColumn("no influence on"), GridColumn("value", wraps=False))
+        yield Table("Results without influence", columns, tuple(row[:2] for row in constant), 0)
 
 
 def _quantity(value: float | str, unit: str, dimension: str) -> str:

@@ -184,7 +184,7 @@ def _headline(rows: Sequence[Row], width: int, most: int) -> Iterator[TextLine]:
         below = _cells([*required, *facts[: max(MIN_FACTS, len(required)) if left else None]], width)[:most]
         for cells in below:  # a number is never cut: at the margin the line goes on
             if len(cells) == 3 and _wide([cells]) > width:
-                yield TextLine(cells[:1] + (Span(cells[1].text.partition("  ")[0].rstrip()),))
+                yield TextLine((*cells[:1], Span(cells[1].text.partition("  ")[0].rstrip())))
                 yield TextLine(
                     (Span(" " * len(cells[0].text) + cells[1].text.partition("  ")[2].strip() + "  "), cells[2])
                 )

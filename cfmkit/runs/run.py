@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit import api
 from cfmkit.documents import run_outcome
+from cfmkit.documents.run_document import RunCommand
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.run_control import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
@@ -149,7 +150,8 @@ def carry_out(
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _options_judged(_computed(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
-        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate):
+        started = RunCommand(verb.name, wanted.spec, _changes(wanted), verb.words, wanted.out)
+        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         ending = {"status": found.status.key, "exit_code": int(found.exit_code)}

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cfmkit.runs.run_outcome import report_on
 from hypothesis import given
 from hypothesis import strategies as st
 
 import cfmkit
+from cfmkit.documents.run_outcome import report_on
 from cfmkit.errors import SpecError
 from cfmkit.metrics.branches_cut_to_window import Undefined
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cfmkit.runs.run_outcome import report_on
 
 import cfmkit
+from cfmkit.documents.run_outcome import report_on
 from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes
 from cfmkit.runs.files_a_run_writes import files, part_of
 from cfmkit.specs.units import format_short

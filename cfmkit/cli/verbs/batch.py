@@ -157,9 +157,21 @@ def _tolerance(options: BatchOptions) -> float | None:
 
 
 def _annotations(found: BatchResult) -> Iterator[str]:
-    from cfmkit.cli.github_annotations import workflow_commands
+    from cfmkit.documents.annotations import workflow_commands
 
-    return workflow_commands(found.entries, found.compared.changes if found.compared else ())
+    return workflow_commands(found.entries, _place_of, found.compared.changes if found.compared else ())
+
+
+def _place_of(name: str, number: int) -> tuple[int, int]:
+    """Return line and column of a requirement; (0, 0) if the file cannot be read any more."""
+    from cfmkit.errors import CfmError
+    from cfmkit.runs.specfile import read_spec
+
+    try:
+        line, column = read_spec(name).place(f"requirements.{number}")
+    except CfmError:
+        return 0, 0
+    return line or 0, column or 0
 
 
 def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:

@@ -90,8 +90,9 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     """
     from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.run_spec_and_print_page import folder_of
+    from cfmkit.documents import html_of_study
     from cfmkit.documents.document import Written
-    from cfmkit.runs import html_report_of_study
+    from cfmkit.documents.sensitivity_document import document_of
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sensitivity.output import exit_code, outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
@@ -130,8 +131,8 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
             shown = form.for_page(makers, drawn)
             study = found.setup.study
             point = run_study_in_folder.command_of_a_point(options, study.design)
-            page = html_report_of_study.page(study.spec, found.setup.paths, kept, command, shown, point)
-            place.folder.write(html_report_of_study.NAME, page)
+            page = html_of_study.page(document_of(found), study.spec, found.setup.paths, kept, command, shown, point)
+            place.folder.write(html_of_study.NAME, page)
         made = run_study_in_folder.Made(
             "sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count
         )

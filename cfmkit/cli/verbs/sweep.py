@@ -95,27 +95,25 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
             drawn |= {stem: figure} if options.report else {}
             for name, content in form.write(figure, stem):
                 place.folder.write(name, content)
+        code, reported = exit_code(records, summary), summary.as_json(records)
+        dimensions = {one.name: one.dimension for one in work.study.metrics}
+        found = sweep_document.document_of(spec, reported, dimensions, code, reused=records.reused)
         if options.report:
-            from cfmkit.runs import html_report_of_study
+            from cfmkit.documents import html_of_study
 
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
             point = run_study_in_folder.command_of_a_point(options, work.study.design)
-            place.folder.write(
-                html_report_of_study.NAME, html_report_of_study.page(spec, varied, kept, command, shown, point)
-            )
-        code = exit_code(records, summary)
+            page = html_of_study.page(found, spec, varied, kept, command, shown, point)
+            place.folder.write(html_of_study.NAME, page)
         made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = run_study_in_folder.commit(place, made, terminal, code)
         run_study_in_folder.finish(place, [records])
-        reported = summary.as_json(records)
     written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
-    about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
-    dimensions = {one.name: one.dimension for one in work.study.metrics}
-    found = sweep_document.document_of(spec, reported, dimensions, code, written, records.reused)
+    data = reported | {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
     complaints = tuple(_complaints(records, code, options, document))
-    return replace(found, data=reported | about, complaints=complaints)
+    return replace(found, data=data, complaints=complaints, files=written)
 
 
 def request(options: SweepOptions) -> SweepRequest:
