@@ -109,7 +109,9 @@ def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator
 
 def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[Table]:
     """Yield the range of every result, beside its value at the best point; what does not change comes last."""
-    leading, rows, constant = [], [], []
+    leading: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
+    constant: list[tuple[str, ...]] = []
     first = [summary["best"]["by"]] if summary["best"] else []
     asked = [one["metric"] for one in summary["requirements"]]
     names = [name for name in dict.fromkeys((*first, *asked, *summary["range"])) if name in summary["range"]]

@@ -194,7 +194,7 @@ def _headline(rows: Sequence[Row], width: int, most: int) -> Iterator[TextLine]:
     for at in range(max(len(left), len(right))):
         texts: tuple[Span, ...] = left[at] if at < len(left) else ()
         pad = " " * (_wide(left) - sum(len(one.text) for one in texts) + GAP)
-        yield whole_line(*texts, *((pad, *right[at]) if at < len(right) else ()))
+        yield whole_line(*texts, *([Span(pad), *right[at]] if at < len(right) else []))
 
 
 def _cells(rows: Sequence[Row], width: int) -> list[tuple[Span, ...]]:

@@ -111,9 +111,9 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
         manifest = run_study_in_folder.commit(place, made, terminal, code)
         run_study_in_folder.finish(place, [records])
     written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
-    data = reported | {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
+    record = reported | {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
     complaints = tuple(_complaints(records, code, options, document))
-    return replace(found, data=data, complaints=complaints, files=written)
+    return replace(found, data=record, complaints=complaints, files=written)
 
 
 def request(options: SweepOptions) -> SweepRequest:
