@@ -95,6 +95,10 @@ LINE_EVERY = 10.0
 """Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""
 
 
+FIRST_ESTIMATE = 0.05
+"""Share of the work before which the time left is not told: what is done first says little of the rest."""
+
+
 class ProgressLines:
     """A line on standard error now and then, with the time that is left."""
 
@@ -109,7 +113,8 @@ class ProgressLines:
         if now - self._reported >= LINE_EVERY and 0.0 < self._most < 1.0:
             self._reported = now
             left = (now - self._start) * (1.0 - self._most) / self._most
-            streams.complain(f"{100 * self._most:.0f} %, {duration(left)} left: {text}\n")
+            time_left = f", {duration(left)} left" if self._most >= FIRST_ESTIMATE else ""
+            streams.complain(f"{100 * self._most:.0f} %{time_left}: {text}\n")
 
 
 def duration(seconds: float) -> str:

@@ -150,4 +150,4 @@ def _nearest(motion: Any, effort: Any, place: float) -> float:
     return float(np.interp(place, motion[order], effort[order], left=np.nan, right=np.nan))
 
 
-__all__ = ["NAME", "page"]
+__all__ = ["NAME", "Film", "page"]

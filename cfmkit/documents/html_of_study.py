@@ -235,4 +235,4 @@ _AXES = (("displacement [", "angle ["), ("force [", "torque ["))
 """How the columns of a curve begin that are drawn: over which, and which."""
 
 
-__all__ = ["NAME", "page"]
+__all__ = ["NAME", "StudyPoints", "page"]

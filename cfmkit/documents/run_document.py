@@ -235,7 +235,7 @@ def metrics_of(report: Report) -> tuple[Row, ...]:
     return tuple(
         Row(
             words(name),
-            branches(report, name, report.metrics) + _overrated(report, name),
+            branches(report, name, report.metrics) + _remark(report, name),
             window=_over(report, name, window),
             about=report.metrics[name].definition,
         )
@@ -261,7 +261,7 @@ def _facts(report: Report) -> Iterator[Row]:
         if name not in known and _has_value(report, name):
             text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
             about = report.metrics[name].definition
-            yield Row(LABELS.get(name, words(name)), text + _overrated(report, name), about=about)
+            yield Row(LABELS.get(name, words(name)), text + _remark(report, name), about=about)
 
 
 def _stress(report: Report, known: set[str]) -> Row | None:
@@ -273,7 +273,7 @@ def _stress(report: Report, known: set[str]) -> Row | None:
         text = f"{text.partition(' ')[0]} of {format_short(allowed, 'stress', 3)}"
     if "safety_factor" not in known and _has_value(report, "safety_factor"):
         factor = report.metrics["safety_factor"].value or 0.0
-        text += f", safety {factor:.3g}" + _overrated(report, "safety_factor")
+        text += f", safety {factor:.3g}" + _overrated(report)
         text += " (little margin)" if 1.0 <= factor < LITTLE_MARGIN else ""
     return Row("stress", text, about=report.metrics["stress_max"].definition)
 
@@ -293,10 +293,26 @@ def _has_value(report: Report, name: str) -> bool:
     return quantity is not None and quantity.value is not None
 
 
-def _overrated(report: Report, name: str) -> str:
-    """Return why a safety factor below one is no finding: the model is known to overestimate the stress by as much."""
-    if not name.endswith("safety_factor"):
+def _remark(report: Report, name: str) -> str:
+    """Return of which stress a safety factor is, by which rule a stress is allowed, and how far a model is known."""
+    allowed = report.result.allowable_stress
+    if name == "allowable_stress":
+        return _rule(report)
+    if name == "safety_factor" and allowed is not None and "allowable_stress" not in report.metrics:
+        return f", of {format_short(allowed, 'stress')}{_rule(report)}{_overrated(report)}"
+    return _overrated(report, name) if name.endswith("safety_factor") else ""
+
+
+def _rule(report: Report) -> str:
+    """Return by which rule a stress is allowed, where the mechanism says how much of its strength may be used."""
+    try:
+        return f" (yield strength / {report.result.spec.at('mechanism.safety_factor'):.4g})"
+    except KeyError:
         return ""
+
+
+def _overrated(report: Report, name: str = "safety_factor") -> str:
+    """Return why a safety factor below one is no finding: the model is known to overestimate the stress by as much."""
     factor, share = report.metrics[name].value, report.result.stress_overrated
     if factor is None or any(item.name == "overstressed" for item in report.result.warnings):
         return ""

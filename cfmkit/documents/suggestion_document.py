@@ -69,7 +69,7 @@ def _tables(record: Mapping[str, Any]) -> Iterator[Table]:
     heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
     proposals, unjudged = record["proposals"], record["unjudged"]
     for heading, listed, first in (
-        ("", proposals, 1),
+        ("proposals", proposals, 1),
         ("not judged in full", unjudged, len(proposals) + 1),
     ):
         rows = tuple(
@@ -95,7 +95,7 @@ def _remarks(found: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
         for text in (*one["unjudged"], *one["warnings"]):
             texts[text].append(number)
     for text, numbers in texts.items():
-        yield Note(_numbers(numbers), text, whole=True)
+        yield Note(f"no. {_numbers(numbers)}", text, whole=True)
 
 
 def _numbers(numbers: Sequence[int]) -> str:

@@ -120,7 +120,7 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
 
 
 def _most_of_headline(rows: Sequence[Row]) -> int:
-    """Return how many lines a headline takes before warnings are left out for it."""
+    """Return how many lines are kept for the headline where warnings would need them."""
     required = sum(row.required for row in rows)
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
 

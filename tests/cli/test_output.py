@@ -240,3 +240,12 @@ def test_a_long_name_is_shown_no_further_than_needed_to_recognise_it(cli, cam, a
     assert done.code in (2, 3, 7)
     assert all(len(line) < 700 for line in done.err.split("\n"))
     assert "\n\n" not in done.err
+
+
+def test_piped_work_prints_a_line_with_the_time_left_now_and_then(monkeypatch, capsys):
+    clock = iter([0.0, 3.0, 12.0, 15.0, 30.0, 60.0])
+    monkeypatch.setattr(output.time, "monotonic", lambda: next(clock))
+    lines = output.ProgressLines()
+    for share, text in ((0.1, "a"), (0.25, "b"), (0.26, "c"), (0.5, "d"), (1.0, "end")):
+        lines.report(share, text)
+    assert capsys.readouterr().err == "25 %, 36 s left: b\n50 %, 30 s left: d\n"

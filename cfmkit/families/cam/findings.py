@@ -189,6 +189,7 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
         f"without the {'constant force' if law.constant else 'force it is cut for'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,
+        short=f"force not {'constant' if law.constant else 'as cut for'} over the first {mm(corner)}",
     )
     yield finding(
         "contact_not_single_valued",
