@@ -226,6 +226,7 @@ class Note(NamedTuple):
     remedy: str = ""  # what changes it, as an option that can be pasted
     tone: str = LABEL
     whole: bool = False  # whether a short page has all of it, too: how a run ended
+    short: str = ""  # what a short page has instead; empty: the clauses of the text that fit
 
 
 class WarningEntry(NamedTuple):

@@ -52,6 +52,9 @@ FACTS = (
 )
 """Metrics that are shown of every family, as far as they have a value."""
 
+EXPECTED = ", and expect "
+"""What stands before the forces of a test plan, which a short page shows."""
+
 LITTLE_MARGIN = 1.05
 """Safety factor below which the margin is called little."""
 
@@ -157,7 +160,7 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
         settings = [f"{path}={''.join(value.split())}" for path, value in design.nearest_feasible.items()]
         yield Note("feasible", " ".join(f"--set {setting}" for setting in settings), whole=True)
     for word, text in report.supplement.lines:
-        yield Note(word, text)
+        yield Note(word, text, short=text.partition(EXPECTED)[2])
     for text in searched(design.search) if design else ():
         yield Note("search", text)
 

@@ -107,7 +107,7 @@ def _title(document: Document, width: int) -> Iterator[TextLine]:
 # --- a short page -----------------------------------------------------------------------------------------------------
 
 
-def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine]:
+def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine | CellGrid]:
     """Yield the lines below the title: what must stand first takes its lines, warnings and facts share the others."""
     notes = [text for note in document.notes for text in _note_lines(note, width)]
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
@@ -134,7 +134,7 @@ def _note_lines(note: Note, width: int) -> list[TextLine]:
     if note.whole:
         lines = textwrap.wrap(note.text, room, break_long_words=False, break_on_hyphens=False) or [""]
         return [whole_line(_word(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)]
-    return [_with_remedy(_word(note.word, note.tone), "", note.text, note.remedy, room)]
+    return [_with_remedy(_word(note.word, note.tone), "", note.short or note.text, note.remedy, room)]
 
 
 def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> TextLine:
@@ -224,7 +224,7 @@ def _wide(lines: Iterable[Sequence[Span]]) -> int:
     return max([0, *(sum(len(one.text) for one in spans) for spans in lines)])
 
 
-def _table_lines(table: Table, width: int) -> list[TextLine]:
+def _table_lines(table: Table, width: int) -> list[TextLine | CellGrid]:
     """Return a table as lines: as many rows as a short page has of it, each as wide as the page."""
     rows = table.rows if table.most is None else table.rows[: table.most]
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
@@ -234,12 +234,12 @@ def _table_lines(table: Table, width: int) -> list[TextLine]:
     wide = [max([0, *(len(row[at].text) for row in cells if at < len(row))]) for at in range(len(heads))]
     room = width - INDENT - 2 * (len(wide) - 1)
     while sum(wide) > room:  # texts give way, numbers do not
-        able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > 8]
-        if not able:
-            break
+        able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > LEAST_COLUMNS]
+        if not able:  # cells take several lines
+            return [*([line(f"  {table.heading}", LABEL)] if table.heading else []), _grid(table, rows)]
         widest = max(able, key=lambda at: wide[at])
-        wide[widest] = max(wide[widest] - (sum(wide) - room), 8)
-    lines = [line(f"  {table.heading}", LABEL)] if table.heading else []
+        wide[widest] = max(wide[widest] - (sum(wide) - room), LEAST_COLUMNS)
+    lines: list[TextLine | CellGrid] = [line(f"  {table.heading}", LABEL)] if table.heading else []
     for row in cells:
         texts = [
             Span(f"{shortened_to_clause(one.text, wide[at]):<{wide[at] + 2}}", one.tone) for at, one in enumerate(row)
@@ -265,6 +265,10 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
     return [whole_line(_word("files", GOOD), text, Span(more, FAINT))]
 
 
+def _grid(table: Table, rows: Sequence[Sequence[str | Span]]) -> CellGrid:
+    return CellGrid(table.columns, rows, gap=2, indented=True)
+
+
 def _command(word: str, text: str) -> TextLine:
     return whole_line(_word(word, GOOD), text)
 
@@ -283,7 +287,7 @@ def _whole_page(document: Document) -> Iterator[Block]:
     for table in document.tables:
         if table.heading:
             yield line(f"  {table.heading}", LABEL)
-        yield CellGrid(table.columns, table.rows, gap=2, indented=True)
+        yield _grid(table, table.rows)
         yield BLANK
     for note in document.notes:
         yield Paragraph(note.word, note.text + (f": {note.remedy}" if note.remedy else ""), note.tone)
