@@ -41,8 +41,6 @@ class TextLine(NamedTuple):
     """One line of text."""
 
     spans: tuple[Span, ...] = ()  # from left to right
-    right: str = ""  # what stands at its far end
-    droppable: bool = False  # whether `right` goes where there is no room for it
     whole: bool = False  # whether it keeps its length where the terminal is narrower: paths and commands are copied
 
 
@@ -97,11 +95,6 @@ def line(text: str, tone: str = PLAIN) -> TextLine:
 def whole_line(*spans: str | Span) -> TextLine:
     """Return a line that keeps its length."""
     return TextLine(tuple(Span(one) if isinstance(one, str) else one for one in spans), whole=True)
-
-
-def columns(*wraps: bool) -> tuple[GridColumn, ...]:
-    """Return columns without heads, by whether their cells may take several lines."""
-    return tuple(GridColumn("", each) for each in wraps)
 
 
 def verdict(ok: bool | None) -> Span:

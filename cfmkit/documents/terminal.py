@@ -338,15 +338,7 @@ def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator
         for text in lines[1:]:
             yield _text(Span(" " * MARGIN + text), whole=True)
     else:
-        yield _line(block, width)
-
-
-def _line(block: TextLine, width: int) -> Text:
-    left = _text(*block.spans, whole=block.whole)
-    room = width - left.cell_len - len(block.right)
-    if not block.right or (block.droppable and room < LEAST_GAP):
-        return left
-    return left.append(" " * max(LEAST_GAP, room)).append(block.right, FAINT)
+        yield _text(*block.spans, whole=block.whole)
 
 
 def _text(*spans: Span, whole: bool = False) -> Text:

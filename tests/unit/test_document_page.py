@@ -17,11 +17,9 @@ from cfmkit.documents.document import (
     Paragraph,
     Row,
     Span,
-    TextLine,
     Verbatim,
     WarningEntry,
     Written,
-    columns,
     command_line,
     field,
     listed,
@@ -47,15 +45,6 @@ def printed(monkeypatch, capsys):
     return show
 
 
-def test_two_texts_stand_at_the_ends_of_a_line_and_never_touch(printed):
-    assert printed(TextLine((Span("left"),), "right")) == "left" + 31 * " " + "right\n"
-    assert printed(TextLine((Span(34 * "l"),), "right")).split() == [34 * "l", "right"]
-
-
-def test_what_stands_at_the_far_end_goes_only_where_that_is_allowed(printed):
-    assert printed(TextLine((Span(34 * "l"),), "right", droppable=True)) == 34 * "l" + "\n"
-
-
 def test_a_paragraph_stands_in_from_its_word_and_cuts_nothing(printed):
     path = "/a/" + 50 * "b"
     assert printed(Paragraph("warning", f"the file {path} is there")) == (
@@ -70,14 +59,14 @@ def test_a_line_that_is_copied_keeps_its_length(printed):
 
 def test_a_table_has_heads_only_where_one_says_something(printed):
     rows = [("a", Span("b"))]
-    assert printed(CellGrid(columns(True, True), rows)) == "a   b\n"
+    assert printed(CellGrid((GridColumn(), GridColumn()), rows)) == "a   b\n"
     assert printed(CellGrid((GridColumn(""), GridColumn("raw")), rows)) == "    raw\na   b\n"
 
 
 def test_cells_are_folded_and_never_cut(printed):
     cell = 30 * "abc"
-    assert "".join(printed(CellGrid(columns(True), [(cell,)])).split()) == cell
-    assert "\N{HORIZONTAL ELLIPSIS}" not in printed(CellGrid(columns(False, False), [(cell, cell)]))
+    assert "".join(printed(CellGrid((GridColumn(),), [(cell,)])).split()) == cell
+    assert "\N{HORIZONTAL ELLIPSIS}" not in printed(CellGrid((GridColumn("", False),) * 2, [(cell, cell)]))
 
 
 def test_records_are_listed_below_their_heading_and_not_at_all_where_there_are_none(printed):
