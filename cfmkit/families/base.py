@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.rows import SolvedRows
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart

@@ -31,7 +31,7 @@ def test_every_process_has_a_reason_and_a_size():
 
 def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     asked = (Requirement(metric="force_mean", min="1.4 N", max="1.6 N"), Requirement(metric="half_band", max="1.5 %"))
-    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
+    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
     shares = first_order_shares(result, assumed(spec), Run())
@@ -46,7 +46,7 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
 
 def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     asked = (Requirement(metric="force_mean", min="1 N", max="2 N"),)
-    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
+    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     found = assumed(spec)
     assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -96,7 +96,7 @@ def spring_chain(spec: VcfmSpec) -> SpringChain:
 def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
     """Return leaf and, unless it is bought, spring as beams with their travels, for decks of other solvers."""
     from cfmkit.elastica import Displacement
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
 
     found = [DrivenNetwork("vcfm-leaf", leaf_network(spec), Displacement("shuttle", DOWN, np.array([spec.travel])))]
     if spec.mechanism.springs is None:

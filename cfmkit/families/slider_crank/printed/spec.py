@@ -210,5 +210,7 @@ class PrintedDesign(Model):
 class PrintedAnalysis(Analysis):
     """How flexures and strips are computed."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "recheck": "for a second opinion on force and stress write 'fidelity: solid', the part as a planar solid"
+    }
     accuracy: Annotated[Ratio, Field(ge=1e-10, le=1e-3)] = Field(1e-7, description="of the beams' forces")
-    recheck: bool = Field(False, description="compute force and stress again by corotational elements at a few places")
