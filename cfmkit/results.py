@@ -105,6 +105,7 @@ class Finding(ShortRepr):
     name: str
     message: str
     cures: tuple[str | tuple[str, ...], ...] = ()
+    short: str = ""  # the consequence with its number, in one clause; empty: the first clauses of the message say it
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.options import Common
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.verb_result import Answer
+    from cfmkit.documents.document import Document
 
 _STYLE: dict[str, Any] = {
     "rich_markup_mode": "rich",
@@ -35,7 +35,7 @@ _STYLE: dict[str, Any] = {
 class Call:
     """A command line that was understood: what to call, and with which options."""
 
-    run: Callable[[Any, Terminal], Answer]
+    run: Callable[[Any, Terminal], Document]
     options: Common
 
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import typer
 
 from cfmkit import errors
-from cfmkit.cli.verb_result import Answer, document
+from cfmkit.documents.document import Document
+from cfmkit.documents.json_document import envelope
 from cfmkit.errors import ExitCode, OutputError, SpecError, StoppedBySignal, shortened
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def go_on(fresh: bool) -> str:
     return f"run the same command again{' without --fresh' if fresh else ''} to continue"
 
 
-def told(error: BaseException, terminal: Terminal) -> Answer:
+def told(error: BaseException, terminal: Terminal) -> Document:
     """Tell the user what went wrong, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
@@ -71,15 +72,15 @@ def fail(error: BaseException, terminal: Terminal) -> ExitCode:
     if terminal.json:
         # What could not be written may be this very output.
         with suppress(OutputError):
-            terminal.document(document(answer))
+            terminal.show_json(envelope(answer))
     return answer.exit_code
 
 
-def answer_to(error: BaseException) -> Answer:
+def answer_to(error: BaseException) -> Document:
     """Return the answer that an exception is."""
     code, lines, entries = code_of(error), list(_lines(error)), list(_entries(error))
     data = {"message": "; ".join(str(entry["message"]) for entry in entries)}
-    return Answer(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))
+    return Document(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))
 
 
 def code_of(error: BaseException) -> ExitCode:

@@ -20,7 +20,7 @@ from cfmkit.cli import streams
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
-from cfmkit.cli.verb_result import document
+from cfmkit.documents.json_document import envelope
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -124,9 +124,9 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
     hidden = wishes.json or wishes.quiet
     wishes.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
     if wishes.json:
-        wishes.document(document(answer))
+        wishes.show_json(envelope(answer))
     elif not wishes.quiet:
-        wishes.show(*answer.page)
+        wishes.show_page(answer)
     return answer.exit_code
 
 

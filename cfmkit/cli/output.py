@@ -1,41 +1,27 @@
-"""How results reach the user: text for people on a terminal, or one JSON document.
-
-Results go to standard output, everything else to standard error. What a page consists of
-is said in `cfmkit.cli.page_block_types`; here it becomes characters, and nowhere else.
-"""
+"""What the user wants to see, and the streams it goes to: results to standard output, all else to standard error."""
 
 from __future__ import annotations
 
-import io
 import json
 import shutil
 import sys
+import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import streams
-from cfmkit.cli.page_block_types import FAINT, MARGIN, CellGrid, JsonText, Paragraph, Span, TextLine, Verbatim
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from rich.console import Console, ConsoleOptions, RenderableType
-    from rich.segment import Segment
-    from rich.table import Table
-    from rich.text import Text
-
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Block, Document
 
     Report = Callable[[float, str], None]
 
-NARROWEST, WIDEST = 40, 108
-"""Columns of a page. In 40 the page of a cam still shows every number beside its name; wider than 108 a paragraph is
-hard to read, and few lines except commands to copy are that long."""
-
-LEAST_GAP = 2
-"""Columns between the two ends of a line: fewer would read as one text."""
+NARROWEST, WIDEST = 40, 100
+"""Columns of a page: in 40 every number still stands beside its name; wider than 100 a line is hard to read."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +53,22 @@ class Terminal:
         return self.verbose >= 2
 
     def show(self, *blocks: Block) -> None:
-        """Print blocks of a page to standard output."""
-        streams.put("".join(map(self._printed, blocks)))
+        """Print blocks to standard output."""
+        from cfmkit.documents.terminal import printed
 
-    def document(self, data: Mapping[str, Any]) -> None:
+        ascii_only = not streams.speaks_utf8(sys.stdout)
+        streams.put(printed(blocks, self.width, sys.stdout.isatty(), ascii_only))
+
+    def show_page(self, document: Document) -> None:
+        """Print the page of a document to standard output."""
+        from cfmkit.documents.terminal import page
+
+        self.show(*page(document, self.width, self.verbose > 0))
+
+    def show_json(self, data: Mapping[str, Any]) -> None:
         """Print one JSON document to standard output."""
-        streams.put(_json(data))
+        ascii_only = not streams.speaks_utf8(sys.stdout)
+        streams.put(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
 
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""
@@ -81,9 +77,12 @@ class Terminal:
 
     @contextmanager
     def progress(self) -> Iterator[Report]:
-        """Yield what reports progress: a bar, if somebody watches standard error."""
-        if self.json or self.quiet or not sys.stderr.isatty():
+        """Yield what reports progress: a bar on a terminal, else a line with the time left now and then."""
+        if self.json or self.quiet:
             yield lambda _fraction, _text: None
+            return
+        if not sys.stderr.isatty():
+            yield ProgressLines().report
             return
         bar = Bar()
         try:
@@ -91,108 +90,38 @@ class Terminal:
         finally:
             bar.close()
 
-    def _printed(self, block: Block) -> str:
-        """Return a block as this terminal prints it."""
-        if isinstance(block, Verbatim):
-            return block.text
-        if isinstance(block, JsonText):
-            return _json(block.data)
-        return self._rendered(block)
 
-    def _rendered(self, block: TextLine | Paragraph | CellGrid) -> str:
-        from rich.console import Console
-
-        page = io.StringIO()
-        colours = True if sys.stdout.isatty() else None
-        console = Console(
-            file=page, force_terminal=colours, width=self.width, highlight=False, markup=False, emoji=False
-        )
-        for item in _renderables(block, self.width):
-            # What a text says about wrapping would be lost: rich prints a copy of it.
-            no_wrap, overflow = getattr(item, "no_wrap", None), getattr(item, "overflow", None)
-            console.print(_Visible(item), crop=False, no_wrap=no_wrap, overflow=overflow)
-        return "\n".join(line.rstrip() for line in page.getvalue().split("\n"))
+LINE_EVERY = 10.0
+"""Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""
 
 
-def _json(data: Mapping[str, Any]) -> str:
-    ascii_only = not streams.speaks_utf8(sys.stdout)
-    return json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n"
+FIRST_ESTIMATE = 0.05
+"""Share of the work before which the time left is not told: what is done first says little of the rest."""
 
 
-def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator[RenderableType]:
-    """Yield what rich prints of a block; of a paragraph line by line."""
-    if isinstance(block, CellGrid):
-        yield _table(block, width)
-    elif isinstance(block, Paragraph):
-        import textwrap
+class ProgressLines:
+    """A line on standard error now and then, with the time that is left."""
 
-        lines = textwrap.wrap(block.text, width - MARGIN, break_long_words=False, break_on_hyphens=False) or [""]
-        yield _text(Span(f"{block.word:<{MARGIN}}", block.tone), Span(lines[0]), whole=True)
-        for text in lines[1:]:
-            yield _text(Span(" " * MARGIN + text), whole=True)
-    else:
-        yield _line(block, width)
+    def __init__(self) -> None:
+        """Begin to count the time."""
+        self._start = self._reported = time.monotonic()
+        self._most = 0.0
 
-
-def _line(block: TextLine, width: int) -> Text:
-    left = _text(*block.spans, whole=block.whole)
-    room = width - left.cell_len - len(block.right)
-    if not block.right or (block.droppable and room < LEAST_GAP):
-        return left
-    return left.append(" " * max(LEAST_GAP, room)).append(block.right, FAINT)
+    def report(self, fraction: float, text: str) -> None:
+        """Tell how far a run is, by the share that is done, if the last line is old enough."""
+        now, self._most = time.monotonic(), max(self._most, fraction)
+        if now - self._reported >= LINE_EVERY and 0.0 < self._most < 1.0:
+            self._reported = now
+            left = (now - self._start) * (1.0 - self._most) / self._most
+            time_left = f", {duration(left)} left" if self._most >= FIRST_ESTIMATE else ""
+            streams.complain(f"{100 * self._most:.0f} %{time_left}: {text}\n")
 
 
-def _text(*spans: Span, whole: bool = False) -> Text:
-    from rich.text import Text
-
-    text = Text.assemble(*((span.text, span.tone) for span in spans))
-    if whole:
-        text.no_wrap, text.overflow = True, "ignore"
-    return text
-
-
-SHORTEST = 8
-"""Columns that a cell of several lines gets at least: most words of the pages are not longer."""
-
-
-def _least_width(block: CellGrid, rows: Sequence[Sequence[Text]]) -> int:
-    """Return how wide a page has to be for a table of which only the columns of texts wrap."""
-    widths = (2 if block.indented else 0) + block.gap * (len(block.columns) - 1)
-    for place, column in enumerate(block.columns):
-        longest = max([len(column.head), *(row[place].cell_len for row in rows if place < len(row))])
-        widths += min(longest, SHORTEST) if column.wraps else longest
-    return widths
-
-
-def _table(block: CellGrid, width: int) -> Table:
-    from rich.table import Table
-
-    headed = any(column.head for column in block.columns)
-    table = Table(box=None, show_header=headed, header_style=FAINT, padding=(0, block.gap, 0, 0), pad_edge=False)
-    if block.indented:
-        table.add_column("", width=0)
-    rows = [[_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row] for row in block.rows]
-    # Where the page is too narrow for what should not wrap, this is folded, too: a number that loses its last digit
-    # or its unit at the margin would be a wrong one.
-    folded = _least_width(block, rows) > width
-    for column in block.columns:
-        table.add_column(column.head, overflow="fold", no_wrap=not (column.wraps or folded))
-    for cells in rows:
-        table.add_row(*([""] if block.indented else []), *cells)
-    return table
-
-
-@dataclass(frozen=True)
-class _Visible:
-    """Something to print, in which a name that holds control characters commands nothing."""
-
-    item: RenderableType
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
-        from rich.segment import Segment
-
-        for text, style, control in console.render(self.item, options):
-            yield Segment("\n".join(map(visible, text.split("\n"))), style, control)
+def duration(seconds: float) -> str:
+    """Return a time in words: ``40 s``, ``3 min``, ``2.5 h``."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 class Bar:

@@ -15,16 +15,13 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli import streams
 from cfmkit.cli.failures import Stopped
-from cfmkit.cli.output import Bar
+from cfmkit.cli.output import LINE_EVERY, Bar, duration
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
     from cfmkit.cli.output import Terminal
-
-LINE_EVERY = 10.0
-"""Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""
 
 DRAW_EVERY = 0.1
 """Seconds between two pictures of the bar: quicker than this nobody reads, and each costs some of the time."""
@@ -132,13 +129,6 @@ class StudyProgress:
         """Remove the bar."""
         if self._bar is not None:
             self._bar.close()
-
-
-def duration(seconds: float) -> str:
-    """Return a time in words: ``40 s``, ``3 min``, ``2.5 h``."""
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 @contextmanager

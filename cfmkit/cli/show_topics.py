@@ -11,14 +11,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
-from cfmkit.cli.page_block_types import LABEL, Field, Span, TextLine, Verbatim, field, line, listed
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Block
     from cfmkit.specs.keys_and_schema import Key
 
     Record = Mapping[str, Any]
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     """By every name under which it is found: what there is to say."""
 
 
-def explain(name: str | None) -> Answer:
+def explain(name: str | None) -> Document:
     """Return what there is to say of a topic, a family, or whatever else has that name; without a name what there is.
 
     Raises
@@ -60,13 +59,13 @@ def skipped(name: str | None) -> tuple[str, ...]:
     return families.skipped() if whole else ()
 
 
-def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Answer:
+def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Document:
     def blocks() -> Iterator[Block]:
         yield TextLine((Span(title, LABEL), Span(f"  {text}")))
         for section in sections:
             yield from listed(*section)
 
-    return Answer(data, blocks())
+    return Document(data, blocks())
 
 
 BY_NAME = {
@@ -81,7 +80,7 @@ BY_NAME = {
 """Examples of what else `explain` finds."""
 
 
-def overview() -> Answer:
+def overview() -> Document:
     """Return the list of families and topics."""
     mechanisms = [{"name": record.name, "summary": record.summary} for record in families.records()]
     topics = [{"name": name, "summary": summary} for name, (summary, _) in TOPICS.items()]
@@ -96,7 +95,7 @@ def overview() -> Answer:
     return _page("cfmkit show", text, sections, {"families": mechanisms, "topics": topics})
 
 
-def units_page() -> Answer:
+def units_page() -> Document:
     """Return the closed list of units, and the dimensions with the unit that files are written in."""
     from cfmkit.specs.units import DIMENSIONS, unit_table
 
@@ -125,7 +124,7 @@ def units_page() -> Answer:
     return _page("units", text, sections, {"units": units, "dimensions": dimensions})
 
 
-def metrics_page() -> Answer:
+def metrics_page() -> Document:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
     from cfmkit.specs.units import border_unit
@@ -155,7 +154,7 @@ NO_SPREAD = "none stated"
 """Of a property for which the sources of a material state no range."""
 
 
-def materials_page() -> Answer:
+def materials_page() -> Document:
     """Return the material library."""
     from cfmkit.stock import MATERIALS
 
@@ -183,17 +182,17 @@ def materials_page() -> Answer:
     return _page("materials", text, sections, {"materials": records})
 
 
-def references_page() -> Answer:
+def references_page() -> Document:
     """Return the papers behind all families, and their BibTeX."""
     records = references()
     columns = (field("name"), field("family"), field("reference", wraps=True))
     shown = _page("references", "", (("", records, columns),), {})
     bibtex = {record.name: text for record in families.records() if (text := record.bibtex)}
-    page = (*shown.page, *(block for text in bibtex.values() for block in (line(""), Verbatim(text.strip() + "\n"))))
-    return Answer({"references": records, "bibtex": bibtex}, page)
+    page = (*shown.body, *(block for text in bibtex.values() for block in (line(""), Verbatim(text.strip() + "\n"))))
+    return Document({"references": records, "bibtex": bibtex}, page)
 
 
-def family_page(name: str) -> Answer:
+def family_page(name: str) -> Document:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
     from cfmkit.specs.keys_and_schema import keys
     from cfmkit.specs.units import border_unit
@@ -259,7 +258,7 @@ def _default(key: Record) -> str:
     return "required" if key["required"] else str(key["default"])
 
 
-def found(name: str) -> Answer | None:
+def found(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
     for kind, (records, fields) in _KINDS.items():
@@ -273,7 +272,7 @@ def found(name: str) -> Answer | None:
     page = _page(name, "", sections, {kind: known for kind, known, _ in sections})
     entries = [text for kind, known, _ in sections if kind == "references" for one in known if (text := _bibtex(one))]
     more = (block for text in entries for block in (line(""), Verbatim(text + "\n")))
-    return Answer({**page.data, **({"bibtex": entries} if entries else {})}, (*page.page, *more))
+    return Document({**page.data, **({"bibtex": entries} if entries else {})}, (*page.body, *more))
 
 
 def _symbols(name: str) -> list[Record]:
@@ -490,7 +489,7 @@ SPEC_KEY_FIELDS = (field("path", "key"), field("family", wraps=True), *KEY_FIELD
 SYMBOL_FIELDS = (field("name", "symbol"), field("family"), field("key", wraps=True), field("meaning", wraps=True))
 METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
 
-TOPICS: Mapping[str, tuple[str, Callable[[], Answer]]] = {
+TOPICS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
     "materials": ("the named materials, with scatter and source", materials_page),

@@ -23,7 +23,7 @@ NARROW = 3.0
 class Finder(Protocol):
     """Makes the findings of one family."""
 
-    def __call__(self, name: str, message: str, *cures: str | tuple[str, ...]) -> Finding:
+    def __call__(self, name: str, message: str, *cures: str | tuple[str, ...], short: str = "") -> Finding:
         """Return a finding of the family; `KeyError` for a name that the family does not explain."""
 
 
@@ -37,10 +37,10 @@ def finder(meanings: Mapping[str, str]) -> Finder:
     'too_thin'
     """
 
-    def finding(name: str, message: str, *cures: str | tuple[str, ...]) -> Finding:
+    def finding(name: str, message: str, *cures: str | tuple[str, ...], short: str = "") -> Finding:
         if name not in meanings:
             raise KeyError(name)
-        return Finding(name, message, cures)
+        return Finding(name, message, cures, short)
 
     return finding
 

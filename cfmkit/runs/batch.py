@@ -11,12 +11,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from cfmkit.arrays import Several, named
+from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
-from cfmkit.runs.run_outcome import worst
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import TOLERANCE, BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
@@ -408,12 +408,12 @@ def batch(
     >>> found.exit_code.name, [(one.spec, one.status) for one in found.entries]
     ('OK', [('configs/cam.yaml', 'complete')])
     """
+    from cfmkit.documents.junit import junit as junit_of
+    from cfmkit.documents.junit import prepared
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch_sources_and_outcomes import folders, sources
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
-    from cfmkit.studies.junit import junit as junit_of
-    from cfmkit.studies.junit import prepared
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():
@@ -452,7 +452,7 @@ def batch(
     if report is not None:
         report(junit_of(entries))
     if reported is not None:
-        from cfmkit.runs.batch_output_files import summary as in_markdown
+        from cfmkit.documents.markdown import summary as in_markdown
 
         reported(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared)

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit import api
+from cfmkit.documents.document import TONES
+from cfmkit.documents.html import escaped_json, part, template
+from cfmkit.documents.run_document import verdict_of
 from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
-from cfmkit.runs.html_report_of_run import ENDS, escaped_json, part, template
 from cfmkit.runs.specfile import bind, changed, read_spec
 from cfmkit.specs.units.strict_decimal_number import NUMBER
 
@@ -174,14 +176,14 @@ class Explorer:
         for slider in self.sliders():
             groups.setdefault(slider.path.rpartition(".")[0], []).append(slider)
         data = {"token": token, "source": self.source, "first": self.answer(())}
-        text: str = template("explorer.html.j2").render(
+        text: str = template("explorer.html.j2", "cfmkit.runs").render(
             title=spec.name,
             family=spec.family,
             groups={name: (_legend(name, spec), sliders) for name, sliders in groups.items()},
             data=escaped_json(data),
             nonce=nonce,
-            style=part("report.css") + part("explorer.css"),
-            script=part("explorer.js"),
+            style=part("report.css") + part("explorer.css", "cfmkit.runs"),
+            script=part("explorer.js", "cfmkit.runs"),
             suggestion=suggested_name(Path(self.source).stem),
         )
         return text.encode()
@@ -240,17 +242,16 @@ def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
 
 def _shown(result: Result) -> dict[str, Any]:
     """Return a result as data for the page."""
+    from cfmkit.documents.run_outcome import report_on
     from cfmkit.families import family
-    from cfmkit.runs.run_outcome import report_on
     from cfmkit.specs.units import border_unit, format_short
 
     report = report_on(result)
-    tone, words = ENDS.get(int(report.exit_code), ("warn", "the run ended early"))
     first = (*family(result.spec.family).leading, "force_mean", "torque_mean", "force_ripple", "torque_ripple")
     known = {name: report.metrics[name] for name in dict.fromkeys(first) if name in report.metrics}
     found: dict[str, Any] = {
-        "tone": tone,
-        "verdict": words,
+        "tone": TONES.get(int(report.exit_code), "warn"),
+        "verdict": verdict_of(report),
         "message": report.message,
         "requirements": [{"sentence": one.sentence, "ok": one.ok} for one in report.requirements],
         "warnings": [{"name": one.name, "message": one.message} for one in report.warnings],

@@ -21,8 +21,9 @@ from cfmkit.tables.json_writing import json_bytes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.documents.run_document import RunCommand
+    from cfmkit.documents.run_outcome import Report
     from cfmkit.export.contours import Drawing
-    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
 
 
@@ -33,6 +34,7 @@ def files(
     command: str = "",
     form: FigureForm = PLAIN,
     animate: str | None = None,
+    started: RunCommand | None = None,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a run as (name below the folder, content), each when it is needed.
 
@@ -50,6 +52,8 @@ def files(
         How figures are written; default: as PNG, as they are drawn. The page has them as SVG.
     animate : {"gif", "mp4"}, optional
         Whether to write the mechanism in motion beside its curve, where its family draws it.
+    started : RunCommand, optional
+        Which commands apply remedies, for the page.
     """
     result, designed = report.result, report.design.spec if report.design else None
     if designed is not None:
@@ -79,9 +83,12 @@ def files(
 
         yield f"figures/motion.{animate}", animation(result, moving, animate)
     if page:
-        from cfmkit.runs import html_report_of_run
+        from cfmkit.documents import html_of_run
 
-        yield html_report_of_run.NAME, html_report_of_run.page(report, form.for_page(makers, drawn), command)
+        heading = "Input" if designed is None else "The design"
+        every = ("Input with every default and derived value", api.dumps(api.resolve(result.spec), complete=True))
+        texts = [(heading, api.dumps(result.spec)), every]
+        yield html_of_run.NAME, html_of_run.page(report, form.for_page(makers, drawn), command, texts, started)
 
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:

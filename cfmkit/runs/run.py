@@ -13,11 +13,12 @@ from math import inf, isclose
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit import api
+from cfmkit.documents import run_outcome
+from cfmkit.documents.run_document import RunCommand
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.run_control import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import OVERWRITTEN, Finding, Status
-from cfmkit.runs import run_outcome
 from cfmkit.runs.files_a_run_writes import files, warnings_of_part
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from contextlib import AbstractContextManager
 
+    from cfmkit.documents.run_outcome import Report
     from cfmkit.errors import Problem
     from cfmkit.results import Result
-    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.yamlio import Document
     from cfmkit.store import Manifest
@@ -149,7 +150,8 @@ def carry_out(
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _options_judged(_computed(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
-        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate):
+        started = RunCommand(verb.name, wanted.spec, _changes(wanted), verb.words, wanted.out)
+        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         ending = {"status": found.status.key, "exit_code": int(found.exit_code)}
@@ -303,7 +305,7 @@ def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Rep
 
     found = _with_yield(found, nominal, given, run)
     reported = bench(nominal, run)
-    return found.beside({}, run_outcome.Supplement(lines=(("bench", reported),))) if reported else found
+    return found.beside({}, run_outcome.Supplement(lines=(("test plan", reported),))) if reported else found
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
@@ -315,7 +317,7 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
         from cfmkit.studies.yield_by_assumed_tolerances import expected
 
         reported = expected(nominal, run)
-        more = run_outcome.Supplement(lines=(("made", reported),) if reported else ())
+        more = run_outcome.Supplement(lines=(("yield", reported),) if reported else ())
         return found.beside(no_yields(given), more).of_many_parts()
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
     return found.beside(yields.quantities(), more).of_many_parts()

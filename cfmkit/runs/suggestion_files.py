@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
+from cfmkit.documents import html
+from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import ExitCode
-from cfmkit.runs.html_report_of_run import NAME, identifier, part, template
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.studies.pool import until
 from cfmkit.studies.serial_and_cluster_executors import BUG
@@ -194,8 +194,7 @@ def files(
             yield f"figures/{name}.png", png(figure)
     if command is not None:
         texts = {folder_name(number, one): one.text for number, one in enumerate(found.listed, 1)}
-        unit = "N" if found.wish.kind == "force" else "N*mm"
-        yield NAME, page(as_json(found, block), texts, drawn, unit, command)
+        yield html.NAME, page(as_json(found, block), exit_code(found), texts, drawn, command)
     work = partial(_made, (plots, command is not None), deadlines, found.listed)
     made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.listed))), lambda: False))
     for index, one in enumerate(found.listed):
@@ -219,9 +218,9 @@ def _made(
 ) -> list[tuple[str, bytes]]:
     """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
     from cfmkit import api
+    from cfmkit.documents.run_outcome import report_on
     from cfmkit.results import Design, Status
     from cfmkit.runs.files_a_run_writes import files
-    from cfmkit.runs.run_outcome import report_on
 
     proposal = proposals[index]
     if deadlines.files.late():
@@ -288,15 +287,8 @@ def _verdict(one: Proposal) -> str:
     return "meets" if one.good else "open" if one.passes else "fails"
 
 
-TONES = {"complete": "good", "partial": "warn"}
-"""Which colour the verdict has, by how the search ended; another end is bad."""
-
-SHARES = ("ripple", "hysteresis", "yield")
-"""Numbers of a proposal that are shares."""
-
-
 def page(
-    record: Mapping[str, Any], texts: Mapping[str, str], drawn: Mapping[str, Figure], unit: str, command: str
+    record: Mapping[str, Any], code: ExitCode, texts: Mapping[str, str], drawn: Mapping[str, Figure], command: str
 ) -> bytes:
     """Return the page of a search.
 
@@ -304,47 +296,19 @@ def page(
     ----------
     record : mapping
         What metrics.json says.
+    code : ExitCode
+        Of the process.
     texts : mapping of str to str
         The specification of each proposal, by its folder.
     drawn : mapping of str to Figure
         The pictures, by their names.
-    unit : str
-        Of the mean force or torque.
     command : str
         How the search was started.
     """
-    from cfmkit.plots.vector_formats import inline, svg
-
-    columns = (*_COLUMNS, *(("yield",) if "yield" in record["wish"] else ()))
-    rows = [
-        (one, [_cell(one, name, unit) for name in columns], quote(f"{one['folder']}/{NAME}"), texts[one["folder"]])
-        for one in (*record["proposals"], *record["unjudged"])
-    ]
-    named = {one["family"] for one in (*record["proposals"], *record["unjudged"])}
-    text: str = template("suggestions.html.j2").render(
-        reported=record,
-        tone=TONES.get(record["status"], "bad"),
-        wish=_listed(record["wish"]),
-        heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in columns[1:])],
-        rows=rows,
-        silent=[(one, _listed(one["nearest"])) for one in record["families"] if one["family"] not in named],
-        pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},
-        command=command,
-        style=part("report.css"),
-    )
-    return text.encode()
-
-
-_COLUMNS = ("mean", "ripple", "across", "along", "depth", "hysteresis", "safety_factor", "parts", "life")
-
-
-def _cell(one: Mapping[str, Any], name: str, unit: str) -> str:
-    value = one.get(name)
-    if value is None:
-        return ""
-    if name in SHARES:
-        return format_short(value, "ratio", 3)
-    return f"{value:.4g}" + (" mm" if name in ("across", "along", "depth") else "")
+    document = document_of(record, code)
+    found = (*record["proposals"], *record["unjudged"])
+    specs = [(f"Specification {one['folder']}", texts[one["folder"]]) for one in found]
+    return html.page(document, drawn, subject=_listed(record["wish"]), command=command, texts=specs)
 
 
 def _listed(pairs: Mapping[str, Any]) -> str:
@@ -359,6 +323,9 @@ def _listed(pairs: Mapping[str, Any]) -> str:
     """
     return ", ".join(f"{key.replace('_', ' ')} {_words(key, value)}" for key, value in pairs.items())
 
+
+SHARES = ("ripple", "hysteresis", "yield")
+"""Numbers of a proposal that are shares."""
 
 JOINED = {"room": " x ", "material": " or ", "prefer": ", "}
 """What stands between the values of a key that has several; else they are the two ends of a band."""

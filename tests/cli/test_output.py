@@ -18,17 +18,21 @@ RUN = ("analyze", "cam.yaml", "-o", "out", "--no-plots", "--set", "requirements.
 
 @pytest.mark.parametrize("columns", [40, 60, 80, 108, 300])
 def test_a_page_keeps_to_the_width_of_the_terminal(cli, cam, columns):
-    lines = cli(*RUN, COLUMNS=str(columns)).out.splitlines()
+    lines = cli(*RUN, "-v", COLUMNS=str(columns)).out.splitlines()
     commands = [line for line in lines if line.strip().startswith("cfmkit design")]
-    changed = "         cfmkit design cam.yaml --set 'requirements.0.max=1 %' --set design."
+    changed = "           cfmkit design cam.yaml --set 'requirements.0.max=1 %' --set design."
     assert commands == [f"{changed}choose=preload", f"{changed}avoid_undercut=true"]
-    assert max(len(line) for line in lines if line not in commands) <= min(columns, 108)
+    whole = [line for line in lines if len(line) > min(columns, 100) and " " in line.strip()]
+    assert whole == commands[: len(whole)]
+    short = cli(*RUN, COLUMNS=str(columns)).out.splitlines()
+    assert max(map(len, short)) <= min(columns, 100)
+    assert len(short) <= 15 or columns < 80
 
 
 @pytest.mark.parametrize("columns", [40, 50])
 def test_a_narrow_page_has_the_numbers_as_well(cli, cam, columns):
     page = cli(*RUN, COLUMNS=str(columns)).out
-    for number in ("9.058", "206.5", "315.4", "<= 1 %", "MISSED"):
+    for number in ("50.7 N", "238.9 mm", "<= 1 %", "MISSED"):
         assert number in page
 
 
@@ -175,6 +179,7 @@ NAME = "a\x1b[31m\nb.yaml"
 def test_a_name_with_control_characters_is_shown_escaped_and_on_one_line(cli, cam, verb):
     (cli.folder / cam).rename(cli.folder / NAME)
     options = ["--vary", "analysis.points=[481,401]"] if verb == "sweep" else []
+    options += ["-v"] if verb in ("analyze", "design") else []
     done = cli(verb, NAME, *options, *(["--no-plots", "-o", "o\x1b[5m"] if verb not in ("check", "export") else []))
     assert done.code == 0
     for text in (done.out, done.err):
@@ -235,3 +240,12 @@ def test_a_long_name_is_shown_no_further_than_needed_to_recognise_it(cli, cam, a
     assert done.code in (2, 3, 7)
     assert all(len(line) < 700 for line in done.err.split("\n"))
     assert "\n\n" not in done.err
+
+
+def test_piped_work_prints_a_line_with_the_time_left_now_and_then(monkeypatch, capsys):
+    clock = iter([0.0, 3.0, 12.0, 15.0, 30.0, 60.0])
+    monkeypatch.setattr(output.time, "monotonic", lambda: next(clock))
+    lines = output.ProgressLines()
+    for share, text in ((0.1, "a"), (0.25, "b"), (0.26, "c"), (0.5, "d"), (1.0, "end")):
+        lines.report(share, text)
+    assert capsys.readouterr().err == "25 %, 36 s left: b\n50 %, 30 s left: d\n"

@@ -172,28 +172,28 @@ def test_an_infeasible_design_says_why_and_what_would_be_feasible(cli, cam):
     )
     assert done.code == 4
     assert "120 mm" in done.out
-    assert "design.stroke = " in done.out
+    assert "--set design.stroke=" in done.out
     document = json.loads((cli.folder / "cfm-out/cam-design/metrics.json").read_text())
     assert document["status"] == "infeasible"
     assert not (cli.folder / "cfm-out/cam-design/curve.csv").exists()
 
 
 def test_the_page_has_the_numbers_requirements_warnings_and_files(cli, cam):
-    page = cli("design", cam).out
+    page = cli("design", cam, "-v").out
     lines = page.splitlines()
-    assert lines[0].startswith("cam  sanchez-salinas-2022")
-    assert "designed and analysed in" in lines[0]
+    assert lines[0].startswith("sanchez-salinas-2022   50.7 N load, 49.3 N unload over 238 mm (2 to 240 mm)")
+    assert lines[0].endswith("all 3 requirements met")
     assert any(line.split() == ["theoretical", "force", "50", "N"] for line in lines)
-    assert any(line.startswith("  force ripple") and line.endswith("<= 5 %      ok") for line in lines)
-    assert "warning  undercut: " in page
-    assert "         cfmkit design cam.yaml --set design.avoid_undercut=true\n" in page
-    assert "written  cfm-out/cam-design/  design.yaml curve.csv metrics.json" in page
-    assert "geometry/{cam.dxf,cam.svg,...}" in page
-    assert "figures/{" in page
+    assert any(line.startswith("  ripple") and line.endswith("<= 5 %      ok") for line in lines)
+    assert "warning    undercut: " in page
+    assert "           cfmkit design cam.yaml --set design.avoid_undercut=true\n" in page
+    assert "files      cfm-out/cam-design/  design.yaml curve.csv metrics.json" in page
+    assert "geometry/cam.dxf" in page
+    assert "figures/" in page
 
 
 def test_the_cure_that_a_warning_names_works(cli, cam):
-    page = cli("design", cam, *QUICK).out
+    page = cli("design", cam, *QUICK, "-v").out
     cure = next(line.strip() for line in page.splitlines() if line.strip().startswith("cfmkit design "))
     done = cli(*cure.split()[1:], *QUICK)
     assert "undercut:" not in done.out
@@ -201,7 +201,7 @@ def test_the_cure_that_a_warning_names_works(cli, cam):
 
 def test_the_cure_keeps_what_the_command_line_had_changed(cli, cam):
     changes = ("--set", "mechanism.roller_radius=20 mm", "--set", "design.avoid_undercut=false")
-    page = cli("design", cam, *QUICK, *changes).out
+    page = cli("design", cam, *QUICK, *changes, "-v").out
     tight, larger = (line.strip() for line in page.splitlines() if line.strip().startswith("cfmkit design "))
     kept = "cfmkit design cam.yaml --set 'mechanism.roller_radius=20 mm' --set design."
     assert tight == f"{kept}avoid_undercut=false --set design.choose=preload"
@@ -209,7 +209,7 @@ def test_the_cure_keeps_what_the_command_line_had_changed(cli, cam):
 
 
 def test_the_cure_of_a_spec_from_standard_input_says_where_to_write(cli, cam):
-    page = cli("design", "-", *QUICK, "-o", "out", stdin=(cli.folder / cam).read_bytes()).out
+    page = cli("design", "-", *QUICK, "-o", "out", "-v", stdin=(cli.folder / cam).read_bytes()).out
     assert "cfmkit design - --set design.avoid_undercut=true -o out\n" in page
 
 
@@ -217,8 +217,8 @@ def test_a_design_whose_rollers_overlap_is_refused_with_the_largest_that_fits(cl
     narrow = ("--set", "mechanism.rest_half_width=2 mm", "--set", "design.force=5 N")
     done = cli("design", cam, *QUICK, "-o", "out", *narrow)
     assert done.code == 4
-    assert "the rollers overlap by 28 mm" in done.out + done.err
-    assert "2 mm" in done.out + done.err
+    assert "the rollers overlap by 28 mm" in " ".join((done.out + done.err).split())
+    assert "--set mechanism.roller_radius=2mm" in done.out
     assert not (cli.folder / "out/geometry").exists()
     export = cli("export", cam, "-o", "cut", *narrow, "--set", "mechanism.profile.force_constant=1 mm")
     assert export.code == 4
@@ -240,8 +240,8 @@ def test_quiet_still_says_which_requirement_is_missed(cli, cam):
 
 def test_a_missed_requirement_stands_out_without_colour(cli, cam):
     page = cli("analyze", cam, *QUICK, "--set", "requirements.0.max=1 %").out
-    assert any(line.startswith("  force ripple") and line.endswith("<= 1 %      MISSED") for line in page.splitlines())
-    assert "missed   1 of 3 requirements" in page
+    assert any(line.startswith("  ripple") and "<= 1 %     MISSED" in line for line in page.splitlines())
+    assert "1 of 3 requirements missed\n" in page
 
 
 @pytest.mark.parametrize("name", ["../../etc/x", "/", "a\nb", "[red]bold[/red] {x}", "力 ü"])
@@ -252,4 +252,4 @@ def test_a_strange_name_is_only_a_name(cli, cam, name):
         f"out/{item}" for item in ("curve.csv", "metrics.json", "resolved.yaml", "manifest.json")
     }
     page = cli("analyze", cam, "-o", "out", *QUICK, "--set", option).out
-    assert page.splitlines()[0].startswith(f"cam  {' '.join(name.split())}")
+    assert page.splitlines()[0].startswith(f"{' '.join(name.split())}   50.7 N")

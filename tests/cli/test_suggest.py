@@ -12,8 +12,9 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.cli.page_block_types import Paragraph, Written
-from cfmkit.cli.verbs.suggest import _page
+from cfmkit.documents.document import Written
+from cfmkit.documents.suggestion_document import document_of
+from cfmkit.errors import ExitCode
 
 WISHES = Path(__file__).parents[1] / "wishes"
 FEASIBLE = sorted(path.stem for path in (WISHES / "sources").glob("*.yaml"))
@@ -85,8 +86,8 @@ def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
     both = [one | {"folder": "1-cam-2-springs"}, one | {"folder": "10-cam"}]
     data = {"message": "2 mechanisms meet the wish", "proposals": both, "wish": {}, "near_misses": [], "unjudged": []}
     written = Written("out", ("1-cam-2-springs/design.yaml", "10-cam/design.yaml", "10-cam/metrics.json"))
-    page = list(_page(data | {"families": [], "warnings": []}, written, False))
-    notes = [block.text for block in page if isinstance(block, Paragraph) and block.word == "note"]
+    document = document_of(data | {"families": [], "warnings": []}, ExitCode.OK, written)
+    notes = [note.text for note in document.notes if note.word == "note"]
     assert len(notes) == 1
     assert "the time ran out: of 1-cam-2-springs only design.yaml was written" in notes[0]
 

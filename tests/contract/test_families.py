@@ -17,9 +17,9 @@ import cfmkit
 from cfmkit import api, families
 from cfmkit.cli.main import main
 from cfmkit.cli.verbs.new import template
+from cfmkit.documents import run_outcome
 from cfmkit.export.contours import Drawing
 from cfmkit.results import Status
-from cfmkit.runs import run_outcome
 from cfmkit.runs.files_a_run_writes import files
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.specs.units import DIMENSIONS

@@ -12,9 +12,10 @@ import pytest
 
 import cfmkit
 from cfmkit import families
+from cfmkit.documents import run_outcome
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Design, Finding, Result, Status
-from cfmkit.runs import run_outcome, specfile
+from cfmkit.runs import specfile
 from cfmkit.runs.files_a_run_writes import files
 from cfmkit.specs import keys_and_schema as keys
 from cfmkit.specs.yamlio import read_document

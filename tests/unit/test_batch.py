@@ -12,9 +12,12 @@ from xml.etree import ElementTree
 import pytest
 
 import cfmkit
-from cfmkit.cli.github_annotations import workflow_commands
+from cfmkit.documents import html
+from cfmkit.documents.annotations import workflow_commands
+from cfmkit.documents.batch_document import document_of
+from cfmkit.documents.junit import junit
+from cfmkit.documents.markdown import plain, summary
 from cfmkit.errors import ExitCode, UsageError
-from cfmkit.runs.batch_output_files import page, plain, summary
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_sources_and_outcomes import (
     Entry,
@@ -27,7 +30,6 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 )
 from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.junit import junit
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, MetricChange, changes_table
 from cfmkit.tables import to_csv
 
@@ -221,8 +223,8 @@ def test_no_table_and_no_report_holds_a_raw_control_character():
         "changes": to_csv(changes_table(changed)),
         "summary": summary(entries, BatchComparison(HOSTILE, 0.1, changed, (HOSTILE,))),
         "junit": junit(entries),
-        "annotations": "\n".join(workflow_commands(entries, changed)).encode(),
-        "page": page(entries, HOSTILE, HOSTILE),
+        "annotations": "\n".join(workflow_commands(entries, lambda name, number: (0, 0), changed)).encode(),
+        "page": html.page(document_of(entries, ExitCode.INVALID), command=HOSTILE),
     }
     for name, data in written.items():
         raw = {char for char in data.decode() if not char.isprintable()}

@@ -12,10 +12,10 @@ import pytest
 import yaml
 
 import cfmkit
-from cfmkit.cli.github_annotations import workflow_commands
 from cfmkit.cli.main import main
+from cfmkit.documents.annotations import workflow_commands
+from cfmkit.documents.markdown import summary
 from cfmkit.errors import ExitCode, UsageError
-from cfmkit.runs.batch_output_files import summary
 from cfmkit.studies.batch_sources_and_outcomes import Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes
 
@@ -130,15 +130,41 @@ def test_a_folder_that_is_none_of_a_batch_is_refused(folder):
 HOSTILE = "a|b<script>%0A::error::,:\n*x*.yaml"
 
 
+def nowhere(name, number):
+    """Return that no place is known."""
+    return 0, 0
+
+
+def test_a_specification_has_one_annotation_that_says_all_of_it():
+    missed = [
+        {
+            "metric": name,
+            "min": None,
+            "max": 1.0,
+            "unit": "1",
+            "over": None,
+            "over_unit": None,
+            "ok": False,
+            "sentence": name,
+        }
+        for name in ("force_ripple", "deviation")
+    ]
+    warned = ({"name": "undercut", "message": "a corner"},)
+    entry = one(code=ExitCode.REQUIREMENT_MISSED, requirements=tuple(missed), warnings=warned)
+    (line,) = workflow_commands([entry], lambda name, number: (7 + number, 3))
+    assert line.startswith("::error file=a.yaml,line=7,col=3,title=requirement missed::")
+    assert line.endswith("::force_ripple%0Adeviation")
+
+
 def test_annotations_name_file_and_line_and_let_no_name_through(folder):
     broken = SPEC.replace("family: vcfm", "family: vcfm\nmechansim: 3")
     (folder / "a.yaml").write_text(broken)
     found = cfmkit.batch("a.yaml", "out", plots=False)
-    lines = list(workflow_commands(found.entries))
+    lines = list(workflow_commands(found.entries, nowhere))
     number = broken.splitlines().index("mechansim: 3") + 1
     assert any(re.fullmatch(rf"::error file=a\.yaml,line={number},col=\d+::.*mechansim.*", line) for line in lines)
     hostile = one(spec=HOSTILE, warnings=({"name": "x,y", "message": "50 %\r\n::stop"},))
-    (line,) = workflow_commands([hostile])
+    (line,) = workflow_commands([hostile], nowhere)
     assert "\n" not in line
     assert line.count("::") == 3
     assert line.startswith("::warning file=a|b<script>%250A%3A%3Aerror%3A%3A%2C%3A%0A*x*.yaml,title=x%2Cy::50 %25%0D")

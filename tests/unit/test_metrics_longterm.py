@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import cfmkit
+from cfmkit.documents.run_outcome import report_on
 from cfmkit.errors import SpecError
 from cfmkit.metrics.branches_cut_to_window import Undefined
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
 from cfmkit.metrics.metric_definitions import words
-from cfmkit.runs.run_outcome import report_on
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POINTS = ((1e3, 25e6), (1e6, 8e6))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit.documents.run_outcome import report_on
 from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes
 from cfmkit.runs.files_a_run_writes import files, part_of
-from cfmkit.runs.run_outcome import report_on
 from cfmkit.specs.units import format_short
 
 CONFIGS = Path(__file__).parents[2] / "configs"

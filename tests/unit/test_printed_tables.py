@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import pytest
 
-from cfmkit.cli.output import Terminal
-from cfmkit.cli.page_block_types import CellGrid, GridColumn
+from cfmkit.documents.document import CellGrid, Document, GridColumn, Table
+from cfmkit.documents.terminal import page as page_of
+from cfmkit.documents.terminal import printed
 
 
 @pytest.mark.parametrize("width", [40, 60, 108])
-def test_no_number_is_cut_on_a_narrow_page(width, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
+def test_no_number_is_cut_on_a_narrow_page(width):
     numbers = ["3.14159265358979", "2.71828182845905", "1.41421356237310", "1.61803398874989"]
     heads = (GridColumn("name", True), *(GridColumn(one, False) for one in "abcd"))
-    page = Terminal()._rendered(CellGrid(heads, [["a row", *numbers]]))
-    assert max(map(len, page.split("\n"))) <= width
-    kept = "".join(page.split())
-    assert all(kept.count(digit) == "".join(numbers).count(digit) for digit in "0123456789.")
+    table = Document(title="t", tables=(Table("", heads, (("a row", *numbers),)),))
+    for page in (
+        printed([CellGrid(heads, [["a row", *numbers]])], width),
+        printed(page_of(table, width), width),
+    ):
+        assert max(map(len, page.split("\n"))) <= width
+        kept = "".join(page.split())
+        assert all(kept.count(digit) == "".join(numbers).count(digit) for digit in "0123456789.")
 
 
-def test_where_there_is_room_only_texts_take_several_lines(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "40")
+def test_where_there_is_room_only_texts_take_several_lines():
     heads = (GridColumn("", True), GridColumn("", False))
-    page = Terminal()._rendered(CellGrid(heads, [["a text of more than one line on this page", "71.3 x 39.5 mm"]]))
+    page = printed([CellGrid(heads, [["a text of more than one line on this page", "71.3 x 39.5 mm"]])], 40)
     assert "71.3 x 39.5 mm" in page

@@ -383,7 +383,7 @@ def test_gradients_are_those_of_differences(name):
 
 
 def test_a_mechanism_without_a_curve_misses_requirements_in_degrees():
-    from cfmkit.runs import run_outcome
+    from cfmkit.documents import run_outcome
 
     found = run_outcome.report_on(cfmkit.analyze(config("li2019", mechanism__offset="700 mm")))
     assert found.exit_code == 4

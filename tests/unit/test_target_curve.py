@@ -236,7 +236,7 @@ def test_page_and_notebook_lead_with_the_deviation_from_a_curve_and_from_none_wh
     for name, there in ((str(file), True), ("configs/cam.yaml", False)):
         assert main(["analyze", name, "--no-plots", "-o", str(tmp_path / "out")]) == 0
         assert ("deviation from curve" in capsys.readouterr().out) == there
-        assert ("deviation_from_curve" in cfmkit.analyze(name)._repr_html_()) == there
+        assert ("deviation from curve" in cfmkit.analyze(name)._repr_html_()) == there
 
 
 def test_a_window_that_the_curve_does_not_cover_has_no_deviation():

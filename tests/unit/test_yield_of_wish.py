@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 import cfmkit
-from cfmkit.cli.page_block_types import Written
-from cfmkit.cli.verbs import suggest as verb
+from cfmkit.documents.document import Written
+from cfmkit.documents.suggestion_document import document_of
+from cfmkit.documents.terminal import page, printed
+from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
@@ -168,11 +170,11 @@ def test_a_strip_moved_for_a_yield_has_it():
     assert found.summary["yield"]["value"] >= 0.8
 
 
-def test_the_first_line_of_the_page_keeps_its_time():
+def test_the_page_says_how_the_search_ended_and_v_how_long_it_took():
     text = "3 mechanisms meet the wish; the time budget ended the search before everything was tried"
     data = {"message": text, "proposals": [], "unjudged": [], "near_misses": [], "families": [], "warnings": []}
-    data |= {"wish": {}}
-    blocks = list(verb._page(data, Written("out", (), 94.7), False))
-    assert blocks[0].right == "94.7 s"
-    assert sum(len(span.text) for span in blocks[0].spans) + len("  94.7 s") <= 80
-    assert blocks[1].text == "the time budget ended the search before everything was tried"
+    document = document_of(data | {"wish": {}}, ExitCode.OK, Written("out", (), 94.7))
+    short, full = (printed(page(document, 80, everything), 80) for everything in (False, True))
+    assert short.startswith("suggest   3 mechanisms meet the wish\n")
+    assert "the time budget ended the search before everything was tried" in " ".join(short.split())
+    assert "94.70 s" in full

@@ -3,7 +3,7 @@
 A verb module has
 
 - a frozen dataclass whose fields are its arguments and options (see `cfmkit.cli.options`);
-- ``run(options, terminal) -> Answer``, which takes one: its docstring is the help text;
+- ``run(options, terminal) -> Document``, which takes one: its docstring is the help text;
 - ``PLACE``: where it stands in ``cfmkit --help``.
 
 A module that is added here is a command; nothing else needs to know. Anything slow to

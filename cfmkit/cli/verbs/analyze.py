@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.verb_result import Answer
+    from cfmkit.documents.document import Document
+    from cfmkit.documents.run_outcome import Report
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.run_control import Run
-    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.comparison_of_fidelities import FidelityComparison
 
@@ -52,7 +52,7 @@ class AnalyzeOptions(Computing, Measuring):
     ] = False
 
 
-def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
+def run(options: AnalyzeOptions, terminal: Terminal) -> Document:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; with --data also a measured curve."""
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.runs.run import Verb, analysed
@@ -72,6 +72,7 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
 
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
+    from cfmkit.documents.run_outcome import Supplement
     from cfmkit.experiment.comparison import compare
     from cfmkit.experiment.measurement_and_calibration_outputs import (
         causes_lines,
@@ -83,7 +84,6 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
         shortfall,
     )
     from cfmkit.runs.run import analysed
-    from cfmkit.runs.run_outcome import Supplement
 
     found = analysed(spec, run)
     if not found.result.curves:
@@ -105,7 +105,7 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
 
 def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside the curves of its other models."""
-    from cfmkit.runs.run_outcome import Supplement
+    from cfmkit.documents.run_outcome import Supplement
     from cfmkit.studies.comparison_of_fidelities import choices_of, compare, data_of, lines_of
 
     choices = choices_of(spec)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cfmkit.cli.options import (
@@ -20,30 +20,15 @@ from cfmkit.cli.options import (
     flag,
     option,
 )
-from cfmkit.cli.page_block_types import (
-    BAD,
-    BLANK,
-    FAINT,
-    GOOD,
-    LABEL,
-    CellGrid,
-    Paragraph,
-    Span,
-    TextLine,
-    Written,
-    columns,
-)
-from cfmkit.cli.verb_result import Answer
-from cfmkit.errors import ExitCode, visible
+from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Document
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
 
 
 PLACE = 26
@@ -100,7 +85,7 @@ class BatchOptions(Changing, FigureChoice):
     no_lock: NoLock = False
 
 
-def run(options: BatchOptions, terminal: Terminal) -> Answer:
+def run(options: BatchOptions, terminal: Terminal) -> Document:
     """Design or analyse many specs, check their requirements and summarise; the exit code is that of the worst.
 
     The results of an earlier batch are reused if nothing has changed: the spec, the options, cfmkit, and the files
@@ -108,6 +93,8 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.progress import watching
+    from cfmkit.documents.batch_document import document_of
+    from cfmkit.documents.document import Note, Written
     from cfmkit.runs.batch import batch, unreached
     from cfmkit.studies.batch_sources_and_outcomes import message
 
@@ -136,17 +123,19 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
             noting=run_study_in_folder.noting,
         )
     written = Written(found.folder, found.files, run_study_in_folder.now() - start)
-    return Answer(
-        dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
-        _page(found, written, tuple(filter(None, (options.junit, options.summary))), terminal.verbose > 0),
-        found.exit_code,
-        (
+    named = tuple(Note("written", file, whole=True) for file in (options.junit, options.summary) if file)
+    document = document_of(found.entries, found.exit_code, written, found.compared)
+    return replace(
+        document,
+        data=dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
+        notes=(*document.notes, *named),
+        complaints=(
             *_complaints(found, options, terminal),
             *unreached(found.entries, options.changes),
             *(_annotations(found) if options.annotations else ()),
         ),
-        () if found.exit_code is ExitCode.OK else (message(found.entries),),
-        tuple({"message": line} for one in found.entries for line in one.errors),
+        quiet_complaints=() if found.exit_code is ExitCode.OK else (message(found.entries),),
+        errors=tuple({"message": line} for one in found.entries for line in one.errors),
     )
 
 
@@ -165,9 +154,21 @@ def _tolerance(options: BatchOptions) -> float | None:
 
 
 def _annotations(found: BatchResult) -> Iterator[str]:
-    from cfmkit.cli.github_annotations import workflow_commands
+    from cfmkit.documents.annotations import workflow_commands
 
-    return workflow_commands(found.entries, found.compared.changes if found.compared else ())
+    return workflow_commands(found.entries, _place_of, found.compared.changes if found.compared else ())
+
+
+def _place_of(name: str, number: int) -> tuple[int, int]:
+    """Return line and column of a requirement; (0, 0) if the file cannot be read any more."""
+    from cfmkit.errors import CfmError
+    from cfmkit.runs.specfile import read_spec
+
+    try:
+        line, column = read_spec(name).place(f"requirements.{number}")
+    except CfmError:
+        return 0, 0
+    return line or 0, column or 0
 
 
 def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
@@ -182,69 +183,3 @@ def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -
 
 def _reused(entries: Sequence[Entry]) -> int:
     return sum(one.reused for one in entries)
-
-
-MOST_CHANGES = 8
-"""Changed values that are shown without ``-v``, so that verdicts stay on the screen."""
-
-
-def _page(found: BatchResult, written: Written, more: Sequence[str], everything: bool) -> Iterator[Block]:
-    """Yield one line per specification, and what is wrong below it."""
-    from cfmkit.studies.batch_sources_and_outcomes import message
-
-    entries = found.entries
-    count = _reused(entries)
-    reused = f", {count} reused" if count else ""
-    yield TextLine((Span(message(entries), LABEL),), f"{written.seconds:.2f} s{reused}")
-    yield BLANK
-    yield CellGrid(columns(True, True, True, True), [_row(one) for one in entries], gap=2)
-    yield BLANK
-    for one in entries:
-        for requirement in one.missed if one.verb and not one.errors else ():
-            reported = requirement["sentence"].removesuffix(": missed")
-            yield Paragraph("missed", f"{visible(one.spec)}: {reported}", BAD)
-        for item in one.warnings if everything else ():
-            yield Paragraph("warning", f"{visible(one.spec)}: {item['name']}: {item['message']}", BAD)
-    if found.compared is not None:
-        yield from _changes(found.compared, everything)
-    yield written.block(everything)
-    for file in more:
-        yield Paragraph("written", file, GOOD)
-
-
-def _changes(compared: BatchComparison, everything: bool) -> Iterator[Block]:
-    """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
-    beyond = compared.beyond
-    reported = (
-        f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
-    )
-    yield Paragraph("compared", reported, BAD if beyond else GOOD)
-    shown = compared.changes if everything else beyond[:MOST_CHANGES]
-    for one in shown:
-        yield Paragraph("changed", f"{visible(one.spec)}: {one.sentence}", BAD if one.beyond else FAINT)
-    if len(beyond) > len(shown):
-        yield Paragraph("changed", f"{len(beyond) - len(shown)} more; -v shows all, changes.csv has them", FAINT)
-
-
-def _row(one: Entry) -> tuple[str | Span, ...]:
-    from cfmkit.studies.batch_sources_and_outcomes import outcome
-
-    word = outcome(one)
-    good = word == "ok"
-    tone = GOOD if good else FAINT if one.skipped else BAD
-    return f"  {visible(one.spec)}", one.verb, Span(word if good or one.skipped else word.upper(), tone), _detail(one)
-
-
-def _detail(one: Entry) -> str:
-    """Return how many requirements are met, or what went wrong before any could be."""
-    if one.skipped:
-        return ""
-    if one.errors:
-        return "see above"
-    if one.missed and one.code is ExitCode.REQUIREMENT_MISSED:
-        return f"{len(one.missed)} of {len(one.requirements)} requirements"
-    if one.code:
-        return one.message
-    reported = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
-    count = len(one.warnings)
-    return reported + (f", {count} warning{'s' * (count != 1)}" if count else "")

@@ -20,11 +20,11 @@ from cfmkit.cli.options import (
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.verb_result import Answer
+    from cfmkit.documents.document import Document
+    from cfmkit.documents.run_outcome import Report
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.run_control import Run
-    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
 
 PLACE = 34
@@ -57,7 +57,7 @@ class CalibrateOptions(Computing, Measuring):
     report: WithReport = False
 
 
-def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
+def run(options: CalibrateOptions, terminal: Terminal) -> Document:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.errors import UsageError
@@ -90,8 +90,8 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     from dataclasses import replace
 
     from cfmkit import api
+    from cfmkit.documents.run_outcome import Supplement, report_on
     from cfmkit.experiment import measurement_and_calibration_outputs as add
-    from cfmkit.runs.run_outcome import Supplement, report_on
     from cfmkit.tables import to_csv
 
     found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
-from cfmkit.cli.page_block_types import BAD, GOOD, Span, whole_line, within
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import BAD, GOOD, Document, Span, whole_line, within
 from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import TextLine
+    from cfmkit.documents.document import TextLine
     from cfmkit.specs.spec import Spec
 
 PLACE = 40
@@ -40,17 +39,17 @@ class Checked:
 
     file: str
     spec: Spec | None
-    failure: Answer
+    failure: Document
 
 
-def run(options: CheckOptions, terminal: Terminal) -> Answer:
+def run(options: CheckOptions, terminal: Terminal) -> Document:
     """Check specs without computing anything: every problem of every file, with its line and column."""
     files = _files(options.specs)
     found = [_checked(name, options.changes, len(files) > 1) for name in files]
     bad = sum(item.spec is None for item in found)
     message = f"{bad} of {len(found)} files are not valid" if bad else ""
 
-    return Answer(
+    return Document(
         {"files": [_record(item) for item in found], "message": message},
         _lines(found, terminal.verbose > 0),
         _code([item.failure.exit_code for item in found]),
@@ -73,7 +72,7 @@ def _checked(name: str, changes: tuple[str, ...], of_many: bool) -> Checked:
     from cfmkit.runs.specfile import bind, read_spec
 
     try:
-        return Checked(name, bind(read_spec(name, changes, of_many)), Answer())
+        return Checked(name, bind(read_spec(name, changes, of_many)), Document())
     except CfmError as error:
         return Checked(name, None, answer_to(error))
 

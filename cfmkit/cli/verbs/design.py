@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.verb_result import Answer
+    from cfmkit.documents.document import Document
     from cfmkit.families.run_control import Run
     from cfmkit.store import RunFolder
 
@@ -34,7 +34,7 @@ class DesignOptions(Computing):
     ] = None
 
 
-def run(options: DesignOptions, terminal: Terminal) -> Answer:
+def run(options: DesignOptions, terminal: Terminal) -> Document:
     """Design a mechanism for the targets of its spec, analyse it, and draw the parts to cut or print."""
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.runs.run import Verb, designed

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import Common, argument
-from cfmkit.cli.page_block_types import Paragraph, Verbatim, field, listed
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import Document, Paragraph, Verbatim, field, listed
 from cfmkit.errors import UsageError, visible
 from cfmkit.runs.find_shipped_folder import shipped_folder
 
@@ -29,17 +28,17 @@ class DocsOptions(Common):
     name: Annotated[str | None, argument("PAGE", "Page to print, in Markdown; default: list all pages.")] = None
 
 
-def run(options: DocsOptions, terminal: Terminal) -> Answer:
+def run(options: DocsOptions, terminal: Terminal) -> Document:
     """List the pages of the documentation, or print one; they come with cfmkit and need no network."""
     if options.name is not None:
         found = page(options.name)
         record = {"name": found.name, "title": found.title, "path": str(found.path), "text": found.text}
-        return Answer(record, (Verbatim(found.text),))
+        return Document(record, (Verbatim(found.text),))
     known = pages()
     records = [{"name": one.name, "title": one.title, "path": str(one.path)} for one in known]
     fields = (field("name"), field("title", wraps=True))
     where = Paragraph("files", f"{known[0].path.parent}; a link to FILE.md in a page is `cfmkit docs FILE`")
-    return Answer({"pages": records}, (*listed("pages", records, fields), where))
+    return Document({"pages": records}, (*listed("pages", records, fields), where))
 
 
 FIRST = ("index", "tutorial", "howto", "reference")

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.cli.options import Common
-from cfmkit.cli.page_block_types import LABEL, Field, Span, TextLine, Verbatim, field, listed
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, listed
 from cfmkit.store.lock import SOFT_LOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Block
 
     Record = dict[str, Any]
 
@@ -32,7 +31,7 @@ class DoctorOptions(Common):
     """Arguments and options."""
 
 
-def run(options: DoctorOptions, terminal: Terminal) -> Answer:
+def run(options: DoctorOptions, terminal: Terminal) -> Document:
     """Report versions, packages, folders, compiled code and families, and any problems with them.
 
     Families of other packages are imported for this, which runs installed code.
@@ -53,7 +52,7 @@ def run(options: DoctorOptions, terminal: Terminal) -> Answer:
     data = {"message": "; ".join(troubles) or "nothing is wrong", **found}
     warnings = [{"name": "doctor", "message": trouble} for trouble in troubles]
 
-    return Answer({**data, "warnings": warnings}, _page(found, troubles))
+    return Document({**data, "warnings": warnings}, _page(found, troubles))
 
 
 def _packages() -> Iterator[Record]:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
-from cfmkit.cli.page_block_types import BAD, GOOD, Paragraph, field, listed, next_command
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import BAD, GOOD, Document, Paragraph, field, listed, next_command
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ class ExamplesOptions(Common):
     jobs: Jobs = None
 
 
-def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
+def run(options: ExamplesOptions, terminal: Terminal) -> Document:
     """List the examples that come with cfmkit, copy one, or run them to check an installation; nothing is replaced."""
     from cfmkit.runs.examples import copy, examples
 
@@ -67,12 +66,12 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
             Paragraph("written", ", ".join(map(visible, written)), GOOD),
             next_command("cfmkit", verb, written[0]),
         )
-        return Answer({"files": written}, page)
+        return Document({"files": written}, page)
     if options.out is not None or options.schema is not None:
         raise UsageError("--out and --schema are for a copy: name an example")
     records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
     fields = (field("name"), field("family"), field("about", wraps=True))
-    return Answer({"examples": records}, tuple(listed("examples", records, fields)))
+    return Document({"examples": records}, tuple(listed("examples", records, fields)))
 
 
 def _verb(name: str, path: str) -> str:
@@ -91,7 +90,7 @@ def _verb(name: str, path: str) -> str:
     return "design" if family(kind).design and getattr(spec, "design", None) is not None else "analyze"
 
 
-def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
+def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Document:
     """Return the outcome of examples that were run in a folder that is gone afterwards, the quick ones first."""
     from tempfile import TemporaryDirectory
 
@@ -122,4 +121,4 @@ def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
         *listed("examples", records, (field("name"), field("status"), field("message", wraps=True))),
         Paragraph("verdict", reported, BAD if wrong else GOOD),
     )
-    return Answer({"message": reported, "examples": records}, page, found.exit_code)
+    return Document({"message": reported, "examples": records}, page, found.exit_code)

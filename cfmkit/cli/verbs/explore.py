@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.failures import Stopped, told
 from cfmkit.cli.options import Changing, argument, flag, option
-from cfmkit.cli.page_block_types import line, whole_line
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import Document, line, whole_line
 from cfmkit.store.safe_disk_changes import reason
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ class ExploreOptions(Changing):
     no_browser: Annotated[bool, flag("--no-browser", text="Open no browser; print the address only.")] = False
 
 
-def run(options: ExploreOptions, terminal: Terminal) -> Answer:
+def run(options: ExploreOptions, terminal: Terminal) -> Document:
     """Change the numbers of a spec with sliders in the browser; curve, metrics and requirements follow.
 
     The page is available on this computer only, at an address with a token. No file outside the spec's folder is read
@@ -60,7 +59,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
             _open_browser(server, terminal)
         with suppress(Stopped):  # the ordinary end, no failure
             server.serve_forever()
-        return Answer({"address": server.address.partition("?")[0]})
+        return Document({"address": server.address.partition("?")[0]})
 
 
 def _open_browser(server: ExplorerServer, terminal: Terminal) -> None:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import OneSpec, Quiet, option
-from cfmkit.cli.page_block_types import BAD, Paragraph, Written
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import Document, Note, Written
 from cfmkit.errors import ExitCode, sentence_of
 
 if TYPE_CHECKING:
@@ -45,9 +44,10 @@ class ExportOptions(OneSpec):
     quiet: Quiet = False
 
 
-def run(options: ExportOptions, terminal: Terminal) -> Answer:
+def run(options: ExportOptions, terminal: Terminal) -> Document:
     """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
     from cfmkit.cli.run_spec_and_print_page import folder_of
+    from cfmkit.documents.run_document import warning_of
     from cfmkit.runs.exported_files import exported
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
@@ -63,15 +63,16 @@ def run(options: ExportOptions, terminal: Terminal) -> Answer:
         code = ExitCode.PARTIAL if failed else ExitCode.OK
         manifest = folder.commit(origin | {"status": "partial" if failed else "complete", "exit_code": int(code)})
     written = Written(out, (*manifest.files, "manifest.json"))
-    notes = [Paragraph("note", note) for note in drawing.notes]
-    warnings = [Paragraph("warning", f"{one.name}: {one.message}", BAD) for one in drawing.warnings]
-    as_json = [{"name": one.name, "message": one.message} for one in drawing.warnings]
-    page = (*notes, *warnings, written.block(terminal.verbose > 0))
+    warnings = [{"name": one.name, "message": one.message} for one in drawing.warnings]
     problems = [f"{name} is not written: {sentence_of(error)}" for name, error in failed.items()]
-    return Answer(
-        written.data | {"notes": list(drawing.notes), "warnings": as_json},
-        page,
-        code,
+    return Document(
+        written.data | {"notes": list(drawing.notes), "warnings": warnings},
+        exit_code=code,
         complaints=tuple(f"error    {problem}" for problem in problems),
         errors=tuple({"message": problem} for problem in problems),
+        title=" ".join(spec.name.split()),
+        verdict="partial" if failed else "",
+        notes=tuple(Note("note", note, whole=True) for note in drawing.notes),
+        warnings=tuple(warning_of(one) for one in drawing.warnings),
+        files=written,
     )

@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
-from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import Document, GridColumn, Note, Table, Written
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
 
 PLACE = 32
@@ -63,7 +61,7 @@ class MeasureOptions(Measuring, FigureChoice):
     no_lock: NoLock = False
 
 
-def run(options: MeasureOptions, terminal: Terminal) -> Answer:
+def run(options: MeasureOptions, terminal: Terminal) -> Document:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
     from cfmkit.experiment.measurement_and_calibration_outputs import data_of, files
     from cfmkit.runs.measure_and_calibrate_api import MeasurementSettings, measure_each
@@ -99,7 +97,7 @@ def run(options: MeasureOptions, terminal: Terminal) -> Answer:
             }
         )
     written = Written(out, (*manifest.files, "manifest.json"))
-    return Answer(data | written.data, _pages(reports, written, terminal.verbose > 0), code)
+    return _document(reports, data | written.data, code, written)
 
 
 def _folder(options: MeasureOptions) -> str:
@@ -110,30 +108,33 @@ def _folder(options: MeasureOptions) -> str:
     return options.out or str(Path("cfm-out") / f"{Path(options.data).stem}-measure")
 
 
-def _pages(reports: Mapping[str, MeasureReport], written: Written, everything: bool) -> Iterator[Block]:
-    for report in reports.values():
-        yield from _page(report)
-    yield written.block(everything)
+def _document(
+    reports: Mapping[str, MeasureReport], data: Mapping[str, Any], code: ExitCode, written: Written
+) -> Document:
+    """Return the document of one recording, or of several of one file."""
+    from cfmkit.documents.run_document import warning_of
 
-
-def _page(report: MeasureReport) -> Iterator[Block]:
-    source, data = report.source, report.data
+    found = list(reports.values())
+    source, record = found[0].source, found[0].data
+    window = record["window"]
     points = f"{len(source.recording)} points, {len(source.raw)} cycle{'s' * (len(source.raw) > 1)}"
-    yield TextLine((Span(source.recording.name, LABEL), Span(f"  {points}")))
-    for text in data["reading"]:
-        yield Paragraph("read", text)
-    if source.low_pass:
-        yield Paragraph("filter", source.low_pass.sentence)
-    window = data["window"]
-    yield Paragraph("window", f"{window['from']:.6g} ... {window['to']:.6g} {window['unit']}")
-    yield BLANK
-    yield _numbers(report)
-    yield BLANK
-    for item in report.warnings:
-        yield Paragraph("warning", f"{item.name}: {item.message}", BAD)
+    where = f"window {window['from']:.6g} to {window['to']:.6g} {window['unit']}"
+    notes = [Note("read", text) for report in found for text in report.data["reading"]]
+    notes += [Note("filter", report.source.low_pass.sentence) for report in found if report.source.low_pass]
+    return Document(
+        data=data,
+        exit_code=code,
+        title=source.recording.name if len(found) == 1 else f"{len(found)} recordings",
+        summary=f"{points}, {where}" if len(found) == 1 else "",
+        verdict="" if code is ExitCode.OK else "partial",
+        tables=tuple(_numbers(report, "" if len(found) == 1 else report.source.recording.name) for report in found),
+        notes=tuple(dict.fromkeys(notes)),
+        warnings=tuple(warning_of(item) for item in dict.fromkeys(one for report in found for one in report.warnings)),
+        files=written,
+    )
 
 
-def _numbers(report: MeasureReport) -> CellGrid:
+def _numbers(report: MeasureReport, heading: str) -> Table:
     """Return the table of what matters most: per branch, raw and filtered."""
     from cfmkit.metrics.metric_definitions import words
 
@@ -141,8 +142,8 @@ def _numbers(report: MeasureReport) -> CellGrid:
     rows = []
     for name in _shown(report):
         raw, smooth = report.numbers.raw[name], report.numbers.filtered.get(name)
-        rows.append((f"  {words(name)}", _short(raw), _short(smooth) if smooth else ""))
-    return CellGrid(tuple(map(GridColumn, heads)), rows)
+        rows.append((words(name), _short(raw), _short(smooth) if smooth else ""))
+    return Table(heading, tuple(GridColumn(head, wraps=not at) for at, head in enumerate(heads)), tuple(rows))
 
 
 def _shown(report: MeasureReport) -> list[str]:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
-from cfmkit.cli.page_block_types import GOOD, Paragraph, Verbatim, next_command
-from cfmkit.cli.verb_result import Answer
+from cfmkit.documents.document import GOOD, Document, Paragraph, Verbatim, next_command
 from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ class NewOptions(Common):
     ] = True
 
 
-def run(options: NewOptions, terminal: Terminal) -> Answer:
+def run(options: NewOptions, terminal: Terminal) -> Document:
     """Write a commented spec to start from; an existing file is never replaced."""
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import with_line, write_schema
@@ -49,7 +48,7 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
     text = template(options.family)
     name = f"{options.family}.yaml" if options.out is None else options.out
     if name == "-":
-        return Answer({"family": options.family, "text": text}, (Verbatim(text),))
+        return Document({"family": options.family, "text": text}, (Verbatim(text),))
     target = Path(name)
     content = with_line(text, record) if options.schema else text
     with reporting(target):
@@ -64,7 +63,7 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
     verb = "design" if record.design else "analyze"
     page = Paragraph("written", ", ".join(map(visible, names)), GOOD)
     follow = next_command("cfmkit", verb, name)
-    return Answer({"family": options.family, "file": name, "files": names}, (page, follow))
+    return Document({"family": options.family, "file": name, "files": names}, (page, follow))
 
 
 def template(name: str) -> str:

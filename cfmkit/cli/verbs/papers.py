@@ -6,12 +6,13 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, argument, flag
-from cfmkit.cli.page_block_types import (
+from cfmkit.documents.document import (
     BAD,
     BLANK,
     FAINT,
     GOOD,
     LABEL,
+    Document,
     Field,
     Paragraph,
     Span,
@@ -20,7 +21,6 @@ from cfmkit.cli.page_block_types import (
     line,
     listed,
 )
-from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode
 from cfmkit.runs.papers import VERDICTS
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Block
 
     Record = Mapping[str, Any]
 
@@ -47,7 +47,7 @@ class PapersOptions(Common):
     quiet: Annotated[bool, flag("-q", "--quiet", text="Print only problems.")] = False
 
 
-def run(options: PapersOptions, terminal: Terminal) -> Answer:
+def run(options: PapersOptions, terminal: Terminal) -> Document:
     """Recompute the numbers printed in the papers and report which agree; exit 5 if a verdict does not hold."""
     from cfmkit.cli.progress import watching
     from cfmkit.runs.papers import check, chosen
@@ -67,7 +67,7 @@ def run(options: PapersOptions, terminal: Terminal) -> Answer:
     )
     data = {"message": reported, "papers": records, "counts": counts}
     errors = tuple({"message": f"{one['paper']}, {one['place']}, {one['what']}: {one['trouble']}"} for one in wrong)
-    return Answer(
+    return Document(
         data,
         _page(records, counts, reported, bool(terminal.verbose)),
         ExitCode.REQUIREMENT_MISSED if wrong else ExitCode.OK,

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument
-from cfmkit.cli.page_block_types import JsonText
-from cfmkit.cli.verb_result import Answer, reported_for
+from cfmkit.documents.document import Document, JsonText, with_skipped_families
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
@@ -26,15 +25,15 @@ class SchemaOptions(Common):
     )
 
 
-def run(options: SchemaOptions, terminal: Terminal) -> Answer:
+def run(options: SchemaOptions, terminal: Terminal) -> Document:
     """Print the JSON schema of specs, for editors."""
     from cfmkit import families
     from cfmkit.runs.editor_schema import schema
 
     if options.family is not None:
         return _answer(schema([families.family(options.family)]))
-    return reported_for(families.skipped(), _answer(schema(families.records())))
+    return with_skipped_families(families.skipped(), _answer(schema(families.records())))
 
 
-def _answer(found: dict[str, Any]) -> Answer:
-    return Answer({"schema": found}, (JsonText(found),))
+def _answer(found: dict[str, Any]) -> Document:
+    return Document({"schema": found}, (JsonText(found),))

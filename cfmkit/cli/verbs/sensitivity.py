@@ -3,29 +3,11 @@
 from __future__ import annotations
 
 import shlex
-from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
-from cfmkit.cli.page_block_types import (
-    BAD,
-    BLANK,
-    FAINT,
-    LABEL,
-    CellGrid,
-    GridColumn,
-    Paragraph,
-    Span,
-    Written,
-    columns,
-    line,
-    spaced,
-    title,
-    verdict,
-)
-from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -34,30 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Document, Written
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
-    from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
+    from cfmkit.studies.sensitivity.result_types import Findings
 
 PLACE = 24
 EXAMPLE = "cfmkit sensitivity cam.yaml --method tolerance --vary mechanism.roller_radius=normal:0.05mm --samples 400"
-
-SHOWN = {
-    "oat": ("swing", "normalised_slope"),
-    "local": ("normalised_slope", "gradient"),
-    "morris": ("mu_star", "sigma"),
-    "sobol": ("total_order", "first_order"),
-    "tolerance": ("yield_gain_when_halved", "variance_drop_when_halved"),
-    "inverse": ("tolerance_alone", "tolerance_together", "tolerance_allocated"),
-}
-"""Indices on the page; the first says in which order."""
-
-PERCENT = SHOWN["tolerance"]
-NOTHING = 1e-12
-"""An index below this is the rounding of a difference of numbers near 1 (2e-16 each), not an influence."""
-
-MOST_PARAMETERS = 6
-"""Parameters of each metric that are shown without ``-v``: two metrics with them fit on a screen of 24 lines."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +82,7 @@ class SensitivityOptions(Studying):
     design: Annotated[bool, flag("--design", text="Redesign the mechanism at each sample.")] = False
 
 
-def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
+def run(options: SensitivityOptions, terminal: Terminal) -> Document:
     """Find out which values matter most, and which share of manufactured parts will meet the requirements.
 
     The spec's block `sensitivity` says what is uncertain. Finished samples are kept in the folder: after an
@@ -126,7 +90,9 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.run_spec_and_print_page import folder_of
-    from cfmkit.runs import html_report_of_study
+    from cfmkit.documents import html_of_study
+    from cfmkit.documents.document import Written
+    from cfmkit.documents.sensitivity_document import document_of
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sensitivity.output import exit_code, outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
@@ -165,15 +131,15 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
             shown = form.for_page(makers, drawn)
             study = found.setup.study
             point = run_study_in_folder.command_of_a_point(options, study.design)
-            page = html_report_of_study.page(study.spec, found.setup.paths, kept, command, shown, point)
-            place.folder.write(html_report_of_study.NAME, page)
+            page = html_of_study.page(document_of(found), study.spec, found.setup.paths, kept, command, shown, point)
+            place.folder.write(html_of_study.NAME, page)
         made = run_study_in_folder.Made(
             "sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count
         )
         manifest = run_study_in_folder.commit(place, made, terminal, exit_code(found))
         run_study_in_folder.finish(place, [piece.records for piece in found.evaluator.pieces])
     written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
-    return _answer(found, written, terminal.verbose > 0)
+    return _document(found, written)
 
 
 def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
@@ -241,7 +207,8 @@ def spread(option: str) -> tuple[str, Any]:
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
 
 
-def _answer(found: Findings, written: Written, everything: bool) -> Answer:
+def _document(found: Findings, written: Written) -> Document:
+    from cfmkit.documents.sensitivity_document import document_of
     from cfmkit.studies.sensitivity.output import as_json, exit_code
 
     spec, code = found.setup.study.spec, exit_code(found)
@@ -250,7 +217,8 @@ def _answer(found: Findings, written: Written, everything: bool) -> Answer:
     data |= {"reused": sum(one.reused for one in records)}
     bugs = sum(one.bugs for one in records)
     complaints = (f"error    {bugs} samples hit a bug in cfmkit; -vv shows the first",) if bugs else ()
-    return Answer(data, _page(found, written, everything), code, complaints, tuple(_quiet(found, data, code)))
+    quiet = tuple(_quiet(found, data, code))
+    return replace(document_of(found, written), data=data, complaints=complaints, quiet_complaints=quiet)
 
 
 def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
@@ -262,94 +230,3 @@ def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator
     for one in data["requirements"]:
         if not one["ok"]:
             yield f"missed   {one['sentence'].removesuffix(': missed')}"
-
-
-def _page(found: Findings, written: Written, everything: bool) -> Iterator[Block]:
-    """Yield the yield, the parameters in the order of what they do, and what failed."""
-    from cfmkit.studies.sensitivity.output import message, warnings
-
-    evaluator = found.evaluator
-    reused = sum(piece.records.reused for piece in evaluator.pieces)
-    right = f"{found.setup.method}, {evaluator.count} samples in {written.seconds:.2f} s"
-    yield title(found.setup.study.spec, right + (f", {reused} from the journal" if reused else ""))
-    yield BLANK
-    if found.all_met is not None:
-        yield _yields(found, found.all_met)
-        yield BLANK
-    for metric, lines in _by_metric(found).items():
-        yield line(f"  {spaced(metric)}", LABEL)
-        yield _ranking(found, lines, everything)
-        yield BLANK
-    for outcome in found.setup.nominal.outcomes:
-        if not outcome.ok:
-            yield Paragraph("missed", f"without any deviation: {outcome.sentence}", BAD)
-    if found.interrupted:
-        yield Paragraph("stopped", message(found), BAD)
-    for item in warnings(found):
-        yield Paragraph("warning", f"{item.name}: {item.message}", BAD)
-    if evaluator.failed:
-        yield Paragraph("first", evaluator.first_failure)
-    yield written.block(everything)
-
-
-def _yields(found: Findings, share: Yield) -> CellGrid:
-    from cfmkit.studies.sensitivity.output import by_interval, yield_ok
-
-    wanted = found.setup.block.min_yield
-    bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
-    ok = None if wanted is None else yield_ok(found)
-    if by_interval(found):
-        bound += " (in the interval)"
-    rows: list[tuple[str | Span, ...]] = [(Span("  yield", LABEL), _share(share), bound, verdict(ok))]
-    for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
-        limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
-        rows.append((f"  {spaced(outcome.metric)}", _share(one), Span(limits, FAINT), ""))
-    return CellGrid(columns(True, True, True, True), rows)
-
-
-def _share(one: Yield) -> str:
-    if one.value != one.value:
-        return f"not stated: {one.failed} of {one.count} parts have no result"
-    low, high = (f"{100 * end:.1f}" for end in one.wilson)
-    least, most = (100 * (one.good + more) / one.count for more in (0, one.failed))
-    value = f"{least:.1f} to {most:.1f} %" if one.failed else f"{100 * one.value:.1f} %"
-    return f"{value}   95 %: {low} ... {high} %"
-
-
-def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
-    """Return metric -> parameter -> index -> line, the parameters that do most first."""
-    tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
-    for one in found.lines:
-        tree[one.metric][one.parameter][one.index] = one
-    return {metric: dict(sorted(each.items(), key=_rank)) for metric, each in tree.items()}
-
-
-def _rank(item: tuple[str, dict[str, IndexLine]]) -> float:
-    """Return how far up a parameter stands: largest first, those without a value before all."""
-    names = [names[0] for names in SHOWN.values()] + ["variance_drop_when_halved"]
-    line = next((item[1][name] for name in names if name in item[1]), None)
-    return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
-
-
-def _ranking(found: Findings, each: dict[str, dict[str, IndexLine]], everything: bool) -> CellGrid:
-    indices = [name for name in SHOWN[found.setup.method] if any(name in lines for lines in each.values())]
-    heads = (GridColumn(), *(GridColumn(spaced(name), wraps=False) for name in indices))
-    shown = list(each.items())[: None if everything else MOST_PARAMETERS]
-    rows = [(f"    {parameter}", *(_index(lines.get(name)) for name in indices)) for parameter, lines in shown]
-    return CellGrid(heads, rows)
-
-
-def _index(line: IndexLine | None) -> str:
-    if line is None or line.value is None:
-        return "not stated"
-    percent = line.index in PERCENT
-    unit = " %" if percent else "" if line.unit == "1" else f" {line.unit}"
-    value, low, high = (None if end is None else _short(end, percent) for end in (line.value, line.low, line.high))
-    if low is None or low == value == high:
-        return f"{value}{unit}"
-    return f"at least {value}{unit}" if high is None else f"{value}{unit}  ({low} ... {high})"
-
-
-def _short(value: float, percent: bool) -> str:
-    """Return a number of three digits; what is nothing but rounding is zero."""
-    return "0" if abs(value) < NOTHING else f"{100 * value if percent else value:.3g}"

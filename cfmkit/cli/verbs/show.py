@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.cli.page_block_types import BLANK, GOOD, Paragraph, field, listed
-from cfmkit.cli.verb_result import Answer, reported_for
+from cfmkit.documents.document import BLANK, GOOD, Document, Paragraph, field, listed, with_skipped_families
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ class ShowOptions(Common):
     ] = None
 
 
-def run(options: ShowOptions, terminal: Terminal) -> Answer:
+def run(options: ShowOptions, terminal: Terminal) -> Document:
     """Explain a family with every key of its spec; list units, metrics, materials or papers; or explain one by name."""
     from cfmkit.cli.show_topics import explain, skipped
 
@@ -52,7 +51,7 @@ def run(options: ShowOptions, terminal: Terminal) -> Answer:
     except UsageError:
         _refer_to_help(options.topic)
         raise
-    return reported_for(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
+    return with_skipped_families(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
 
 
 def _refer_to_help(name: str | None) -> None:
@@ -69,7 +68,7 @@ def _refer_to_help(name: str | None) -> None:
         raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it") from None
 
 
-def _copy_drawing(name: str | None, given: str) -> Answer:
+def _copy_drawing(name: str | None, given: str) -> Document:
     """Copy the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
@@ -89,4 +88,4 @@ def _copy_drawing(name: str | None, given: str) -> Answer:
         BLANK,
         Paragraph("written", visible(str(path)), GOOD),
     )
-    return Answer({"show": name, "dimensions": rows, "file": str(path)}, page)
+    return Document({"show": name, "dimensions": rows, "file": str(path)}, page)

@@ -23,27 +23,13 @@ from cfmkit.cli.options import (
     option,
     seconds,
 )
-from cfmkit.cli.page_block_types import (
-    BAD,
-    BLANK,
-    LABEL,
-    CellGrid,
-    GridColumn,
-    Paragraph,
-    Span,
-    TextLine,
-    Written,
-    line,
-    next_command,
-)
-from cfmkit.cli.verb_result import Answer, reported_for
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
+    from cfmkit.documents.document import Document
 
 PLACE = 5
 EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
@@ -126,7 +112,7 @@ BANDS = ("force", "torque")
 """Keys that are a list where two values are given."""
 
 
-def run(options: SuggestOptions, terminal: Terminal) -> Answer:
+def run(options: SuggestOptions, terminal: Terminal) -> Document:
     """Suggest mechanisms for a wish: a force, a travel and a room. Start here if there is no spec yet.
 
     Candidates from every family are designed and analysed from their written files with the finest model. Those that
@@ -135,6 +121,8 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit import families
     from cfmkit.cli.run_study_in_folder import noting
     from cfmkit.designing.run_many_starts import Clock
+    from cfmkit.documents import suggestion_document
+    from cfmkit.documents.document import Written, with_skipped_families
     from cfmkit.families.run_control import Run
     from cfmkit.runs import suggestion_files
     from cfmkit.runs.read_wish import wish_of
@@ -178,9 +166,13 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     written = Written(out, (*manifest.files, "manifest.json"), time.perf_counter() - start)
     data = suggestion_files.as_json(found, block) | written.data | {"reused": found.reused}
     complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
-    page = _page(data, written, terminal.verbose > 0)
-    answer = Answer(data, page, code, tuple(_bugs(found.bugs, terminal.tracebacks)), quiet_complaints=complaints)
-    return reported_for(families.skipped(), answer)
+    document = replace(
+        suggestion_document.document_of(data, code, written),
+        data=data,
+        complaints=tuple(_bugs(found.bugs, terminal.tracebacks)),
+        quiet_complaints=complaints,
+    )
+    return with_skipped_families(families.skipped(), document)
 
 
 def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:
@@ -239,103 +231,3 @@ def _folder(options: SuggestOptions) -> str:
         raise UsageError("a wish from standard input has no name; give the output folder with --out")
     stem = "options" if options.wish is None else Path(options.wish).stem
     return str(Path("cfm-out") / f"{stem}-suggest")
-
-
-HEADS = ("", "", "mean", "ripple", "room", "safety", "parts", "model")
-"""Of the table; "hysteresis" follows where a proposal has some, and "yield" where one is wished."""
-
-VARIANT = 1
-"""The column whose cells may take several lines; a number is never broken."""
-
-
-def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterator[Block]:
-    """Yield the proposals as a table, near misses, families out of reach with their nearest wish, files."""
-    head, _, rest = data["message"].partition("; ")  # the time stands behind what fits into a line
-    yield TextLine((Span("suggest", LABEL), Span(f"  {head}")), f"{written.seconds:.1f} s")
-    if rest:
-        yield Paragraph("", rest)
-    listed = [*data["proposals"], *data["unjudged"]]
-    if data["proposals"]:
-        yield BLANK
-        yield from _rows(data["proposals"], data, 1)
-    if data["unjudged"]:
-        yield BLANK
-        yield line("not judged in full", LABEL)
-        yield from _rows(data["unjudged"], data, len(data["proposals"]) + 1)
-    if data["near_misses"]:
-        yield BLANK
-        yield line("near misses: one requirement not met", LABEL)
-        near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
-        yield CellGrid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
-    named = {one["family"] for one in listed}
-    silent = [one for one in data["families"] if one["family"] not in named]
-    if silent:
-        yield BLANK
-        yield line("no proposals from these families", LABEL)
-        yield CellGrid((GridColumn("", False), GridColumn()), [_silent(one) for one in silent], gap=2, indented=True)
-    for one in data["warnings"]:
-        yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
-    yield BLANK
-    yield written.block(everything)
-    if bare := [one["folder"] for one in listed if not _complete(one["folder"], written.files)]:
-        yield Paragraph(
-            "note",
-            f"the time ran out: of {', '.join(bare)} only design.yaml was written, and what is cut if there was time; "
-            "`cfmkit analyze` of that file gives the curve and figures, `cfmkit export --format dxf,svg,png` the files "
-            "to cut and a drawing",
-        )
-    if listed:  # files to cut or print of the best
-        best = Path(written.folder) / listed[0]["folder"] / "design.yaml"
-        yield next_command("cfmkit", "export", str(best))
-
-
-def _rows(listed: Sequence[Mapping[str, Any]], data: Mapping[str, Any], first: int) -> Iterator[Block]:
-    """Yield a table of mechanisms, and below it what else a row says: what was not judged, and warnings."""
-    more = _more(data)
-    rows = [
-        [*_row(str(number), one, data), *(_share(one[name]) for name in more)]
-        for number, one in enumerate(listed, first)
-    ]
-    heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
-    yield CellGrid(heads, rows, gap=2, indented=True)
-    said = [(number, [*one["unjudged"], *one["warnings"]]) for number, one in enumerate(listed, first)]
-    cells = [[str(number), "; ".join(words)] for number, words in said if words]
-    if cells:
-        yield CellGrid((GridColumn("", False), GridColumn()), cells, gap=2, indented=True)
-
-
-def _complete(folder: str, files: Iterable[str]) -> bool:
-    """Return True if a proposal's analysis is there, not its spec and its drawing alone."""
-    return f"{folder}/metrics.json" in files
-
-
-def _more(data: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the shares that follow the other columns of the table."""
-    lossy = any(one["hysteresis"] is not None for one in (*data["proposals"], *data["unjudged"]))
-    return (*(("hysteresis",) if lossy else ()), *(("yield",) if "yield" in data["wish"] else ()))
-
-
-def _silent(one: Mapping[str, Any]) -> list[str]:
-    """Return why a family has no proposal, and the nearest wish that it could meet."""
-    nearest = ", ".join(f"{key} {value}" for key, value in one["nearest"].items())
-    return [one["family"], (one["reason"] or "no mechanism fits") + (f"; nearest: {nearest}" if nearest else "")]
-
-
-def _row(number: str, one: Mapping[str, Any], data: Mapping[str, Any]) -> list[str]:
-    unit = "N*mm" if "torque" in data["wish"] else "N"
-    sides = [one["across"], one["along"], one["depth"]]
-    room_needed = " x ".join(f"{side:.3g}" for side in sides if side is not None) + " mm"
-    return [
-        f"{number} {one['family']}",
-        one["variant"],
-        f"{one['mean']:.4g} {unit}",
-        "-" if one["ripple"] is None else f"{100 * one['ripple']:.2g} %",
-        room_needed,
-        "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
-        str(one["parts"]),
-        one["model"],
-    ]
-
-
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.3g} %"

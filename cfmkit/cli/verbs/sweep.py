@@ -3,46 +3,27 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
-from cfmkit.cli.page_block_types import (
-    BAD,
-    BLANK,
-    FAINT,
-    GOOD,
-    LABEL,
-    CellGrid,
-    Paragraph,
-    Span,
-    Written,
-    columns,
-    spaced,
-    title,
-    within,
-)
-from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_block_types import Block
-    from cfmkit.specs.yamlio import Document
+    from cfmkit.documents.document import Document
+    from cfmkit.specs.yamlio import Document as SpecDocument
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
     from cfmkit.studies.sweep_request_and_files import SweepRequest
 
 PLACE = 22
 EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
-
-MOST_METRICS = 6
-"""Metrics of the best point that are shown without ``-v``, so that the page of a sweep fits on a screen of 24 lines."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,13 +58,15 @@ class SweepOptions(Studying):
     )
 
 
-def run(options: SweepOptions, terminal: Terminal) -> Answer:
+def run(options: SweepOptions, terminal: Terminal) -> Document:
     """Analyse a mechanism in many variants: one row per point, whether it could be solved or not.
 
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
     from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.run_spec_and_print_page import folder_of
+    from cfmkit.documents import sweep_document
+    from cfmkit.documents.document import Written
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
@@ -112,25 +95,25 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             drawn |= {stem: figure} if options.report else {}
             for name, content in form.write(figure, stem):
                 place.folder.write(name, content)
+        code, reported = exit_code(records, summary), summary.as_json(records)
+        dimensions = {one.name: one.dimension for one in work.study.metrics}
+        found = sweep_document.document_of(spec, reported, dimensions, code, reused=records.reused)
         if options.report:
-            from cfmkit.runs import html_report_of_study
+            from cfmkit.documents import html_of_study
 
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
             point = run_study_in_folder.command_of_a_point(options, work.study.design)
-            place.folder.write(
-                html_report_of_study.NAME, html_report_of_study.page(spec, varied, kept, command, shown, point)
-            )
-        code = exit_code(records, summary)
+            page = html_of_study.page(found, spec, varied, kept, command, shown, point)
+            place.folder.write(html_of_study.NAME, page)
         made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = run_study_in_folder.commit(place, made, terminal, code)
         run_study_in_folder.finish(place, [records])
-        reported = summary.as_json(records)
     written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
-    about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
-    page = _page(records, reported, code, written, terminal.verbose > 0)
-    return Answer(reported | about, page, code, tuple(_complaints(records, code, options, document)))
+    record = reported | {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
+    complaints = tuple(_complaints(records, code, options, document))
+    return replace(found, data=record, complaints=complaints, files=written)
 
 
 def request(options: SweepOptions) -> SweepRequest:
@@ -177,7 +160,7 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     return summary.exit_code()
 
 
-def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: Document) -> Iterator[str]:
+def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: SpecDocument) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
 
     if code is ExitCode.INVALID:
@@ -190,7 +173,7 @@ def _complaints(records: Records, code: ExitCode, options: SweepOptions, documen
         yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
 
 
-def _refusal(records: Records, document: Document) -> tuple[str, ...]:
+def _refusal(records: Records, document: SpecDocument) -> tuple[str, ...]:
     """Return why the first point is invalid: the table has the message, and the file knows its place."""
     from cfmkit.runs.run import placing
 
@@ -201,61 +184,6 @@ def _refusal(records: Records, document: Document) -> tuple[str, ...]:
     except CfmError as error:
         return lines_of(error)
     return (f"error    {reported}",)
-
-
-def _page(
-    records: Records, data: Mapping[str, Any], code: ExitCode, written: Written, everything: bool
-) -> Iterator[Block]:
-    """Yield how many points ended how, the best of them, and where the files are."""
-    reused = f", {records.reused} from the journal" if records.reused else ""
-    yield title(records.work.study.spec, f"{records.finished} points in {written.seconds:.2f} s{reused}")
-    yield BLANK
-    yield CellGrid(columns(True, True, True), list(_numbers(records, data, everything)))
-    yield BLANK
-    if code is ExitCode.REQUIREMENT_MISSED:
-        yield Paragraph("missed", "no point meets every requirement", BAD)
-    for one in data["warnings"]:
-        yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
-    yield written.block(everything)
-
-
-def _numbers(records: Records, data: Mapping[str, Any], everything: bool) -> Iterator[tuple[str | Span, ...]]:
-    for name, count in data["points"].items():
-        if name != "total":
-            yield Span(f"  {spaced(name)}", GOOD if name == "complete" else BAD), f"{count} points", ""
-    for one in data["requirements"]:
-        yield f"  {spaced(one['metric'])}", f"met at {one['met']} of {one['of']}", Span(within(one), FAINT)
-    if data["best"]:
-        yield from _best(records, data, everything)
-
-
-def _best(records: Records, data: Mapping[str, Any], everything: bool) -> Iterator[tuple[str | Span, ...]]:
-    best, metrics = data["best"], data["metrics"]
-    point = f"point {best['point']}" + (f", first of {best['ties']} as good" if best["ties"] > 1 else "")
-    yield "", "", ""
-    yield Span("  best", LABEL), point, Span(f"{best['sense']} {spaced(best['by'])}{_among(best)}", FAINT)
-    for path, value in best["values"].items():
-        yield f"  {path}", value, ""
-    dimensions = {one.name: one.dimension for one in records.work.study.metrics}
-    names = [best["by"], *(name for name in metrics if name != best["by"])]
-    for name in names if everything else names[:MOST_METRICS]:
-        if (value := metrics[name]["value"]) is not None:
-            yield f"  {spaced(name)}", _quantity(value, metrics[name]["unit"], dimensions[name]), ""
-
-
-def _among(best: Mapping[str, Any]) -> str:
-    if best["requirements_met"] is None:
-        return ""
-    return " of those that meet every requirement" if best["requirements_met"] else "; no point meets every requirement"
-
-
-def _quantity(value: float | str, unit: str, dimension: str) -> str:
-    """Return a value in its border unit; of what has none, shares are percentages, counts and factors are not."""
-    if isinstance(value, str):
-        return value
-    if dimension == "ratio":
-        return f"{100 * value:.4g} %"
-    return f"{value:.5g}" if unit == "1" else f"{value:.5g} {unit}"
 
 
 def _pictures(records: Records, summary: Summary) -> dict[str, Any]:

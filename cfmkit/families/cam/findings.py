@@ -178,6 +178,7 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
         f"without the {'constant force' if law.constant else 'force it is cut for'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,
+        short=f"force not {'constant' if law.constant else 'as cut for'} over the first {mm(corner)}",
     )
 
 

@@ -1,6 +1,6 @@
 """``report.html`` of a sweep or a sensitivity study: its points as a table that sorts and filters, its curves.
 
-A slider stands for each varied value; a sensitivity study has its indices and the shares of good parts before them.
+A slider stands for each varied value. Before them stands what the document of the study says.
 
 Made from the study's own files, so it says what they say. A file has at most 500 curves and 4 MB of points: a study
 with more columns keeps those that were varied and those that its page shows first, and says so.
@@ -13,11 +13,13 @@ import io
 import json
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.runs.html_report_of_run import NAME, escaped_json, identifier, part, references_of, template
+from cfmkit.documents import html
+from cfmkit.documents.document import GridColumn
+from cfmkit.documents.html import NAME, escaped_json, part, references_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.documents.document import Document
     from cfmkit.specs.spec import Spec
 
 MOST_CURVES = 500
@@ -46,7 +49,19 @@ DIGITS = 6
 """Of a number in the page: more are in results.csv."""
 
 
+class StudyPoints(NamedTuple):
+    """The points of a study as the page has them."""
+
+    columns: tuple[GridColumn, ...]
+    rows: tuple[tuple[str, ...], ...]  # the first of them, for readers without scripts
+    total: int
+    left_out: tuple[str, ...]  # what is only in results.csv
+    data: str  # JSON for the script
+    heading: str = "points"
+
+
 def page(
+    document: Document,
     spec: Spec,
     varied: Sequence[str],
     files: Mapping[str, bytes],
@@ -58,6 +73,8 @@ def page(
 
     Parameters
     ----------
+    document : Document
+        What the study found.
     spec : Spec
         What was varied.
     varied : sequence of str
@@ -71,8 +88,6 @@ def page(
     point : str
         The command that computes one point as the study did, but for what was varied.
     """
-    from cfmkit.plots.vector_formats import inline, svg
-
     summary = json.loads(files["metrics.json"])
     head, *points = csv.reader(io.StringIO(files["results.csv"].decode()))
     rows = points[:MOST_POINTS]
@@ -86,56 +101,23 @@ def page(
         "columns": [_numbers(column, exact=name in paths) for name, column in zip(kept, columns, strict=True)],
         "curves": _curves(files.get("curves.csv"), paths, [[row[head.index(path)] for row in rows] for path in paths]),
     }
-    best = summary.get("best") or {}
-    text: str = template("study.html.j2").render(
-        title=spec.name,
-        family=spec.family,
-        status=summary.get("status", ""),
-        message=summary.get("message", ""),
-        kind="a sensitivity study" if "indices.csv" in files else "a sweep",
-        requirements=[one for one in summary.get("requirements", ()) if "sentence" in one],
-        shares=_shares(summary),
-        indices=_indices(files.get("indices.csv")),
-        best=best.get("values", {}),
-        best_by=" ".join(str(best[key]) for key in ("sense", "by") if best.get(key)).replace("_", " "),
-        ranges={name: _range(one) for name, one in summary.get("range", {}).items()},
-        definitions={name: one.get("definition", "") for name, one in summary.get("metrics", {}).items()},
-        head=kept,
-        left_out=len(head) - len(kept),
-        rows=[[_short(column[at]) for column in columns] for at in range(min(SHOWN, len(rows)))],
-        total=len(points),
-        points_left_out=len(points) - len(rows),
-        pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},
-        data=escaped_json(data),
+    more = ((len(points) - len(rows), "points"), (len(head) - len(kept), "columns"))
+    shown = StudyPoints(
+        tuple(map(GridColumn, kept)),
+        tuple(tuple(_short(column[at]) for column in columns) for at in range(min(SHOWN, len(rows)))),
+        len(points),
+        tuple(f"{count} more {things} are in results.csv." for count, things in more if count),
+        escaped_json(data),
+    )
+    return html.page(
+        document,
+        drawn,
+        subject=f"{spec.family}: {'a sensitivity study' if 'indices.csv' in files else 'a sweep'}",
         command=command,
-        style=part("report.css"),
+        points=shown,
         script=part("study.js"),
         **references_of(spec.family),
     )
-    return text.encode()
-
-
-def _shares(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return in words what share of parts meets what, of a study of tolerances."""
-    named = [("every requirement", summary.get("yield"))]
-    named += [
-        (one["sentence"].rpartition(": ")[0], one.get("yield"))
-        for one in summary.get("requirements", ())
-        if "sentence" in one
-    ]
-    return [
-        (name, f"{100 * one['value']:.4g} % ({100 * one['wilson'][0]:.4g} ... {100 * one['wilson'][1]:.4g} %)")
-        for name, one in named
-        if one and one.get("value") is not None
-    ]
-
-
-def _indices(content: bytes | None) -> list[list[str]]:
-    """Return indices.csv as rows for reading, its head first; nothing where a study has none."""
-    if content is None:
-        return []
-    head, *rows = csv.reader(io.StringIO(content.decode()))
-    return [head, *([_short(cell) for cell in row] for row in rows)]
 
 
 def _fitting(
@@ -153,14 +135,6 @@ def _fitting(
             kept.add(name)
             used += size[name]
     return [name for name in head if name in kept]
-
-
-def _range(one: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the smallest and the largest value of a metric in words."""
-    unit = f" {one['unit']}" if one.get("unit") not in (None, "", "1") else ""
-    ends = (one.get(end) for end in ("min", "max"))
-    low, high = ("" if end is None else _short(str(end)) + unit for end in ends)
-    return low, high
 
 
 def _short(text: str) -> str:
@@ -261,4 +235,4 @@ _AXES = (("displacement [", "angle ["), ("force [", "torque ["))
 """How the columns of a curve begin that are drawn: over which, and which."""
 
 
-__all__ = ["NAME", "page"]
+__all__ = ["NAME", "StudyPoints", "page"]

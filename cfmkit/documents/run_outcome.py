@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from cfmkit import api
 from cfmkit.errors import ExitCode
 from cfmkit.metrics.requirements import of_many
 from cfmkit.results import Result, Status
@@ -146,7 +145,12 @@ def worst(codes: list[ExitCode]) -> ExitCode:
 
 def report_on(result: Result, design: Design | None = None) -> Report:
     """Return the report on a result, and on the design that led to it."""
-    return Report(result, api.evaluate(result), api.check(result), design)
+    from cfmkit.families import family
+    from cfmkit.metrics import check, evaluate, values_of_family
+
+    values = values_of_family(family(result.spec.family).values)
+    requirements = check(result.spec.part_requirements, result, values)
+    return Report(result, evaluate(result), requirements, design)
 
 
 def undesigned(spec: Spec, design: Design) -> Result:

@@ -1,0 +1,107 @@
+"""The document of a batch: a row for each specification, what is missed, and changes since an earlier batch."""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from cfmkit.documents.document import (
+    BAD,
+    FAINT,
+    GOOD,
+    Document,
+    GridColumn,
+    Note,
+    Span,
+    Table,
+    Written,
+)
+from cfmkit.errors import ExitCode, visible
+from cfmkit.studies.batch_sources_and_outcomes import message, outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
+    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
+
+MAX_CHANGES = 8
+"""Changed values on a short page, so that verdicts stay on the screen."""
+
+
+def document_of(
+    entries: Sequence[Entry], code: ExitCode, files: Written | None = None, compared: BatchComparison | None = None
+) -> Document:
+    """Return the document of a batch.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Every specification.
+    code : ExitCode
+        Of the process.
+    files : Written, optional
+        What was written.
+    compared : BatchComparison, optional
+        With an earlier batch.
+    """
+    reused = sum(one.reused for one in entries)
+    columns = (GridColumn(), GridColumn(wraps=False), GridColumn(wraps=False), GridColumn())
+    return Document(
+        exit_code=code,
+        title=message(entries),
+        summary=f"{reused} reused" if reused else "",
+        tables=(Table("", columns, tuple(_row(one) for one in entries)), *_warnings(entries)),
+        notes=(*_missed(entries), *(_changes(compared) if compared else ())),
+        files=files,
+    )
+
+
+def _warnings(entries: Sequence[Entry]) -> Iterator[Table]:
+    """Yield the warnings of all specifications, which a short page only counts."""
+    rows = tuple((visible(one.spec), item["name"], item["message"]) for one in entries for item in one.warnings)
+    if rows:
+        yield Table("warnings", (GridColumn(wraps=False), GridColumn(wraps=False), GridColumn()), rows, 0)
+
+
+def _missed(entries: Sequence[Entry]) -> Iterator[Note]:
+    for one in entries:
+        for requirement in one.missed if one.verb and not one.errors else ():
+            reported = requirement["sentence"].removesuffix(": missed")
+            yield Note("missed", f"{visible(one.spec)}: {reported}", tone=BAD, whole=True)
+
+
+def _changes(compared: BatchComparison) -> Iterator[Note]:
+    """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
+    beyond = compared.beyond
+    text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
+    yield Note("compared", text, tone=BAD if beyond else GOOD, whole=True)
+    for one in beyond[:MAX_CHANGES]:
+        yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD, whole=True)
+    if len(beyond) > MAX_CHANGES:
+        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more stand in changes.csv", tone=FAINT)
+
+
+def _row(one: Entry) -> tuple[str | Span, ...]:
+    word = outcome(one)
+    good = word == "ok"
+    tone = GOOD if good else FAINT if one.skipped else BAD
+    link = quote(str(PurePosixPath(one.folder) / "report.html")) if one.written else ""
+    spec = Span(visible(one.spec), link=link)
+    return spec, one.verb, Span(word if good or one.skipped else word.upper(), tone), detail(one)
+
+
+def detail(one: Entry) -> str:
+    """Return how many requirements are met, or what went wrong before any could be."""
+    if one.skipped:
+        return ""
+    if one.errors:
+        return "see above"
+    if one.missed and one.code is ExitCode.REQUIREMENT_MISSED:
+        return f"{len(one.missed)} of {len(one.requirements)} requirements"
+    if one.code:
+        return one.message
+    reported = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
+    count = len(one.warnings)
+    return reported + (f", {count} warning{'s' * (count != 1)}" if count else "")

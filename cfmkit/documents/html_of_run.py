@@ -1,0 +1,153 @@
+"""``report.html`` of a run: its document with figures, the mechanism in motion, and every metric by branch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.documents import html
+from cfmkit.documents.document import GridColumn, Table
+from cfmkit.documents.html import NAME, escaped_json, part, references_of
+from cfmkit.documents.run_document import document_of
+from cfmkit.families import family
+from cfmkit.metrics import split_name
+from cfmkit.plots.figures import moving_of
+from cfmkit.specs.units import format_short, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from matplotlib.figure import Figure
+
+    from cfmkit.documents.run_document import RunCommand
+    from cfmkit.documents.run_outcome import Report
+    from cfmkit.results import Quantity, Result
+
+
+def page(
+    report: Report,
+    drawn: Mapping[str, Figure],
+    command: str = "",
+    texts: Sequence[tuple[str, str]] = (),
+    run: RunCommand | None = None,
+) -> bytes:
+    """Return the page of a run; the same report gives the same bytes.
+
+    Parameters
+    ----------
+    report : Report
+        Of any status.
+    drawn : mapping of str to Figure
+        The figures of the result, by their names: the first is the curve.
+    command : str
+        How the run was started, for whoever wants to repeat it.
+    texts : sequence of (str, str)
+        The specification, under its heading.
+    run : RunCommand, optional
+        Which commands apply remedies.
+    """
+    record = family(report.result.spec.family)
+    figures = {name: html.drawing(figure, name) for name, figure in drawn.items()}
+    film = _film(report.result, drawn, figures)
+    return html.page(
+        document_of(report, run),
+        figures,
+        subject=f"{record.name}: {record.summary}",
+        command=command,
+        texts=texts,
+        metrics=_metrics(report),
+        film=film,
+        script=part("report.js") if film else "",
+        **references_of(record.name),
+    )
+
+
+def _metrics(report: Report) -> Table | None:
+    """Return one row for each metric, with a column for each branch; those without a value say why."""
+    if not report.metrics:
+        return None
+    branches = tuple(dict.fromkeys(report.result.curve.branches)) if report.result.curves else ()
+    several = branches if len(branches) > 1 else ()
+    names = dict.fromkeys(split_name(name)[0] if split_name(name)[1] in branches else name for name in report.metrics)
+    rows = []
+    for name in names:
+        each = [report.metrics.get(f"{name}[{branch}]") for branch in several]
+        worst = report.metrics.get(name) or report.metrics[f"{name}[{branches[0]}]"]
+        values = [_value(worst), *("" if one is None else _value(one) for one in each)]
+        rows.append((name, *values, worst.definition))
+    heads = ("metric", "worst" if several else "value", *several, "what it is")
+    return Table("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
+
+
+def _value(quantity: Quantity) -> str:
+    if quantity.word is not None:
+        return quantity.word
+    if quantity.value is None:
+        return f"none: {quantity.reason}" if quantity.reason else "none"
+    return format_short(quantity.value, quantity.dimension, 6)
+
+
+@dataclass(frozen=True)
+class Film:
+    """The mechanism in motion beside its curve."""
+
+    drawing: str  # SVG of all poses
+    curve: str  # name of the figure that has the cursors
+    data: str  # JSON for the script: texts and places of the cursors of each pose
+    poses: int  # how many there are
+    first: str  # what stands below the slider before it is moved
+
+
+def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) -> Film | None:
+    """Return the film of a result; None if its family has none. The figure beside it gets its cursors."""
+    moving = moving_of(family(result.spec.family), result)
+    if moving is None or not drawn:
+        return None
+    from cfmkit.plots.poses_in_one_svg import film
+
+    name = next(iter(drawn))
+    spots = list(_cursors(drawn[name], to_border(moving.motion, result.curve.motion_dimension)))
+    lines = "".join(
+        f'<line class="cursor" x1="{xs[0]}" x2="{xs[0]}" y1="{low}" y2="{high}"/>' for xs, low, high in spots
+    )
+    figures[name] = figures[name].replace("</svg>", f"{lines}</svg>")
+    texts = [_moment(result, float(place)) for place in moving.motion]
+    data = escaped_json({"texts": texts, "cursors": [xs for xs, _, _ in spots]})
+    drawing = film(moving, f"{result.spec.family} mechanism to scale over its travel")
+    return Film(drawing, name, data, len(texts), texts[0])
+
+
+def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, float]]:
+    """Yield, for each panel over the motion: x of the cursor at every pose, and its lower and upper end [pt]."""
+    height = figure.bbox.height / figure.dpi * 72.0
+    for ax in figure.axes:
+        box = ax.get_window_extent()
+        scale = 72.0 / figure.dpi
+        x = ax.transData.transform(np.column_stack([motion, np.zeros(len(motion))]))[:, 0]
+        x = np.clip(x, box.x0, box.x1) * scale
+        yield [round(float(one), 2) for one in x], round(height - box.y0 * scale, 2), round(height - box.y1 * scale, 2)
+
+
+def _moment(result: Result, place: float) -> str:
+    """Return the motion and the effort of every branch at one pose, in words."""
+    curve = result.curve
+    reported = [f"{curve.motion_name} {format_short(place, curve.motion_dimension)}"]
+    for name in dict.fromkeys(curve.branches):
+        on = curve.branch == name
+        effort = _nearest(curve.motion[on], curve.effort[on], place)
+        label = f"{curve.kind} on {name}" if len(set(curve.branches)) > 1 else curve.kind
+        reported.append(f"{label} {format_short(effort, curve.kind)}" if np.isfinite(effort) else f"{label}: none")
+    return ", ".join(reported)
+
+
+def _nearest(motion: Any, effort: Any, place: float) -> float:
+    """Return the effort at a motion, linear between points; NaN beyond them or where the curve folds back."""
+    order = np.argsort(motion, kind="stable")
+    if len(motion) < 2 or not np.all(np.diff(motion[order]) > 0):
+        return float(effort[np.argmin(np.abs(motion - place))]) if len(motion) else np.nan
+    return float(np.interp(place, motion[order], effort[order], left=np.nan, right=np.nan))
+
+
+__all__ = ["NAME", "Film", "page"]

@@ -1,0 +1,412 @@
+"""The document of a run over one specification: what `design`, `analyze` and `calibrate` found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.documents.document import (
+    BAD,
+    SHORT,
+    Document,
+    Note,
+    Row,
+    WarningEntry,
+    Written,
+    command_line,
+    shortened_to_clause,
+    spaced,
+)
+from cfmkit.errors import ExitCode
+from cfmkit.families import family
+from cfmkit.metrics import Window, evaluate, known_metrics, left_of, split_name, window_of
+from cfmkit.metrics.metric_definitions import words
+from cfmkit.specs.units import border_unit, format_short, to_border
+from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.documents.run_outcome import Report
+    from cfmkit.metrics import Outcome
+    from cfmkit.results import Finding, Quantity, Searched
+    from cfmkit.specs.spec import Requirement
+
+STDIN = "-"
+
+LABELS = {
+    "force_ripple": "ripple",
+    "torque_ripple": "ripple",
+    "deviation_from_target": "deviation",
+    "safety_factor": "safety",
+    "stress_max": "stress",
+    "hysteresis_area": "hysteresis",
+}
+"""What values are called where there is little room."""
+
+FACTS = (
+    "force_ripple",
+    "torque_ripple",
+    "allowable_stress",
+    "safety_factor",
+)
+"""Metrics that are shown of every family, as far as they have a value."""
+
+EXPECTED = ", and expect "
+"""What stands before the forces of a test plan, which a short page shows."""
+
+LITTLE_MARGIN = 1.05
+"""Safety factor below which the margin is called little."""
+
+
+@dataclass(frozen=True)
+class RunCommand:
+    """How a run was started, so that a remedy can be written as the command that applies it."""
+
+    verb: str
+    source: str  # the specification; ``-`` is standard input
+    changes: tuple[str, ...] = ()  # what ``--set`` said
+    words: tuple[str, ...] = ()  # other words of the command line, which another verb does not take
+    folder: str = ""
+
+    def with_remedy(self, cure: str | tuple[str, ...]) -> str:
+        """Return the command line that applies a cure to the specification, changed as it was."""
+        changes = (cure,) if isinstance(cure, str) else cure
+        verb = "design" if changes[0].startswith("design.") else self.verb
+        paths = [change.partition("=")[0] for change in changes]
+        kept = [change for change in self.changes if change.partition("=")[0].strip() not in paths]
+        settings = [word for change in (*kept, *changes) for word in ("--set", change)]
+        folder = ["-o", self.folder] if self.source == STDIN else []
+        return command_line("cfmkit", verb, self.source, *(self.words if verb == self.verb else ()), *settings, *folder)
+
+
+def document_of(report: Report, command: RunCommand | None = None, files: Written | None = None) -> Document:
+    """Return the document of a report.
+
+    Parameters
+    ----------
+    report : Report
+        Of any status.
+    command : RunCommand, optional
+        How the run was started; default: remedies are named as options only.
+    files : Written, optional
+        What the run wrote.
+    """
+    spec = report.result.spec
+    return Document(
+        exit_code=report.exit_code,
+        title=" ".join(spec.name.split()),
+        summary=_summary(report),
+        verdict=verdict_of(report),
+        headline=headline_of(report),
+        metrics=metrics_of(report),
+        notes=tuple(_notes(report, command)),
+        warnings=tuple(warning_of(item, command) for item in report.warnings if item not in _reasons(report)),
+        files=files,
+    )
+
+
+def verdict_of(report: Report) -> str:
+    """Return how a run ended, in a few words."""
+    missed, count = len(report.missed), len(report.requirements)
+    met = f"{missed} of {count} requirements missed" if missed else _all_met(count)
+    if not report.status.usable:
+        return spaced(report.status.key)
+    return met if report.status.exit_code is ExitCode.OK else f"partial, {met}"
+
+
+def _all_met(count: int) -> str:
+    if count == 0:
+        return "no requirements"
+    return "requirement met" if count == 1 else f"all {count} requirements met"
+
+
+def warning_of(item: Finding, command: RunCommand | None = None) -> WarningEntry:
+    """Return the entry of a finding."""
+    options = tuple(_option(cure, command) for cure in item.cures)
+    commands = tuple(command.with_remedy(cure) if command else command_line(*_settings(cure)) for cure in item.cures)
+    short = shortened_to_clause(item.short or item.message, SHORT - len(item.name) - 2)
+    return WarningEntry(item.name, short, item.message, options, commands)
+
+
+def _option(cure: str | tuple[str, ...], command: RunCommand | None) -> str:
+    """Return a remedy as options; with the verb where it is another one than that of the run."""
+    first = cure if isinstance(cure, str) else cure[0]
+    other = first.startswith("design.") and command is not None and command.verb != "design"
+    return command_line(*(["design"] if other else []), *_settings(cure))
+
+
+def _settings(cure: str | tuple[str, ...]) -> list[str]:
+    return [word for change in ((cure,) if isinstance(cure, str) else cure) for word in ("--set", change)]
+
+
+def _reasons(report: Report) -> list[Finding]:
+    """Return the warnings that say what the run's message says."""
+    return [item for item in report.warnings if item.message == report.result.message]
+
+
+def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
+    """Yield how the run ended where that is not as requested, what the design decided, and what the verb adds."""
+    status, design = report.status, report.design
+    if status.exit_code is not ExitCode.OK:
+        yield Note("partial" if status.usable else "failed", report.message, tone=BAD, whole=True)
+        cures = dict.fromkeys(cure for item in _reasons(report) for cure in item.cures)
+        for cure in cures:
+            text = command.with_remedy(cure) if command else command_line(*_settings(cure))
+            yield Note("remedy", text, whole=True)
+    elif design is not None and design.message != design.status.value:
+        yield Note("design", design.message)
+    if design is not None and design.nearest_feasible:
+        settings = [f"{path}={''.join(value.split())}" for path, value in design.nearest_feasible.items()]
+        yield Note("feasible", " ".join(f"--set {setting}" for setting in settings), whole=True)
+    for word, text in report.supplement.lines:
+        yield Note(word, text, short=text.partition(EXPECTED)[2])
+    for text in searched(design.search) if design else ():
+        yield Note("search", text)
+
+
+def searched(found: Mapping[str, Searched]) -> list[str]:
+    """Return what only a design search knows: one sentence for each model and window, which it names first."""
+    groups: dict[str, list[str]] = {}
+    for name, one in found.items():
+        if one.quantity.value is not None:
+            over = "" if one.window is None else f", {span(*one.window, one.motion)}"
+            groups.setdefault(one.model + over, []).append(f"{words(name)} {short_value(one.quantity)}")
+    return [f"{about}: {', '.join(reported)}" for about, reported in groups.items()]
+
+
+def span(low: float, high: float, dimension: str) -> str:
+    """Return an interval with one unit, rounded for reading.
+
+    Examples
+    --------
+    >>> span(0.002, 0.24, "length")
+    '2 to 240 mm'
+    """
+    numbers = (f"{float(to_border(value, dimension)):.4g}" for value in (low, high))
+    return f"{' to '.join(numbers)} {border_unit(dimension)}"
+
+
+# --- title ------------------------------------------------------------------------------------------------------------
+
+
+def _window(report: Report) -> Window | None:
+    """Return the window of the title: that of the analysis, else the one that all requirements share."""
+    if (own := window_of(report.result)) is not None:
+        return left_of(own, report.result)
+    shared = {outcome.over for outcome in report.requirements if outcome.over is not None}
+    return left_of(Window(*shared.pop()), report.result) if len(shared) == 1 else None
+
+
+def _summary(report: Report) -> str:
+    """Return the mean effort over the window; "" without a curve."""
+    result = report.result
+    if not result.status.usable or not result.curves:
+        return ""
+    curve, window = result.curve, _window(report)
+    name = f"{curve.kind}_mean"
+    measured = report.metrics
+    if window is not None and window_of(result) is None:
+        measured = evaluate(result, (name, *(f"{name}[{branch}]" for branch in curve.branches)), window)
+    low, high = (window.lo, window.hi) if window else (float(curve.motion.min()), float(curve.motion.max()))
+    if name not in measured or measured[name].value is None:
+        return f"over {span(low, high, curve.motion_dimension)}"
+    mean = branches(report, name, measured)
+    return f"{mean} over {format_short(high - low, curve.motion_dimension)} ({span(low, high, curve.motion_dimension)})"
+
+
+# --- values -----------------------------------------------------------------------------------------------------------
+
+
+def headline_of(report: Report) -> tuple[Row, ...]:
+    """Return requirements with their verdicts, then what matters most of the family; nothing without a curve."""
+    if not report.result.status.usable:
+        return ()
+    spec = report.result.spec
+    judged = spec.requirements if len(report.requirements) == len(spec.requirements) else spec.part_requirements
+    required = [_required(report, *pair) for pair in zip(judged, report.requirements, strict=True)]
+    return (*required, *_facts(report))
+
+
+def metrics_of(report: Report) -> tuple[Row, ...]:
+    """Return every metric that has a value, by branch where branches differ."""
+    if not report.result.status.usable:
+        return ()
+    names = [name for name in report.metrics if "[" not in name and _has_value(report, name)]
+    names += [name for name in report.metrics if "[" in name and split_name(name)[0] not in report.metrics]
+    window = left_of(window_of(report.result), report.result)
+    return tuple(
+        Row(
+            words(name),
+            branches(report, name, report.metrics) + _remark(report, name),
+            window=_over(report, name, window),
+            about=report.metrics[name].definition,
+        )
+        for name in names
+    )
+
+
+def _facts(report: Report) -> Iterator[Row]:
+    """Yield what is not required and matters most: stress and size, then what the family leads with."""
+    spec = report.result.spec
+    known = {split_name(outcome.metric)[0] for outcome in report.requirements}
+    known |= {f"{report.result.curve.kind}_mean"} if report.result.curves else set()
+    if (stress := _stress(report, known)) is not None:
+        yield stress
+        known |= {"stress_max", "allowable_stress", "safety_factor"}
+    if (size := _size(report)) is not None:
+        yield size
+    if spec.target_curve is not None:
+        known |= {"force_ripple", "torque_ripple"}
+    for name in dict.fromkeys(
+        ("deviation_from_curve", "usable_stroke", "hysteresis_area", *family(spec.family).headline, *FACTS)
+    ):
+        if name not in known and _has_value(report, name):
+            text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
+            about = report.metrics[name].definition
+            yield Row(LABELS.get(name, words(name)), text + _remark(report, name), about=about)
+
+
+def _stress(report: Report, known: set[str]) -> Row | None:
+    """Return the largest stress beside what is allowed, with the safety factor where no requirement says it."""
+    if not _has_value(report, "stress_max") or "stress_max" in known:
+        return None
+    text, allowed = short_value(report.metrics["stress_max"], 3), report.result.allowable_stress
+    if allowed is not None:
+        text = f"{text.partition(' ')[0]} of {format_short(allowed, 'stress', 3)}"
+    if "safety_factor" not in known and _has_value(report, "safety_factor"):
+        factor = report.metrics["safety_factor"].value or 0.0
+        text += f", safety {factor:.3g}" + _overrated(report)
+        text += " (little margin)" if 1.0 <= factor < LITTLE_MARGIN else ""
+    return Row("stress", text, about=report.metrics["stress_max"].definition)
+
+
+def _size(report: Report) -> Row | None:
+    """Return the box that the mechanism stays in, and of how many parts it is."""
+    space = family(report.result.spec.family).envelope(report.result)
+    if space is None:
+        return None
+    sides = " x ".join(f"{1e3 * side:.3g}" for side in space.sides if side is not None)
+    parts = f", {space.parts} parts" if space.parts > 1 else ""
+    return Row("size", f"{sides} mm{parts}", about="the box that everything stays in over the travel")
+
+
+def _has_value(report: Report, name: str) -> bool:
+    quantity = report.metrics.get(name)
+    return quantity is not None and quantity.value is not None
+
+
+def _remark(report: Report, name: str) -> str:
+    """Return of which stress a safety factor is, by which rule a stress is allowed, and how far a model is known."""
+    allowed = report.result.allowable_stress
+    if name == "allowable_stress":
+        return _rule(report)
+    if name == "safety_factor" and allowed is not None and "allowable_stress" not in report.metrics:
+        return f", of {format_short(allowed, 'stress')}{_rule(report)}{_overrated(report)}"
+    return _overrated(report, name) if name.endswith("safety_factor") else ""
+
+
+def _rule(report: Report) -> str:
+    """Return by which rule a stress is allowed, where the mechanism says how much of its strength may be used."""
+    try:
+        return f" (yield strength / {report.result.spec.at('mechanism.safety_factor'):.4g})"
+    except KeyError:
+        return ""
+
+
+def _overrated(report: Report, name: str = "safety_factor") -> str:
+    """Return why a safety factor below one is no finding: the model is known to overestimate the stress by as much."""
+    factor, share = report.metrics[name].value, report.result.stress_overrated
+    if factor is None or any(item.name == "overstressed" for item in report.result.warnings):
+        return ""
+    return f" (stress overestimated by up to {100 * share:.2g} %)" if 1 / (1 + share) <= factor < 1 else ""
+
+
+def _stroke(report: Report) -> str:
+    """Return the usable stroke with its ends."""
+    stroke, start, end = (report.metrics[name] for name in ("usable_stroke", "usable_start", "usable_end"))
+    text = short_value(stroke)
+    if start.value is None or end.value is None:
+        return text
+    return f"{text} ({span(start.value, end.value, stroke.dimension)})"
+
+
+def branches(report: Report, name: str, metrics: Mapping[str, Quantity]) -> str:
+    """Return the value on each branch where they differ, else the one value."""
+    each: Mapping[str, Quantity | None] = {}
+    if report.result.curves:
+        each = {branch: metrics.get(f"{name}[{branch}]") for branch in report.result.curve.branches}
+    known = {branch: item for branch, item in each.items() if item is not None and item.value is not None}
+    texts = {branch: short_value(item, 3) for branch, item in known.items()}
+    if len(texts) == len(each) and len(set(texts.values())) > 1:
+        return ", ".join(f"{text} {branch}" for branch, text in texts.items())
+    return short_value(metrics[name])
+
+
+def short_value(quantity: Quantity, digits: int = 4) -> str:
+    """Return a value with its unit, rounded for reading; a word where it stands for one."""
+    if quantity.word is not None:
+        return quantity.word
+    return "no value" if quantity.value is None else format_short(quantity.value, quantity.dimension, digits)
+
+
+def _over(report: Report, name: str, window: Window | None) -> str:
+    """Return the window, if there is one and the metric looks only inside."""
+    if window is None or not report.result.curves:
+        return ""
+    curve = report.result.curve
+    windowed = {item.name for item in known_metrics(curve.kind) if item.windowed}
+    return span(window.lo, window.hi, curve.motion_dimension) if split_name(name)[0] in windowed else ""
+
+
+def _required(report: Report, requirement: Requirement, outcome: Outcome) -> Row:
+    base, branch = split_name(outcome.metric)
+    label = LABELS[base] + (f" on {branch}" if branch else "") if base in LABELS else words(outcome.metric)
+    over = Window(*outcome.over) if outcome.over else None
+    apart = "" if over is None or _is_title(report, over) else _over(report, outcome.metric, over)
+    bound = _bound(requirement)
+    about = outcome.sentence
+    if outcome.value is None:
+        reason = outcome.sentence.partition("no value (")[2].rpartition("), ")[0]
+        return Row(label, f"no value: {reason}", bound, False, about=about)
+    if outcome.ok:
+        digits = 3 if outcome.metric in OF_MANY_PARTS else 4
+        return Row(label, format_short(outcome.value, outcome.dimension, digits), bound, True, apart, about)
+    # the sentence rounds so that the value stays on its side of the bound
+    missed = outcome.sentence.rpartition(", ")[0].removeprefix(words(outcome.metric)).strip()
+    return Row(label, missed.partition(" over ")[0], bound, False, apart, about)
+
+
+def _is_title(report: Report, window: Window) -> bool:
+    """Return True if a window is the one that the title states."""
+    shown = _window(report)
+    if shown is None:
+        return False
+    slack = 1e-9 * max(abs(shown.lo), abs(shown.hi))
+    return abs(shown.lo - window.lo) <= slack and abs(shown.hi - window.hi) <= slack
+
+
+def _bound(requirement: Requirement) -> str:
+    if requirement.min is None:
+        return f"<= {requirement.max}"
+    return f">= {requirement.min}" if requirement.max is None else f"{requirement.min} to {requirement.max}"
+
+
+def complaints_of(report: Report) -> tuple[str, ...]:
+    """Return what a user must hear who has asked to hear nothing else."""
+    status = report.status
+    if not status.usable:
+        design = report.design
+        reported = design.explanation if design is not None and design.spec is None else report.message
+        return (f"error    {spaced(status.key)}: {reported}",)
+    partial = [] if status.exit_code is ExitCode.OK else [f"partial  {report.message}"]
+    return (*partial, *(f"missed   {outcome.sentence.removesuffix(': missed')}" for outcome in report.missed))
+
+
+def data_of(report: Report) -> dict[str, object]:
+    """Return what the JSON document says of a report beside the files."""
+    spec, design = report.result.spec, report.design
+    data = report.as_json() | {"family": spec.family, "name": spec.name}
+    if design is not None:
+        data |= {"active_bounds": list(design.active_bounds), "nearest_feasible": dict(design.nearest_feasible)}
+    return data

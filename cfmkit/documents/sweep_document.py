@@ -1,0 +1,142 @@
+"""The document of a sweep: how many points meet what, the best of them, and the range of each result."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.documents.document import (
+    SHORT,
+    Document,
+    GridColumn,
+    Note,
+    Row,
+    Table,
+    WarningEntry,
+    Written,
+    shortened_to_clause,
+    spaced,
+    within,
+)
+from cfmkit.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.specs.spec import Spec
+
+MAX_RANGES = 6
+"""Results whose range a short page shows."""
+
+NO_INFLUENCE = 1e-9
+"""Share of a value by which it may change and still counts as the same: rounding of sums leaves as much."""
+
+
+def document_of(
+    spec: Spec,
+    summary: Mapping[str, Any],
+    dimensions: Mapping[str, str],
+    code: ExitCode,
+    files: Written | None = None,
+    reused: int = 0,
+) -> Document:
+    """Return the document of a sweep.
+
+    Parameters
+    ----------
+    spec : Spec
+        What was varied.
+    summary : mapping
+        What metrics.json says of it.
+    dimensions : mapping of str to str
+        Of its metrics, by name.
+    code : ExitCode
+        Of the process.
+    files : Written, optional
+        What was written.
+    reused : int
+        Points that came from the journal.
+    """
+    counts = summary["points"]
+    ends = ", ".join(f"{count} {spaced(name)}" for name, count in counts.items() if name != "total")
+    again = f" ({reused} from the journal)" if reused else ""
+    return Document(
+        exit_code=code,
+        title=" ".join(spec.name.split()),
+        summary=f"{counts['total']} points: {ends}{again}" if counts["total"] else "no point was finished",
+        verdict=_verdict(summary, code),
+        headline=(
+            *(
+                Row(spaced(one["metric"]), f"met at {one['met']} of {one['of']}", within(one), bool(one["ok"]))
+                for one in summary["requirements"]
+            ),
+            *_best(summary, dimensions),
+        ),
+        tables=tuple(_ranges(summary, dimensions)),
+        notes=tuple(_settings(summary)),
+        warnings=tuple(
+            WarningEntry(one["name"], shortened_to_clause(one["message"], SHORT - len(one["name"]) - 2), one["message"])
+            for one in summary["warnings"]
+        ),
+        files=files,
+    )
+
+
+def _verdict(summary: Mapping[str, Any], code: ExitCode) -> str:
+    if code is ExitCode.REQUIREMENT_MISSED:
+        return "no point meets every requirement"
+    if code is not ExitCode.OK:
+        return spaced(str(summary["status"] if code is not ExitCode.INTERRUPTED else "interrupted"))
+    return "requirements can be met" if summary["requirements"] else "complete"
+
+
+def _settings(summary: Mapping[str, Any]) -> Iterator[Note]:
+    """Yield what was varied, at the best point, as options that can be pasted."""
+    if summary["best"]:
+        values = summary["best"]["values"].items()
+        settings = [f"{path}={''.join(str(value).split())}" for path, value in values]
+        yield Note("best", " ".join(f"--set {setting}" for setting in settings), whole=True)
+
+
+def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[Row]:
+    best = summary["best"]
+    if not best:
+        return
+    metric = summary["metrics"][best["by"]]
+    value = _quantity(metric["value"], metric["unit"], dimensions.get(best["by"], ""))
+    tie = f" ({best['ties']} tie)" if best["ties"] > 1 else ""
+    yield Row(f"{best['sense']} {spaced(best['by'])}", f"{value}, point {best['point']}{tie}")
+
+
+def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[Table]:
+    """Yield the range of every result, beside its value at the best point; what does not change comes last."""
+    leading: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
+    constant: list[tuple[str, ...]] = []
+    first = [summary["best"]["by"]] if summary["best"] else []
+    asked = [one["metric"] for one in summary["requirements"]]
+    names = [name for name in dict.fromkeys((*first, *asked, *summary["range"])) if name in summary["range"]]
+    for name in names:
+        one, dimension = summary["range"][name], dimensions.get(name, "")
+        low, high = (_quantity(one[end], one["unit"], dimension) for end in ("min", "max"))
+        at_best = summary["metrics"].get(name, {}).get("value")
+        shown = "" if at_best is None else _quantity(at_best, one["unit"], dimension)
+        if one["max"] - one["min"] <= NO_INFLUENCE * max(abs(one["min"]), abs(one["max"])):
+            row, others = (spaced(name), low, "no influence", shown), constant
+        else:
+            row, others = (spaced(name), low, high, shown), rows
+        (leading if name in (*first, *asked) else others).append(row)
+    if leading or rows:
+        columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in ("from", "to", "best point")))
+        yield Table("", columns, (*leading, *rows), MAX_RANGES)
+    if constant:
+        columns = (GridColumn("no influence on"), GridColumn("value", wraps=False))
+        yield Table("Results without influence", columns, tuple(row[:2] for row in constant), 0)
+
+
+def _quantity(value: float | str, unit: str, dimension: str) -> str:
+    """Return a value in its border unit; of what has none, shares are percentages, counts and factors are not."""
+    if isinstance(value, str):
+        return value
+    if dimension == "ratio":
+        return f"{100 * value:.4g} %"
+    return f"{value:.5g}" if unit == "1" else f"{value:.5g} {unit}"

@@ -1,0 +1,190 @@
+"""What a page consists of, and how a terminal prints it."""
+
+from pathlib import Path
+
+import pytest
+
+import cfmkit
+from cfmkit.cli.output import Terminal
+from cfmkit.documents import sweep_document
+from cfmkit.documents.document import (
+    BLANK,
+    CellGrid,
+    Document,
+    GridColumn,
+    JsonText,
+    Note,
+    Paragraph,
+    Row,
+    Span,
+    Verbatim,
+    WarningEntry,
+    Written,
+    command_line,
+    field,
+    listed,
+    shortened_to_clause,
+    whole_line,
+)
+from cfmkit.documents.terminal import page
+from cfmkit.documents.terminal import printed as printed_blocks
+from cfmkit.errors import ExitCode
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.fixture
+def printed(monkeypatch, capsys):
+    """What a terminal of 40 columns, or as many as are given, prints of blocks."""
+
+    def show(*blocks, width=40):
+        monkeypatch.setenv("COLUMNS", str(width))
+        Terminal().show(*blocks)
+        return capsys.readouterr().out
+
+    return show
+
+
+def test_a_paragraph_stands_in_from_its_word_and_cuts_nothing(printed):
+    path = "/a/" + 50 * "b"
+    assert printed(Paragraph("warning", f"the file {path} is there")) == (
+        f"warning    the file\n           {path}\n           is there\n"
+    )
+    assert printed(Paragraph("first", "")) == "first\n"
+
+
+def test_a_line_that_is_copied_keeps_its_length(printed):
+    assert printed(whole_line("cfmkit analyze ", 60 * "x")) == f"cfmkit analyze {60 * 'x'}\n"
+
+
+def test_a_table_has_heads_only_where_one_says_something(printed):
+    rows = [("a", Span("b"))]
+    assert printed(CellGrid((GridColumn(), GridColumn()), rows)) == "a   b\n"
+    assert printed(CellGrid((GridColumn(""), GridColumn("raw")), rows)) == "    raw\na   b\n"
+
+
+def test_cells_are_folded_and_never_cut(printed):
+    cell = 30 * "abc"
+    assert "".join(printed(CellGrid((GridColumn(),), [(cell,)])).split()) == cell
+    assert "\N{HORIZONTAL ELLIPSIS}" not in printed(CellGrid((GridColumn("", False),) * 2, [(cell, cell)]))
+
+
+def test_records_are_listed_below_their_heading_and_not_at_all_where_there_are_none(printed):
+    assert printed(*listed("units", [{"name": "mm"}], (field("name", ""),))) == "\nunits\n  mm\n"
+    assert list(listed("units", [], (field("name"),))) == []
+
+
+def test_text_and_data_are_printed_as_they_are(printed):
+    assert printed(BLANK, Verbatim("a  \nb"), JsonText({"c": 1})) == '\na  \nb{\n  "c": 1\n}\n'
+
+
+def test_of_each_folder_one_file_is_named_on_a_short_page():
+    written = Written("out/", ("curve.csv", "geometry/a.dxf", "geometry/b.dxf", "figures/l.png", "manifest.json"))
+    assert (written.place, written.names()) == ("out/", ["geometry/{a.dxf,...}", "figures/l.png", "curve.csv"])
+
+
+def test_a_command_line_is_quoted_for_a_shell_and_stays_on_one_line():
+    assert command_line("cfmkit", "new", "a b", "c\nd") == "cfmkit new 'a b' $'c\\x0ad'"
+
+
+def page_of(document, width=100, everything=False):
+    """Return the page of a document as lines."""
+    return printed_blocks(page(document, width, everything), width).split("\n")[:-1]
+
+
+def many(count, **more):
+    """Return a document with so many requirements, facts, notes and warnings."""
+    text = "the roller of 16 mm is larger than the path's smallest radius of curvature (10.3 mm): it runs on a corner"
+    return Document(
+        title="a-name",
+        summary="20.1 N over 10 mm (2.3 to 12.3 mm)",
+        verdict=f"all {count} requirements met",
+        headline=(
+            *(Row(f"metric {k}", "1.234 %", "<= 5 %", True) for k in range(count)),
+            *(Row(f"fact {k}", "12.34 mm (1.2 to 12.3 mm)") for k in range(9)),
+        ),
+        notes=(Note("yield", "about 14 % of parts would meet the requirements: " + 30 * "word " + "end"),),
+        warnings=tuple(
+            WarningEntry(f"finding_{k}", text, text, ("--set mechanism.roller_radius=10mm",), ("cfmkit analyze x",))
+            for k in range(count)
+        ),
+        files=Written("cfm-out/a-long-name-of-a-folder-analyze", tuple(f"file{k}.csv" for k in range(12))),
+        **more,
+    )
+
+
+@pytest.mark.parametrize("width", [80, 100])
+@pytest.mark.parametrize("count", [0, 1, 4, 8, 30])
+def test_a_short_page_has_at_most_15_lines_whatever_there_is_to_say(count, width):
+    lines = page_of(many(count), width)
+    assert len(lines) <= 15
+    assert max(map(len, lines)) <= width
+    assert lines[0].startswith("a-name   20.1 N over 10 mm")
+    assert "cfm-out/a-long-name-of-a-folder-analyze/" in "\n".join(lines)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 100])
+def test_no_word_of_a_page_is_broken(width):
+    document = many(3)
+    words = set(" ".join(page_of(document, 10_000, everything=True)).split())
+    words |= {
+        "--set",
+        "mechanism.roller_radius=10mm",
+        "...",
+        "-v:",
+        "all",
+        "warnings",
+        "3",
+        "and",
+        "2",
+        "more",
+        "(-v):",
+    }
+    assert set(" ".join(page_of(document, width)).split()) - words - {f"finding_{k}," for k in range(3)} == set()
+
+
+def test_requirements_stand_beside_what_else_matters_and_a_remedy_at_the_end_of_its_warning():
+    lines = page_of(many(3))
+    assert lines[1].split()[:6] == ["metric", "0", "1.234", "%", "<=", "5"]
+    assert "fact 0" in lines[1]
+    assert [line for line in lines if line.endswith("   --set mechanism.roller_radius=10mm")]
+
+
+def test_with_v_every_text_warning_and_file_is_there():
+    text = " ".join(" ".join(page_of(many(3), everything=True)).split())
+    assert "it runs on a corner" in text
+    assert "word word end" in text
+    assert text.count("cfmkit analyze x") == 3
+    assert "file11.csv" in text
+
+
+def test_why_a_run_has_no_result_is_told_in_full():
+    message = "no mechanism meets the targets: " + 20 * "reason " + "end"
+    document = Document(title="a", verdict="infeasible", notes=(Note("failed", message, whole=True),))
+    assert " ".join(" ".join(page_of(document, 60)).split()).endswith("reason end")
+
+
+@pytest.mark.parametrize(
+    ("text", "limit", "shown"),
+    [
+        ("short enough", 20, "short enough"),
+        ("the first clause ends here (1 mm); the second is long", 40, "the first clause ends here (1 mm)"),
+        ("a clause without any: another one has 6.7 % in it, and more", 36, "another one has 6.7 % in it"),
+        ("b1 and b2 were turned to fit: b1 -0.85 deg and b2 0.2 deg", 40, "b1 and b2 were turned to fit"),
+        ("one very long clause that has no end at all in it", 30, "one very long clause that ..."),
+    ],
+)
+def test_a_warning_is_cut_where_a_clause_ends_and_keeps_its_number(text, limit, shown):
+    assert shortened_to_clause(text, limit) == shown
+
+
+def test_what_a_sweep_does_not_change_has_no_influence_and_ties_are_counted():
+    spec = cfmkit.load(CONFIGS / "cam.yaml")
+    study = cfmkit.sweep(
+        spec, vary={"mechanism.roller_radius": "8 mm:16 mm:3"}, metrics=["force_ripple", "usable_stroke"]
+    )
+    dimensions = {"force_ripple": "ratio", "usable_stroke": "length"}
+    lines = page_of(sweep_document.document_of(spec, study.summary, dimensions, ExitCode.OK))
+    assert any(line.split()[:2] == ["force", "ripple"] and "no influence" in line for line in lines)
+    assert any(line.split()[:2] == ["usable", "stroke"] and "no influence" not in line for line in lines)
+    assert any("point 1 (3 tie)" in line for line in lines)
