@@ -16,9 +16,10 @@ from cfmkit.families.run_control import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.specs.units import Share
 from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
-from cfmkit.studies.yield_of_drawn_parts import _without, common, judge, yields_of
 
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 
@@ -76,12 +77,12 @@ def test_an_analysis_does_not_judge_a_yield():
 def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
     spec = cam(samples=100)
     result = cfmkit.analyze(spec)
-    made = tolerances_of(spec, spec.design, 0)
-    assert common(made, result, Run()) == (0,)
-    values = made.drawn()
-    judged = judge(made, values, result, Run())
+    made = Parts.of_design(spec, spec.design, 0)
+    assert common_errors(made, result, Run()) == (0,)
+    values = made.draw()
+    judged = analyze_parts(made, values, result, Run())
     values[:, 0] = made.nominal[0]
-    still = judge(made, values, result, Run())
+    still = analyze_parts(made, values, result, Run())
     # without a weight the force is proportional to the stiffness: the trim is the same as no error
     assert judged.share(judged.trimmed).good == still.share().good > judged.share().good
 
@@ -94,17 +95,17 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
     spec = cam(tolerances=scatter, samples=30).replace({**built, "analysis.points": 31, "requirements": (limits,)})
     spec = designed(spec, Run()).design.spec
     result = cfmkit.analyze(spec)
-    made = tolerances_of(spec, spec.design, 0)
-    judged = judge(made, made.drawn(), result, Run())
+    made = Parts.of_design(spec, spec.design, 0)
+    judged = analyze_parts(made, made.draw(), result, Run())
     assert judged.share(judged.trimmed).good == judged.share().good == 30
 
 
 def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_that_of_the_design():
     tolerances = {f"mechanism.springs.{name}": {"normal": "5 %"} for name in ("pivot", "crank_pin", "slider_pin")}
     spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.tolerances": tolerances})
-    made = tolerances_of(spec, spec.design, 0)
-    values = made.drawn(40)
-    judged = judge(made, values, cfmkit.analyze(spec), Run())
+    made = Parts.of_design(spec, spec.design, 0)
+    values = made.draw(40)
+    judged = analyze_parts(made, values, cfmkit.analyze(spec), Run())
     goods = []
     for row in values:
         part = cfmkit.analyze(spec.replace(dict(zip(made.paths, row.tolist(), strict=True)), as_made=True)).curve
@@ -117,9 +118,9 @@ def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_
 def test_parts_without_a_result_are_bad_and_counted():
     spec = cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
     result = cfmkit.analyze(spec)
-    made = tolerances_of(spec, spec.design, 0)
+    made = Parts.of_design(spec, spec.design, 0)
     values = np.array([[made.nominal[0]], [-0.01]])
-    judged = judge(made, values, result, Run())
+    judged = analyze_parts(made, values, result, Run())
     assert judged.failed.tolist() == [False, True]
     assert (judged.share().good, judged.share().failed, judged.share().count) == (1, 1, 2)
     assert "rest_half_width" in judged.why
@@ -165,30 +166,13 @@ def test_a_look_at_metrics_alone_leaves_out_the_rest_and_changes_none_of_them(na
     assert full.key(()) != lean.key(())
 
 
-def test_parts_without_an_error_of_the_modulus_follow_from_those_with_it():
-    """Force and stress go with the modulus: a third of all parts had been analysed again to say so."""
-    spec = cfmkit.load("configs/studies/beam_lan2010_yield.yaml")
-    nominal, made = family("beam").analyze(spec, Run()), tolerances_of(spec, spec.design, 0)
-    modulus = made.paths.index("mechanism.material.youngs_modulus")
-    values = made.drawn(12, 5)
-    values[:, modulus] *= np.linspace(0.8, 1.2, 12)
-    judged = judge(made, values, nominal, Run())
-    without = values.copy()
-    without[:, modulus] = made.nominal[modulus]
-    found, solved = _without(made, (modulus,), values, judged, nominal, Run()), judge(made, without, nominal, Run())
-    assert (found.met == solved.met).all()
-    assert (found.met != judged.met).any()
-    # the force does not go with one beam's thickness
-    assert _without(made, (0,), values, judged, nominal, Run()) is None
-
-
 def test_a_trim_by_the_force_of_one_branch_leaves_the_perfect_part_as_it_is():
     """Ends of the force had been those of both branches: "0 % after a trim", where a tenth was good before it."""
     requirement = {"metric": "deviation_from_target[load]", "max": "3 %", "over": ("3 mm", "35 mm")}
     spec = cfmkit.design("configs/slider_crank_friction.yaml").spec.replace({"requirements": (requirement,)})
     spec = spec.replace({"design.tolerances": {"mechanism.unloaded_angle": {"normal": "0.3 deg"}}})
-    nominal, made = family("slider-crank").analyze(spec, Run()), tolerances_of(spec, spec.design, 0)
-    judged = judge(made, np.array([made.nominal] * 2), nominal, Run())
+    nominal, made = family("slider-crank").analyze(spec, Run()), Parts.of_design(spec, spec.design, 0)
+    judged = analyze_parts(made, np.array([made.nominal] * 2), nominal, Run())
     assert judged.met.all()
     assert judged.trimmed.all()
 

@@ -7,7 +7,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.results import OLD_KEY
-from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances_of
+from cfmkit.studies.parts.assumed_errors import assumed
+from cfmkit.studies.parts.parts import Parts
 
 
 def warned(spec):
@@ -21,11 +22,11 @@ def test_tolerances_of_a_search_of_shapes_are_tolerances_of_the_design():
     shape = [f"mechanism.beams.s.shape.coefficients.{k}" for k in (1, 2, 3)]
     reported = {path: {"normal": "0.01 rad"} for path in shape[: len(spec.mechanism.beams["s"].shape.coefficients) - 1]}
     by_new = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}} | reported})
-    found, wanted = (tolerances_of(one, one.design, 0) for one in (by_old, by_new))
+    found, wanted = (Parts.of_design(one, one.design, 0) for one in (by_old, by_new))
     stated = [{one.path: one.spread.deviation for one in each.parameters} for each in (found, wanted)]
     assert stated[0] == pytest.approx(stated[1])
     assert (found.samples, wanted.samples) == (30, 400)
-    assert tolerances_of(spec, spec.design, 0) is None
+    assert Parts.of_design(spec, spec.design, 0) is None
     assert OLD_KEY not in warned(by_new)
     message = warned(by_old)[OLD_KEY]
     assert "'design.optimise.tolerances' is the old name of 'design.tolerances'" in message
@@ -39,7 +40,7 @@ def test_the_tolerances_of_a_design_count_where_both_are_given():
             "design.tolerances": {"mechanism.thickness": {"normal": "0.01 mm"}},
         }
     )
-    assert tolerances_of(spec, spec.design, 0).paths == ("mechanism.thickness",)
+    assert Parts.of_design(spec, spec.design, 0).paths == ("mechanism.thickness",)
 
 
 def test_the_process_of_a_printed_slider_crank_is_that_of_its_part():
@@ -62,9 +63,9 @@ def test_the_process_of_a_part_is_what_it_is_assumed_to_be_made_by_and_its_own_v
     assert assumed(own).deviations == {"mechanism.beam.offset": pytest.approx(7e-6)}
     assert assumed(own).process.least_feature == assumed(named).process.least_feature
     # it says how parts are made where their yield is asked for, and judges no parts otherwise
-    assert tolerances_of(own, own.design, 0) is None
+    assert Parts.of_design(own, own.design, 0) is None
     asked = own.replace({"design.yield": 0.9})
-    assert tolerances_of(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
+    assert Parts.of_design(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
 
 
 def test_a_process_that_is_none_is_refused():
@@ -83,7 +84,7 @@ def test_a_requirement_on_the_yield_is_content_with_tolerances_under_an_old_name
     asked = "requirements=[{metric: stress_max, max: 42.5 MPa}, {metric: yield, min: 40 %}]"
     file = f"configs/{name}.yaml"
     spec = cfmkit.load(file, [*OLD_TOLERANCES[name], asked])
-    made = tolerances_of(spec, spec.design, 0)
+    made = Parts.of_design(spec, spec.design, 0)
     assert made.paths
     unsaid = OLD_TOLERANCES[name][:-1]
     with pytest.raises(SpecError, match=r"state their tolerances in 'design\.tolerances'"):

@@ -11,10 +11,11 @@ from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.studies import requirement_constraints
-from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances, tolerances_of
-from cfmkit.studies.yield_by_assumed_tolerances import expected, first_order_shares
-from cfmkit.studies.yield_of_drawn_parts import judge
+from cfmkit.studies.parts import requirement_rows
+from cfmkit.studies.parts.assumed_errors import assumed, tolerances
+from cfmkit.studies.parts.near_parts import expected_shares, expected_yield
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
 
 STRIP = "configs/slider_crank_strip.yaml"
 
@@ -31,12 +32,12 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
-    shares = first_order_shares(result, assumed(spec), Run())
-    made = tolerances_of(spec, spec.design, 0)
+    shares = expected_shares(result, Parts.assumed(spec, 0), Run())
+    made = Parts.of_design(spec, spec.design, 0)
     assert made.paths == ("mechanism.beam.offset",)
-    judged = judge(made, made.drawn(), result, Run()).share()
-    share = shares.good
-    assert share == shares.measured
+    judged = analyze_parts(made, made.draw(), result, Run()).share()
+    share = shares.good.value
+    assert shares.good == shares.measured
     assert not shares.proportional  # no spread of the modulus is stated
     assert abs(share - judged.value) < 3 * (share * (1 - share) / judged.count) ** 0.5 + 0.02
 
@@ -47,7 +48,7 @@ def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     found = assumed(spec)
     assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))
-    reported = expected(cfmkit.analyze(spec), Run())
+    reported = expected_yield(cfmkit.analyze(spec), Run())
     assert "assumed" in reported
     assert "once the modulus is measured" in reported
     assert "design.process=fdm" in reported
@@ -95,7 +96,7 @@ def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
     )
     result = cfmkit.analyze(spec)
     record, solved, looked = family(spec.family), [], []
-    analyze, sampled = record.analyze, requirement_constraints.function_named(record.sampled)
+    analyze, sampled = record.analyze, requirement_rows.function_named(record.sampled)
 
     def analysed(part, run):
         solved.append(part)
@@ -106,9 +107,9 @@ def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
         return sampled(part, places)
 
     changed = SimpleNamespace(analyze=analysed, sampled=record.sampled)
-    monkeypatch.setattr(requirement_constraints, "family", lambda _name: changed)
-    monkeypatch.setattr(requirement_constraints, "function_named", lambda _name: seen)
-    first_order_shares(result, assumed(spec), Run())
+    monkeypatch.setattr(requirement_rows, "family", lambda _name: changed)
+    monkeypatch.setattr(requirement_rows, "function_named", lambda _name: seen)
+    expected_shares(result, Parts.assumed(spec, 0), Run())
     nominal = spec.mechanism.model_dump()
     assert sum(part.mechanism.model_dump() == nominal for part in looked) == 1
     again = [part for part in solved if part.mechanism.model_dump() == nominal]

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
+    from cfmkit.studies.parts.share import Share
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
 PLACE = 24
@@ -193,7 +193,7 @@ def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
     cfmkit.errors.SpecError
         If the block is not valid with it.
     """
-    from cfmkit.studies.sensitivity.parameters import with_options
+    from cfmkit.studies.parts.uncertain_values import with_options
 
     changes = changes_of(options)
     if not changes or (spec.sensitivity is None and "parameters" not in changes):
@@ -292,7 +292,7 @@ def _page(found: Findings, written: Written, everything: bool) -> Iterator[Block
     yield written.block(everything)
 
 
-def _yields(found: Findings, share: Yield) -> CellGrid:
+def _yields(found: Findings, share: Share) -> CellGrid:
     from cfmkit.studies.sensitivity.output import by_interval, yield_ok
 
     wanted = found.setup.block.min_yield
@@ -307,7 +307,7 @@ def _yields(found: Findings, share: Yield) -> CellGrid:
     return CellGrid(columns(True, True, True, True), rows)
 
 
-def _share(one: Yield) -> str:
+def _share(one: Share) -> str:
     if one.value != one.value:
         return f"not stated: {one.failed} of {one.count} parts have no result"
     low, high = (f"{100 * end:.1f}" for end in one.wilson)

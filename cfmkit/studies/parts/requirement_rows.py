@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
+from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE, Sampled, function_named
 from cfmkit.metrics import check, split_name, window_of
@@ -22,7 +23,7 @@ from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
@@ -52,6 +53,15 @@ class RequirementRows:
     constant: FloatArray
     metrics: tuple[Metric, ...]  # those that are numbers of their own: the last ones
     about: tuple[int, ...]  # to which requirement each row belongs
+
+    @property
+    def efforts(self) -> int:
+        """How many of the numbers, the first ones, are efforts."""
+        return len(self.branches) * len(self.places)
+
+    def limits(self, numbers: FloatArray) -> FloatArray:
+        """Return what parts with numbers (..., q) leave of each limit, (..., m)."""
+        return np.asarray(numbers @ self.matrix.T + self.constant)
 
 
 class _RowsOfMargins:
@@ -265,6 +275,13 @@ def places_of(nominal: Result) -> FloatArray:
     return np.asarray(places[near])
 
 
+def requirement_rows(nominal: Result, spec: Spec, run: Run) -> RequirementRows | None:
+    """Return the requirements on a specification, whose result is known; None if it is not followed at a few poses."""
+    places = places_of(nominal)
+    first = sampled_of(spec, places, run)
+    return None if first is None else rows_of(nominal, first, places)
+
+
 def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementRows:
     """Return the requirements on a result as rows of what is seen of its parts."""
     builder = _RowsOfMargins(nominal, places, first)
@@ -327,31 +344,31 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float
         found = sampled_on_curves(result, rows.places, reached)
     if not _has_columns(found, rows):
         return None
-    numbers = [numbers_in(found)]
-    if rows.metrics:
-        metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
-        if metrics is None:
-            return None
-        numbers.append(metrics)
-    return np.concatenate(numbers)
+    if not rows.metrics:
+        return numbers_in(found)
+    metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
+    return None if metrics is None else np.concatenate([numbers_in(found), metrics])
 
 
 def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:
-    """Return `numbers_of` a part that was analysed and looked at the quick way already: nothing is solved again.
+    """Return `numbers_of` a part whose analysis is known: nothing is solved again; stated windows must be reached.
 
-    Parameters
-    ----------
-    result : Result
-        Its analysis, with all metrics.
-    quick : Sampled or None
-        From `quickly_sampled`, at the places of the rows; None of a family without a quick way.
-    rows : RequirementRows
-        What is looked at; windows that are stated in its specification must be reached.
+    `quick`: what `quickly_sampled` says of it at the places of the rows; None of a family without a quick way.
     """
     found = sampled_on_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
     if not _has_columns(found, rows):
         return None
     return np.concatenate([numbers_in(found), metrics_in(result, rows)]) if rows.metrics else numbers_in(found)
+
+
+def exact_derivatives(spec: Spec, places: FloatArray, paths: Sequence[str]) -> dict[str, Sampled]:
+    """Return the derivatives of effort and stress at places, by those values of a design by which they are known."""
+    name = family(spec.family).sampled_slopes
+    try:
+        found = None if name is None else function_named(name)(spec, places, tuple(paths))
+    except CfmError:
+        return {}
+    return {} if found is None else dict(found.by)
 
 
 def _has_columns(found: Sampled | None, rows: RequirementRows) -> TypeGuard[Sampled]:
