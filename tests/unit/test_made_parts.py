@@ -14,13 +14,16 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import analysed, designed
-from cfmkit.specs.units import Share
+from cfmkit.specs.units import Share as TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
 from cfmkit.studies.parts.outcomes import analyze_parts
 from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.share import Share, clopper_pearson
 from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.sensitivity.setup import prepare
 
+MODULUS = "mechanism.material.youngs_modulus"
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 
 
@@ -61,7 +64,7 @@ def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says
     assert count == 40 - found.after.good > 10
     assert "the window 2 ... 240 mm is not within the curve" in reason
     assert f"{count} have no value for a requirement and count as bad (the first: " in found.sentence()
-    shares = [one.model_copy(update={"over": (Share(0.02), Share(1.0))}) for one in design.requirements[:2]]
+    shares = [one.model_copy(update={"over": (TravelShare(0.02), TravelShare(1.0))}) for one in design.requirements[:2]]
     of_each = design.replace({"requirements": tuple(shares), "analysis.window": None})
     found = yields_of(replace(cfmkit.analyze(of_each), spec=of_each), None, Run())
     assert (found.lacking, found.after.good) == ((0, ""), 40)
@@ -207,3 +210,47 @@ def test_a_yield_of_a_part_that_errs_nowhere_is_refused_and_never_met():
     assert "err by its process" in found.requirements[1].sentence
     assert int(found.exit_code) == 5
     assert "err by its process" in dict(found.design.notes)["margins"]
+
+
+def test_parts_without_common_errors_are_analysed_themselves():
+    """They had been followed from those with such errors, which held for some parts and not for others."""
+    spec = cfmkit.load("configs/vcfm_pla.yaml")
+    tolerances = {"mechanism.bistable.thickness": {"normal": "0.01 mm"}, MODULUS: {"normal": "3 %"}}
+    spec = spec.replace({"design.tolerances": tolerances, "design.samples": 60})
+    nominal = cfmkit.analyze(spec)
+    found, parts = yields_of(nominal, None, Run()), Parts.of_design(spec, spec.design, 0)
+    assert found.common == (MODULUS,)
+    values = parts.draw()
+    values[:, parts.paths.index(MODULUS)] = spec.at(MODULUS)
+    singly = [cfmkit.analyze(parts.part(one)) for one in values]
+    good = sum(all(outcome.ok for outcome in cfmkit.check(one)) for one in singly)
+    assert found.frozen.good == good != found.after.good
+
+
+def test_the_estimate_and_the_test_plan_draw_the_parts_that_a_study_draws():
+    """Each had a generator of its own: three different sets of parts for one design and one seed."""
+    spec = cfmkit.load("configs/vcfm_pla.yaml")
+    block = {"method": "tolerance", "parameters": {"mechanism.bistable.thickness": {"normal": "0.05 mm"}}, "samples": 5}
+    setup = prepare(spec.replace({"sensitivity": block}), seed=3)
+    stated = spec.replace({"design.tolerances": {"mechanism.bistable.thickness": {"normal": "0.05 mm"}}})
+    parts, whence = Parts.expected(stated, 3)
+    assert whence == "within design.tolerances"
+    assert parts.draw(5).tolist() == setup.parts.draw().tolist()
+    assumed = Parts.assumed(spec, 3)
+    at = assumed.paths.index("mechanism.bistable.thickness")
+    assert assumed.parameters[at].spread.deviation == pytest.approx(3e-5)  # what a laser is assumed to hold
+
+
+@pytest.mark.parametrize(
+    ("fate", "value", "ends"), [("bad", 0.5, (0.5, 0.5)), ("unknown", None, None), ("either", 0.6, (0.5, 0.7))]
+)
+def test_a_share_says_what_failed_parts_count_as(fate, value, ends):
+    share = Share.of(np.arange(10) < 5, np.arange(10) >= 8, fate)
+    assert (share.good, share.failed, share.count) == (5, 2, 10)
+    found = share.as_json()
+    assert found["value"] == value
+    if value is None:
+        assert found["wilson"] == found["clopper_pearson"] == [None, None]
+        return
+    assert share.ends == ends
+    assert found["clopper_pearson"] == [clopper_pearson(5, 10)[0], clopper_pearson(round(10 * ends[1]), 10)[1]]
