@@ -14,6 +14,7 @@ import pytest
 import cfmkit
 from cfmkit.cli.github_annotations import workflow_commands
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.metrics.compare import MetricChange
 from cfmkit.runs.batch_output_files import page, plain, summary
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_sources_and_outcomes import (
@@ -28,7 +29,7 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, MetricChange, changes_table
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, changes_table
 from cfmkit.tables import to_csv
 
 
