@@ -16,6 +16,7 @@ The allocated set is then drawn and analysed part by part: the yield that is rep
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError, SolutionError
 from cfmkit.families.run_control import Run
-from cfmkit.studies.parts.requirement_rows import numbers_of, requirement_rows
+from cfmkit.studies.parts.requirement_rows import numbers_of, numbers_of_parts, requirement_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,14 +90,13 @@ def limits_along_errors(
         raise SolutionError("the specification cannot be followed at a few poses: no tolerance can be stated")
     found = []
     for one, factor in zip(parts.parameters, factors.tolist(), strict=True):
-        known, tight = {}, one.spread.tightened(factor)
+        tight, near = one.spread.tightened(factor), {}
         for offset in (factor * ERRORS_TRIED * one.spread.standard_deviation).tolist():
             there = one.spread.nominal + offset
             if offset and tight.low <= there <= tight.high:
-                try:
-                    known[offset] = numbers_of(spec.replace({one.path: there}), rows, run)
-                except CfmError:
-                    continue
+                with suppress(CfmError):
+                    near[offset] = spec.replace({one.path: there})
+        known = dict(zip(near, numbers_of_parts(list(near.values()), rows, run), strict=True))
         moved = {offset: numbers - middle for offset, numbers in sorted(known.items()) if numbers is not None}
         if not moved:
             raise SolutionError(

@@ -39,6 +39,7 @@ from cfmkit.studies.parts.requirement_rows import (
     exact_derivatives,
     numbers_in,
     numbers_of,
+    numbers_of_parts,
     requirement_rows,
     sampled_of,
     stated_places,
@@ -48,6 +49,8 @@ from cfmkit.studies.variable_paths import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.specs.spec import Spec
@@ -99,17 +102,26 @@ class PartNumbers:
                 changes[path] = changes.get(path, at) + error
         return parts.spec.replace(changes, as_made=bool(errors.any()))
 
-    def __call__(self, x: FloatArray, errors: FloatArray, reached: tuple[float, ...] = ()) -> FloatArray | None:
-        """Return the numbers of a part; None if it has none, or ends before what must be reached."""
+    def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
+        """Return the numbers of a part; None if it has none."""
         try:
-            return numbers_of(self.variant(x, errors), self.rows, self.run, reached)
+            return numbers_of(self.variant(x, errors), self.rows, self.run)
         except CfmError:
             return None
 
-    def is_good(self, x: FloatArray, errors: FloatArray) -> bool:
-        """Return whether a part keeps every row, over all of the windows."""
-        numbers = self(x, errors, stated_places(self.parts.spec))
-        return numbers is not None and bool((self.rows.limits(numbers) >= 0).all())
+    def are_good(self, x: FloatArray, errors: FloatArray) -> NDArray[np.bool_]:
+        """Return which parts with errors (k, d) keep every row, over all of the windows, (k,); each is solved."""
+        parts = {k: part for k, one in enumerate(errors) if (part := self._valid(x, one)) is not None}
+        reached, good = stated_places(self.parts.spec), np.zeros(len(errors), dtype=bool)
+        for k, numbers in zip(parts, numbers_of_parts(list(parts.values()), self.rows, self.run, reached), strict=True):
+            good[k] = numbers is not None and bool((self.rows.limits(numbers) >= 0).all())
+        return good
+
+    def _valid(self, x: FloatArray, errors: FloatArray) -> Spec | None:
+        try:
+            return self.variant(x, errors)
+        except CfmError:
+            return None
 
     def slopes(self, x: FloatArray, errors: FloatArray) -> PartSlopes | None:
         """Return the exact derivatives of the numbers of a part, as far as its family knows them; None of none."""
@@ -127,7 +139,7 @@ class PartNumbers:
 
     def checked(self, x: FloatArray) -> int:
         """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
-        return sum(self.is_good(x, one) for one in self._fresh_errors)
+        return int(self.are_good(x, self._fresh_errors).sum())
 
     @cached_property
     def _fresh_errors(self) -> FloatArray:

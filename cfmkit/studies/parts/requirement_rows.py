@@ -21,12 +21,14 @@ from cfmkit.results import Status
 from cfmkit.specs.units import Share
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.variants_in_rows import SolvedVariants
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
+    from cfmkit.metrics.metrics_of_rows import CurveRows
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric
@@ -348,6 +350,69 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float
         return numbers_in(found)
     metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
     return None if metrics is None else np.concatenate([numbers_in(found), metrics])
+
+
+def numbers_of_parts(
+    parts: Sequence[Spec], rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()
+) -> list[FloatArray | None]:
+    """Return `numbers_of` many parts, as rows of one solution where the family has them; None of an invalid part."""
+    found = _numbers_in_rows(parts, rows, reached)
+
+    def alone(part: Spec) -> FloatArray | None:
+        try:
+            return numbers_of(part, rows, run, reached)
+        except CfmError:
+            return None
+
+    return [found[k] if k in found else alone(part) for k, part in enumerate(parts)]
+
+
+def _numbers_in_rows(
+    parts: Sequence[Spec], rows: RequirementRows, reached: tuple[float, ...]
+) -> dict[int, FloatArray | None]:
+    """Return the numbers of those parts that are solved together and have complete curves."""
+    found: dict[int, FloatArray | None] = {}
+    solve = family(parts[0].family).rows if len(parts) else None
+    if solve is None:
+        return found
+    study = Study(parts[0].model_copy(update={"requirements": ()}), (), rows.metrics, lean=True)
+    try:
+        for members, solved in solve(parts):
+            known = SolvedVariants(study, [parts[k] for k in members], solved)
+            if tuple(solved.branches) != rows.branches or not known.known:
+                continue
+            numbers = _looked_up(solved.branches, rows, known)
+            if numbers is None:
+                continue
+            good = known.usable & np.isfinite(numbers).all(axis=1)
+            ends = [curves.extent for curves in solved.branches.values()]
+            slack = 1e-9 * float(rows.places[-1] - rows.places[0])
+            for row, k in enumerate(np.asarray(members).tolist()):
+                if good[row]:
+                    spans = [(low[row] - slack, high[row] + slack) for low, high in ends]
+                    there = all(low <= place <= high for place in reached for low, high in spans)
+                    found[k] = numbers[row] if there else None
+    except CfmError:  # each part says by itself what is wrong with it
+        return {}
+    return found
+
+
+def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, known: SolvedVariants) -> FloatArray | None:
+    """Return the numbers of each row of a solution, (m, q); None if it has other stresses than the rows look at."""
+    columns, stresses = [], []
+    for curves in branches.values():
+        low, high = curves.extent
+        places = np.clip(np.broadcast_to(rows.places, (len(low), len(rows.places))), low[:, None], high[:, None])
+        with np.errstate(all="ignore"):
+            columns.append(curves.all_at(places))
+        if curves.stress is not None:
+            # between the points of its curve, as of a part alone
+            points = curves.stress.samples[0]
+            each = zip(points.motion, points.values, points.count.tolist(), strict=True)
+            stresses.append([np.interp(rows.places, motion[:n], values[:n]) for motion, values, n in each])
+    if len(stresses) != rows.stresses:
+        return None
+    return np.hstack([*columns, *map(np.array, stresses), known.rows().values])
 
 
 def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:
