@@ -410,8 +410,11 @@ def test_parts_that_are_solved_as_rows_have_the_numbers_of_each_part_alone(name)
     """Parts whose yield is designed for were analysed one by one: a vcfm's took ten times as long."""
     result = cfmkit.analyze(f"configs/{name}.yaml")
     rows, parts = requirement_rows(result, result.spec, Run()), Parts.assumed(result.spec, 0)
-    made = [parts.part(values) for values in parts.draw(6)]
-    together = numbers_of_parts(made, rows, Run(), stated_places(result.spec))
+    values = parts.draw(6)
+    together = numbers_of_parts(
+        result.spec, dict(zip(parts.paths, values.T, strict=True)), rows, Run(), stated_places(result.spec)
+    )
+    made = [parts.part(one) for one in values]
     for numbers, part in zip(together, made, strict=True):
         alone = numbers_of(part, rows, Run(), stated_places(result.spec))
         assert (numbers is None) == (alone is None)

@@ -16,13 +16,12 @@ The allocated set is then drawn and analysed part by part: the yield that is rep
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.errors import CfmError, SolutionError
+from cfmkit.errors import SolutionError
 from cfmkit.families.run_control import Run
 from cfmkit.studies.parts.requirement_rows import numbers_of, numbers_of_parts, requirement_rows
 
@@ -90,13 +89,12 @@ def limits_along_errors(
         raise SolutionError("the specification cannot be followed at a few poses: no tolerance can be stated")
     found = []
     for one, factor in zip(parts.parameters, factors.tolist(), strict=True):
-        tight, near = one.spread.tightened(factor), {}
-        for offset in (factor * ERRORS_TRIED * one.spread.standard_deviation).tolist():
-            there = one.spread.nominal + offset
-            if offset and tight.low <= there <= tight.high:
-                with suppress(CfmError):
-                    near[offset] = spec.replace({one.path: there})
-        known = dict(zip(near, numbers_of_parts(list(near.values()), rows, run), strict=True))
+        tight = one.spread.tightened(factor)
+        offsets = factor * ERRORS_TRIED * one.spread.standard_deviation
+        there = one.spread.nominal + offsets
+        tried = (offsets != 0.0) & (tight.low <= there) & (there <= tight.high)
+        near = numbers_of_parts(spec, {one.path: there[tried]}, rows, run)
+        known = dict(zip(offsets[tried].tolist(), near, strict=True))
         moved = {offset: numbers - middle for offset, numbers in sorted(known.items()) if numbers is not None}
         if not moved:
             raise SolutionError(

@@ -111,17 +111,11 @@ class PartNumbers:
 
     def are_good(self, x: FloatArray, errors: FloatArray) -> NDArray[np.bool_]:
         """Return which parts with errors (k, d) keep every row, over all of the windows, (k,); each is solved."""
-        parts = {k: part for k, one in enumerate(errors) if (part := self._valid(x, one)) is not None}
-        reached, good = stated_places(self.parts.spec), np.zeros(len(errors), dtype=bool)
-        for k, numbers in zip(parts, numbers_of_parts(list(parts.values()), self.rows, self.run, reached), strict=True):
-            good[k] = numbers is not None and bool((self.rows.limits(numbers) >= 0).all())
-        return good
-
-    def _valid(self, x: FloatArray, errors: FloatArray) -> Spec | None:
-        try:
-            return self.variant(x, errors)
-        except CfmError:
-            return None
+        design = self.variant(x, np.zeros(errors.shape[1]))
+        middle = np.array([float(design.at(path)) for path in self.parts.paths])
+        values = dict(zip(self.parts.paths, (middle + errors).T, strict=True))
+        found = numbers_of_parts(design, values, self.rows, self.run, stated_places(self.parts.spec))
+        return np.array([one is not None and (self.rows.limits(one) >= 0).all() for one in found], dtype=bool)
 
     def slopes(self, x: FloatArray, errors: FloatArray) -> PartSlopes | None:
         """Return the exact derivatives of the numbers of a part, as far as its family knows them; None of none."""

@@ -6,6 +6,7 @@ or of the stress, at the poses of its window do. Any other metric is a number of
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeGuard
@@ -25,6 +26,8 @@ from cfmkit.studies.variants_in_rows import SolvedVariants
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
@@ -353,48 +356,64 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float
 
 
 def numbers_of_parts(
-    parts: Sequence[Spec], rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()
+    spec: Spec, values: Mapping[str, FloatArray], rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()
 ) -> list[FloatArray | None]:
-    """Return `numbers_of` many parts, as rows of one solution where the family has them; None of an invalid part."""
+    """Return `numbers_of` many parts, as rows of one solution where the family has them; None of an invalid part.
+
+    `values`: dotted path -> values of the parts, (k,) [SI].
+    """
+    parts: dict[int, Spec] = {}
+    columns = {path: column.tolist() for path, column in values.items()}
+    for k in range(min(map(len, columns.values()), default=0)):
+        with suppress(CfmError):
+            parts[k] = spec.replace({path: column[k] for path, column in columns.items()}, as_made=True)
     found = _numbers_in_rows(parts, rows, reached)
 
-    def alone(part: Spec) -> FloatArray | None:
+    def alone(k: int) -> FloatArray | None:
         try:
-            return numbers_of(part, rows, run, reached)
+            return numbers_of(parts[k], rows, run, reached) if k in parts else None
         except CfmError:
             return None
 
-    return [found[k] if k in found else alone(part) for k, part in enumerate(parts)]
+    return [found[k] if k in found else alone(k) for k in range(max(map(len, columns.values()), default=0))]
 
 
 def _numbers_in_rows(
-    parts: Sequence[Spec], rows: RequirementRows, reached: tuple[float, ...]
+    parts: Mapping[int, Spec], rows: RequirementRows, reached: tuple[float, ...]
 ) -> dict[int, FloatArray | None]:
     """Return the numbers of those parts that are solved together and have complete curves."""
     found: dict[int, FloatArray | None] = {}
-    solve = family(parts[0].family).rows if len(parts) else None
+    order, specs = np.array(list(parts)), list(parts.values())
+    solve = family(specs[0].family).rows if specs else None
     if solve is None:
         return found
-    study = Study(parts[0].model_copy(update={"requirements": ()}), (), rows.metrics, lean=True)
+    study = Study(specs[0].model_copy(update={"requirements": ()}), (), rows.metrics, lean=True)
     try:
-        for members, solved in solve(parts):
-            known = SolvedVariants(study, [parts[k] for k in members], solved)
+        for members, solved in solve(specs):
+            known = SolvedVariants(study, [specs[k] for k in members], solved)
             if tuple(solved.branches) != rows.branches or not known.known:
                 continue
             numbers = _looked_up(solved.branches, rows, known)
-            if numbers is None:
-                continue
-            good = known.usable & np.isfinite(numbers).all(axis=1)
-            ends = [curves.extent for curves in solved.branches.values()]
-            slack = 1e-9 * float(rows.places[-1] - rows.places[0])
-            for row, k in enumerate(np.asarray(members).tolist()):
-                if good[row]:
-                    spans = [(low[row] - slack, high[row] + slack) for low, high in ends]
-                    there = all(low <= place <= high for place in reached for low, high in spans)
-                    found[k] = numbers[row] if there else None
+            if numbers is not None:
+                good = known.usable & np.isfinite(numbers).all(axis=1)
+                there = _get_to(solved.branches, rows, reached)
+                found |= {
+                    int(order[members[row]]): numbers[row] if there[row] else None for row in np.flatnonzero(good)
+                }
     except CfmError:  # each part says by itself what is wrong with it
         return {}
     return found
+
+
+def _get_to(branches: Mapping[str, CurveRows], rows: RequirementRows, reached: tuple[float, ...]) -> NDArray[np.bool_]:
+    """Return which rows of a solution get to all places that must be reached, on every branch."""
+    slack = 1e-9 * float(rows.places[-1] - rows.places[0])
+    ends = [curves.extent for curves in branches.values()]
+    there = np.ones(len(ends[0][0]), dtype=bool)
+    for low, high in ends:
+        for place in reached:
+            there &= (low - slack <= place) & (place <= high + slack)
+    return there
 
 
 def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, known: SolvedVariants) -> FloatArray | None:
