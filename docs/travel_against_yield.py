@@ -13,15 +13,14 @@ from pathlib import Path
 import cfmkit
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
-from cfmkit.studies.sensitivity.probability_confidence_intervals import clopper_pearson
-from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
-from cfmkit.studies.yield_of_drawn_parts import judge
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "studies" / "slider_crank_strip_yield.yaml"
 TRAVELS = (34.0, 35.0, 36.0, 37.0, 37.25, 37.5, 37.75, 38.0, 39.0)
 """At which the design is made [mm]."""
 
-PARTS, ASKED = 400, 0.99
+N_PARTS, ASKED = 400, 0.99
 
 
 def of_travel(travel: float, asked: float = ASKED) -> cfmkit.Spec:
@@ -44,12 +43,12 @@ def row(travel: float) -> str:
     nominal, mechanism = cfmkit.analyze(found.spec), found.spec.mechanism
     if nominal.status is not Status.COMPLETE:
         return f"| {travel:g} mm | | | | none |"
-    made = tolerances_of(found.spec, found.spec.design, 0)
-    good = judge(made, made.drawn(PARTS), nominal, Run()).share().good
-    low, high = clopper_pearson(good, PARTS)
+    parts = Parts.of_design(found.spec, found.spec.design, 0)
+    share = analyze_parts(parts, parts.draw(N_PARTS), nominal, Run()).share()
+    low, high = share.clopper_pearson
     chosen = f"{1e3 * mechanism.beam.thickness:.4f} mm | {1e3 * mechanism.beam.width:.3f} mm | "
     chosen += f"{mechanism.unloaded_angle:.5f} rad"
-    return f"| {travel:g} mm | {chosen} | {100 * good / PARTS:.3g} % ({100 * low:.3g} to {100 * high:.3g}) |"
+    return f"| {travel:g} mm | {chosen} | {100 * share.value:.3g} % ({100 * low:.3g} to {100 * high:.3g}) |"
 
 
 if __name__ == "__main__":

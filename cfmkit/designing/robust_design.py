@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from cfmkit.designing.conditional_value_at_risk import best_move, tail_risk
+from cfmkit.designing.first_order import SIGMA_STEP, NearParts, differentiate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
 
 STEP = 2e-4
 """Step of a difference by a value of the design, as a share of its range."""
-
-SIGMA_STEP = 0.5
-"""Step of a difference by an error, in standard deviations: so small that its own curvature does not count."""
 
 ASIDE = 0.25
 """An error whose mean exceeds so many standard deviations is one-sided, like a waviness, which is never below zero."""
@@ -131,26 +129,11 @@ class RobustProblem:
 
 
 @dataclass(frozen=True)
-class Linear:
-    """A design to first order."""
+class Linear(NearParts):
+    """Limits of a design and of parts near it, to first order: the numbers are what the limits leave."""
 
-    x: FloatArray  # (n,) its values
-    rows: FloatArray  # (m,) limits of the perfect part
-    by_x: FloatArray  # (m, n) their derivatives by the values
-    by_error: FloatArray  # (m, d) by the errors
-
-    def parts(self, errors: FloatArray) -> FloatArray:
-        """Return the limits of parts, (k, m)."""
-        return np.asarray(self.rows + errors @ self.by_error.T)
-
-    def share(self, errors: FloatArray) -> float:
-        """Return the share of parts that keep every limit, to first order."""
-        return float((self.parts(errors) >= 0).all(axis=1).mean())
-
-    def spread(self, deviations: FloatArray, correlated: FloatArray | None = None) -> FloatArray:
-        """Return the standard deviation of each row, (m,)."""
-        moved = self.by_error if correlated is None else self.by_error @ correlated
-        return np.asarray(np.sqrt(((moved * deviations) ** 2).sum(axis=1)))
+    x: FloatArray  # (n,) values of the design
+    by_x: FloatArray  # (m, n) derivatives of the limits by the values
 
 
 @dataclass(frozen=True)
@@ -193,49 +176,40 @@ def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | No
     if middle is None:
         return None
     known = problem.slopes(x, problem.perfect)
-    no_columns: FloatArray = np.zeros((len(middle), 0))  # nothing may move
-    known_by_x, known_by_error = (None, None) if known is None else (known.by_x, known.by_error)
-    by_x = _by_values(problem, x, problem.perfect, seen, known_by_x) if len(x) else no_columns
-    by_error = _by_errors(problem, x, seen, known_by_error)
+    by_x = _by_values(problem, x, problem.perfect, seen, known)
+    by_error = _by_errors(problem, x, seen, known)
     if by_x is None or by_error is None:
         return None
     matrix = problem.matrix
-    return Linear(x, matrix @ middle + problem.constant, matrix @ by_x, matrix @ by_error)
+    return Linear(matrix @ middle + problem.constant, matrix @ by_error, x, matrix @ by_x)
 
 
 def _by_values(
-    problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart, known: FloatArray | None
+    problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart, known: PartSlopes | None
 ) -> FloatArray | None:
-    """Return the derivatives of the numbers of a part by the values of its design, (q, n); those not known by steps."""
-    columns = []
-    for k, width in enumerate(problem.reach.tolist()):
-        if known is not None and np.isfinite(known[:, k]).all():
-            columns.append(known[:, k])
-            continue
-        low, high = x.copy(), x.copy()
-        low[k] = max(problem.bounds[k, 0], x[k] - STEP * width)
-        high[k] = min(problem.bounds[k, 1], x[k] + STEP * width)
-        ends = seen(high, errors), seen(low, errors)
-        if ends[0] is None or ends[1] is None:
-            return None
-        columns.append((ends[0] - ends[1]) / (high[k] - low[k]))
-    return np.array(columns).T
+    """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
+    if not len(x):  # nothing may move
+        return np.zeros((problem.matrix.shape[1], 0))
+    step = STEP * problem.reach
+    ends = np.column_stack([np.maximum(problem.bounds[:, 0], x - step), np.minimum(problem.bounds[:, 1], x + step)])
+
+    def numbers(k: int, value: float) -> FloatArray | None:
+        moved = x.copy()
+        moved[k] = value
+        return seen(moved, errors)
+
+    return differentiate(numbers, ends, None if known is None else known.by_x)
 
 
-def _by_errors(problem: RobustProblem, x: FloatArray, seen: SeenPart, known: FloatArray | None) -> FloatArray | None:
-    """Return the derivatives of the numbers by the errors, (q, d); those not known at the middle error by steps."""
-    columns = []
-    for k, sigma in enumerate(problem.deviations.tolist()):
-        one = np.arange(len(problem.deviations)) == k
-        if known is not None and np.isfinite(known[:, k]).all() and problem.middle[k] == 0:
-            columns.append(known[:, k])
-            continue
-        step, about = SIGMA_STEP * sigma * one, problem.middle * one
-        ends = [seen(x, about + sign * step) for sign in (1.0, -1.0)]
-        if ends[0] is None or ends[1] is None:
-            return None
-        columns.append((ends[0] - ends[1]) / (2.0 * SIGMA_STEP * sigma))
-    return np.array(columns).T
+def _by_errors(problem: RobustProblem, x: FloatArray, seen: SeenPart, known: PartSlopes | None) -> FloatArray | None:
+    """Return the derivatives of the numbers by the errors, (q, d); exact ones hold for errors about zero only."""
+    step, about = SIGMA_STEP * problem.deviations, problem.middle
+
+    def numbers(k: int, error: float) -> FloatArray | None:
+        return seen(x, np.where(np.arange(len(about)) == k, error, 0.0))
+
+    exact = None if known is None else np.where(about == 0.0, known.by_error, np.nan)
+    return differentiate(numbers, np.column_stack([about - step, about + step]), exact)
 
 
 def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> RobustResult:
@@ -263,11 +237,11 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
     few = problem.errors[:LINEAR_PARTS]
     began = share = now.share(problem.errors)
     best = now
-    best_share, risk, trust, steps = share, tail_risk(now.parts(few) / scale, problem.share), FIRST_TRUST, 0
+    best_share, risk, trust, steps = share, tail_risk(now.numbers(few) / scale, problem.share), FIRST_TRUST, 0
     for _ in range(most):
         if not len(x) or best_share >= min(problem.share + SURE, 1.0) or trust < LEAST_TRUST or problem.late():
             break
-        parts = now.parts(few) / scale
+        parts = now.numbers(few) / scale
         slopes = np.broadcast_to(now.by_x / scale[:, None], (len(few), *now.by_x.shape))
         move = best_move(parts, slopes, problem.share, problem.bounds, now.x, trust)
         if move is None:
@@ -278,7 +252,7 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
             trust *= 0.5
             continue
         next_ = linear(problem, there, seen)
-        new_risk = np.inf if next_ is None else tail_risk(next_.parts(few) / scale, problem.share)
+        new_risk = np.inf if next_ is None else tail_risk(next_.numbers(few) / scale, problem.share)
         if next_ is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
             trust *= 0.5
             continue
@@ -298,7 +272,7 @@ def _risk_at(
     numbers = seen(there, problem.perfect)
     if numbers is None:
         return np.inf
-    return tail_risk(replace(now, rows=seen.rows(numbers)).parts(few) / scale, problem.share)
+    return tail_risk(replace(now, middle=seen.rows(numbers)).numbers(few) / scale, problem.share)
 
 
 def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
@@ -330,8 +304,7 @@ class _Parts:
         """Return the derivatives of those rows by the values, (k, m, n)."""
         out = []
         for error in self.errors:
-            known = self.problem.slopes(x, error)
-            found = _by_values(self.problem, x, error, self.seen, None if known is None else known.by_x)
+            found = _by_values(self.problem, x, error, self.seen, self.problem.slopes(x, error))
             if found is None:
                 return None
             out.append(self.problem.matrix @ found)
@@ -406,6 +379,6 @@ def costliest(found: RobustResult, problem: RobustProblem, groups: list[tuple[in
     for members in groups:
         still = problem.errors.copy()
         still[:, members] = 0.0
-        missed = np.maximum(-found.linear.parts(still) / spread, 0.0).max(axis=1)
+        missed = np.maximum(-found.linear.numbers(still) / spread, 0.0).max(axis=1)
         gained.append((found.linear.share(still), -float(missed.mean())))
     return max(range(len(groups)), key=gained.__getitem__)

@@ -10,8 +10,8 @@ from cfmkit.errors import visible
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from cfmkit.metrics.compare import MetricChange
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.metric_changes_since_earlier_batch import MetricChange
 
 PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
 """How the fault of a file begins."""

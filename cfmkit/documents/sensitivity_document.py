@@ -12,7 +12,7 @@ from cfmkit.studies.sensitivity.output import by_interval, exit_code, message, w
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
+    from cfmkit.studies.parts.share import Share
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
 INDICES = {
@@ -87,7 +87,7 @@ def _yields(found: Findings) -> Iterator[Row]:
         yield Row(spaced(outcome.metric), f"{share_of(one)}  {limits}")
 
 
-def share_of(one: Yield) -> str:
+def share_of(one: Share) -> str:
     """Return the share of parts that are good, with its 95 % interval."""
     if one.value != one.value:
         return f"not stated: {one.failed} of {one.count} parts have no result"

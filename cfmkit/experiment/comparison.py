@@ -19,7 +19,8 @@ from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.compare import Compared, Points, counterpart, effort_at, largest, mean, overlap, rms
+from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.numerics.holes_in_samples import holes_between, weights
 from cfmkit.results import Quantity
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
-    from cfmkit.metrics.curve_differences import Measure
+    from cfmkit.metrics.compare import Measure
     from cfmkit.results import Result
 
 PLACES = 257
@@ -107,9 +108,11 @@ class Comparison(ShortRepr):
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean error per branch, and over all, by name, SI."""
-        gap = "the model has no equilibrium at some of the points"
-        each = {item.branch: Difference(item.errors(self.curve), gap, item.weight) for item in self.samples}
-        return emptied(summarize(each, _ERRORS, self.curve.kind), self.holes, self.curve.kind)
+        points = {
+            item.branch: Points(item.motion, item.effort, item.model_branch, item.weight) for item in self.samples
+        }
+        found = compare_sides(Compared("measured", points=points), Compared("model", self.curve), self.window)
+        return emptied(found.summarize(_ERRORS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:
         """Return what a measured cycle loses, and half the mean gap between its branches; nothing without a loop."""
@@ -191,6 +194,8 @@ def compare(result: Result, source: MeasuredCurves, window: Window | None = None
     pairs = {branch: model_branch(curve, branch) for branch in source.raw[0].branches}
     window = _common(curve, source, window or window_of(result), set(pairs.values()))
     samples = tuple(_samples(source, branch, mine, window) for branch, mine in pairs.items())
+    for item in samples:
+        model_at(curve, item.model_branch, item.motion)  # a branch that turns back is refused at once
     if not all(len(item.motion) >= 2 for item in samples):
         raise DataError(f"{name}: has fewer than 2 points in {span_text(window.lo, window.hi, curve.kind)} on a branch")
     size = float(np.concatenate([item.weight for item in samples]).mean())

@@ -109,6 +109,7 @@ class FindingRule(Generic[S]):
     name: str
     holds: Callable[[S], Any]  # of a solution: (m,) of bool, or one for all mechanisms
     sentence: Callable[[S], tuple[Any, ...]]  # of a solution of one mechanism: message, then cures
+    short: Callable[[S], str] | None = None  # of the same: the consequence with its number, for pages
 
 
 def findings_of_one(rules: Iterable[FindingRule[S]], finding: Finder, solution: S) -> Iterator[Finding]:
@@ -116,7 +117,7 @@ def findings_of_one(rules: Iterable[FindingRule[S]], finding: Finder, solution: 
     with np.errstate(all="ignore"):
         held = [rule for rule in rules if np.ravel(rule.holds(solution))[0]]
     for rule in held:
-        yield finding(rule.name, *rule.sentence(solution))
+        yield finding(rule.name, *rule.sentence(solution), short=rule.short(solution) if rule.short else "")
 
 
 @np.errstate(all="ignore")

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from cfmkit.arrays import Several, named
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
+from cfmkit.metrics.compare import TOLERANCE
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
-from cfmkit.studies.metric_changes_since_earlier_batch import TOLERANCE, BatchComparison, earlier, gone
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 from cfmkit.tables.html import first_rows
 

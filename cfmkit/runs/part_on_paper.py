@@ -29,7 +29,7 @@ def stated_tolerances(spec: Spec) -> tuple[str, ...]:
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
-    from cfmkit.studies.stated_or_assumed_tolerances import assumed
+    from cfmkit.studies.parts.assumed_errors import assumed
 
     found = assumed(spec)
     if found is None:

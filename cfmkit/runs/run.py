@@ -281,7 +281,7 @@ def analysed(spec: Spec, run: Run) -> Report:
 def designed(spec: Spec, run: Run) -> Report:
     """Return the report on the designed mechanism, with the yield of its parts, or on why there is none."""
     from cfmkit.specs.spec import DesignKeys
-    from cfmkit.studies.stated_or_assumed_tolerances import is_made
+    from cfmkit.studies.parts.parts import is_made
 
     block = getattr(spec, "design", None)
     many = isinstance(block, DesignKeys) and is_made(spec, block)
@@ -301,22 +301,22 @@ def designed(spec: Spec, run: Run) -> Report:
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
-    from cfmkit.studies.expected_forces_at_bench import bench
+    from cfmkit.studies.parts.expected_forces import expected_forces
 
     found = _with_yield(found, nominal, given, run)
-    reported = bench(nominal, run)
+    reported = expected_forces(nominal, run)
     return found.beside({}, run_outcome.Supplement(lines=(("test plan", reported),))) if reported else found
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, where their tolerances are given."""
-    from cfmkit.studies.yield_of_drawn_parts import no_yields, yields_of
+    from cfmkit.studies.parts.drawn_yields import no_yields, yields_of
 
     yields = yields_of(nominal, given, run)
     if yields is None:
-        from cfmkit.studies.yield_by_assumed_tolerances import expected
+        from cfmkit.studies.parts.near_parts import expected_yield
 
-        reported = expected(nominal, run)
+        reported = expected_yield(nominal, run)
         more = run_outcome.Supplement(lines=(("yield", reported),) if reported else ())
         return found.beside(no_yields(given), more).of_many_parts()
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))

@@ -211,7 +211,7 @@ def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with parameters and groups of the block `sensitivity`, each with its place in the file."""
     if spec.sensitivity is None:
         return
-    from cfmkit.studies.sensitivity.parameters import faults
+    from cfmkit.studies.parts.uncertain_values import faults
 
     for path, message in faults(spec, spec.sensitivity):
         yield document.problem(path, message)
@@ -225,7 +225,7 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     lacking = "is a share of manufactured parts: state their tolerances in 'design.tolerances'"
     if isinstance(design, DesignKeys):
-        from cfmkit.studies.stated_or_assumed_tolerances import NO_TOLERANCE, errs_nowhere, faults, is_made
+        from cfmkit.studies.parts.parts import NO_TOLERANCE, errs_nowhere, faults, is_made
 
         if is_made(spec, design):
             lacking = f"is a share of manufactured parts: {NO_TOLERANCE}" if errs_nowhere(spec, design) else ""

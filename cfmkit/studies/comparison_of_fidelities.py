@@ -11,31 +11,26 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.metrics import Undefined, Window, window_of, windows_judged
+from cfmkit.metrics import window_of, windows_judged
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.compare import PLACES, Compared, largest, mean, rms
+from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.results import Finding, Status
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.families.run_control import Run
-    from cfmkit.metrics.curve_differences import Measure
+    from cfmkit.metrics.compare import Differences, Measure
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Spec
 
 PATH = "analysis.fidelity"
 
 OPTION = "--compare-fidelity"
-
-PLACES = 1001
-"""Where curves are compared: so many places, evenly over the motion that they have in common."""
 
 
 @dataclass(frozen=True)
@@ -104,44 +99,20 @@ class FidelityComparison:
         return (*gone, *more)
 
     @cached_property
-    def windows(self) -> Mapping[str, Window]:
-        """Ranges in which each of the others can be compared: where both exist, inside `analysis.window`."""
-        found = {}
-        for item in self.compared:
-            if (window := self._window(item)) is not None:
-                found[item.name] = window
-        return found
+    def _differences(self) -> Mapping[str, Differences]:
+        """Differences of each of the others from the finest, inside `analysis.window`."""
+        reference, over = _side(self.reference), window_of(self.variants[0].result)
+        return {item.name: compare_sides(reference, _side(item), over) for item in self.compared}
 
-    def _window(self, item: Variant) -> Window | None:
-        if not (item.result.curves and self.reference.result.curves):
-            return None
-        fine, coarse = self.reference.result.curve, item.result.curve
-        pairs = _pairs(fine, coarse)
-        parts = [part for mine, other in pairs.items() for part in (fine.on(mine), coarse.on(other))]
-        extents = [(float(part.motion.min()), float(part.motion.max())) for part in parts]
-        return overlap(extents, window_of(self.variants[0].result))
-
-    def places(self, name: str) -> FloatArray:
-        """Return where a fidelity is compared [m or rad]; nothing where it cannot be."""
-        window = self.windows.get(name)
-        return np.linspace(window.lo, window.hi, PLACES) if window else np.empty(0)
-
-    def differences(self, item: Variant) -> Mapping[str, Difference]:
+    def differences(self, item: Variant) -> Differences:
         """Return what the nominal curve of a variant has more than that of the finest, by branch of the finest."""
-        missing = [one for one in (item, self.reference) if not one.result.curves]
-        if missing or item.name not in self.windows:
-            why = f"there is no {missing[0].name} curve" if missing else "they have no travel in common"
-            return {"": Difference(np.empty(0), why)}
-        fine, coarse, places = self.reference.result.curve, item.result.curve, self.places(item.name)
-        return {
-            mine: _difference((coarse, other), (fine, mine), places) for mine, other in _pairs(fine, coarse).items()
-        }
+        return self._differences[item.name]
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean difference of each fidelity, by name, SI."""
         found: dict[str, Quantity] = {}
         for item in self.compared:
-            found |= summarize(self.differences(item), self._measures(item), self.kind, item.name)
+            found |= self.differences(item).summarize(self._measures(item), self.kind, item.name)
         return found
 
     @property
@@ -150,7 +121,7 @@ class FidelityComparison:
         return self.curves[0].kind if self.curves else "force"
 
     def _measures(self, item: Variant) -> Mapping[str, Measure]:
-        window = self.windows.get(item.name)
+        window = self.differences(item).window
         over = f" over {span_text(window.lo, window.hi, self.kind)}" if window else ""
         what = f"({item.name} - {self.finest}) {{}}, at {PLACES} even places{over}"
         return {
@@ -160,22 +131,8 @@ class FidelityComparison:
         }
 
 
-def _pairs(fine: Curve, coarse: Curve) -> dict[str, str]:
-    """Return which branch of the coarser curve each branch of the finer one is compared with."""
-    found = {}
-    for name in fine.branches:
-        motion = fine.on(name).motion
-        found[name] = counterpart(coarse, name, float(motion[-1] - motion[0]))
-    return found
-
-
-def _difference(one: tuple[Curve, str], other: tuple[Curve, str], places: FloatArray) -> Difference:
-    try:
-        return Difference(
-            effort_at(*one, places) - effort_at(*other, places), "there is no equilibrium at some of the places"
-        )
-    except Undefined as problem:
-        return Difference(np.full(len(places), np.nan), problem.reason)
+def _side(item: Variant) -> Compared:
+    return Compared(item.name, item.result.curve if item.result.curves else None)
 
 
 def choices_of(spec: Spec) -> Choices:
@@ -257,9 +214,10 @@ def lines_of(found: FidelityComparison) -> tuple[tuple[str, str], ...]:
 def _lines(found: FidelityComparison, item: Variant) -> Iterator[str]:
     from cfmkit.specs.units import format_short
 
-    metrics, window, differences = found.metrics(), found.windows.get(item.name), found.differences(item)
-    for branch in differences:
-        tag = f"[{item.name},{branch}]" if len(differences) > 1 else f"[{item.name}]"
+    metrics, differences = found.metrics(), found.differences(item)
+    window = differences.window
+    for branch in differences.curves:
+        tag = f"[{item.name},{branch}]" if len(differences.curves) > 1 else f"[{item.name}]"
         values = [metrics[f"fidelity_{name}{tag}"] for name in ("rms", "mean", "max")]
         title = f"{item.name} - {found.finest}" + (f" on {branch}" if branch else "")
         if window is None or values[0].value is None:

@@ -42,7 +42,7 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
 def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:
     """Return a design of perfect parts, in half of the time, with margins for the yield, in the time that is left."""
     from cfmkit.designing.run_many_starts import Clock
-    from cfmkit.studies.redesign_for_yield import with_design_margins
+    from cfmkit.studies.parts.redesign import with_design_margins
 
     clock = Clock.of(run.time_budget)
     half = None if run.time_budget is None else 0.5 * run.time_budget

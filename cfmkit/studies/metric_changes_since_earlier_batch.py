@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, UsageError, visible
+from cfmkit.metrics.compare import TOLERANCE, Compared, MetricChange, compare
 from cfmkit.results import Status
 from cfmkit.tables import Table, TableColumn, text_column
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.studies.batch_sources_and_outcomes import Entry
 
     Known = Mapping[str, "Earlier"]
-
-TOLERANCE = 1e-6
-"""Relative change that is none: other versions of the libraries round in the last digits, and searches stop there."""
-
-NOTHING = 1e-9
-"""Values in border units between which there is no difference: what should be zero is rounding, and rounding varies."""
 
 
 @dataclass(frozen=True)
@@ -33,29 +27,6 @@ class Earlier:
     status: str
     exit_code: int
     metrics: Mapping[str, Mapping[str, Any]]
-
-
-@dataclass(frozen=True)
-class MetricChange:
-    """One value that is not what it was."""
-
-    # spec, name: the specification, and the metric; ``status`` for how it ended
-    spec: str
-    name: str
-    # before, after: in border units; None if there was no value
-    before: float | str | None
-    after: float | str | None
-    unit: str  # of both
-    # the difference over what it was: 1 where it doubled; None if they are not numbers, or it was zero
-    relative: float | None
-    beyond: bool  # whether it is more than the tolerance
-
-    @property
-    def sentence(self) -> str:
-        """The change in words."""
-        share = "" if self.relative is None else f" ({100 * self.relative:+.3g} %)"
-        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
-        return f"{self.name}: {_reported(self.before)} -> {_reported(self.after)}{unit}{share}"
 
 
 @dataclass(frozen=True)
@@ -76,10 +47,6 @@ class BatchComparison:
         """Return what metrics.json says about it."""
         changes = [asdict(one) for one in self.changes]
         return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
-
-
-def _reported(value: float | str | None) -> str:
-    return "no value" if value is None else value if isinstance(value, str) else f"{value:.8g}"
 
 
 def earlier(folder: str) -> Known:
@@ -137,7 +104,8 @@ def changes(
             found.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
             now = (_read(os.path.join(folder, entry.folder, "metrics.json")) or {}).get("metrics", {})
-            found += _of_metrics(entry.spec, before.metrics, now, tolerance)
+            sides = Compared("the earlier batch", metrics=before.metrics), Compared(entry.spec, metrics=now)
+            found += compare(*sides, tolerance=tolerance).changes
     return tuple(found)
 
 
@@ -145,23 +113,6 @@ def _ends(status: str, code: int) -> str:
     """Return how a specification ended: a curve may be complete and miss a requirement."""
     missed = code == ExitCode.REQUIREMENT_MISSED
     return f"{status}, requirement missed" if missed and status == Status.COMPLETE.key else status
-
-
-def _of_metrics(
-    spec: str, before: Mapping[str, Any], after: Mapping[str, Any], tolerance: float
-) -> Iterator[MetricChange]:
-    for name in dict.fromkeys((*before, *after)):
-        old, new = (side.get(name, {}).get("value") for side in (before, after))
-        unit = str((after.get(name) or before.get(name) or {}).get("unit", ""))
-        if old == new:
-            continue
-        numbers = all(isinstance(value, int | float) and math.isfinite(value) for value in (old, new))
-        if not numbers:
-            yield MetricChange(spec, name, old, new, unit, None, True)
-            continue
-        if abs(new - old) > NOTHING:
-            relative = (new - old) / abs(old) if old else None
-            yield MetricChange(spec, name, old, new, unit, relative, relative is None or abs(relative) > tolerance)
 
 
 def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:

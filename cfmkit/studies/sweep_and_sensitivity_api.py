@@ -44,8 +44,8 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
 
 def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sensitivity study; see `cfmkit.sensitivity`."""
+    from cfmkit.studies.parts.uncertain_values import with_options
     from cfmkit.studies.sensitivity.output import outputs
-    from cfmkit.studies.sensitivity.parameters import with_options
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 

@@ -18,6 +18,7 @@ from cfmkit.documents.batch_document import document_of
 from cfmkit.documents.junit import junit
 from cfmkit.documents.markdown import plain, summary
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.metrics.compare import MetricChange
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_sources_and_outcomes import (
     Entry,
@@ -30,7 +31,7 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 )
 from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, MetricChange, changes_table
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, changes_table
 from cfmkit.tables import to_csv
 
 

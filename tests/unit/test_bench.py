@@ -10,7 +10,8 @@ import pytest
 import cfmkit
 from cfmkit.families.run_control import Run
 from cfmkit.specs.spec import Requirement
-from cfmkit.studies.expected_forces_at_bench import bench
+from cfmkit.studies.parts import near_parts
+from cfmkit.studies.parts.expected_forces import expected_forces
 
 MODULUS = "mechanism.material.youngs_modulus"
 
@@ -21,7 +22,7 @@ def test_the_range_is_that_of_the_normal_law_where_the_force_is_proportional_to_
     spec = cfmkit.load("configs/beam_rescaled.yaml").replace({"requirements": asked})
     spec = spec.replace({"design.tolerances": {MODULUS: {"normal": "3 %"}, "mechanism.width": {"normal": "0.1 %"}}})
     result = cfmkit.analyze(spec)
-    reported = bench(result, Run())
+    reported = expected_forces(result, Run())
     assert "measure width (10 mm as drawn), determine material.youngs_modulus (2000 MPa in the design)" in reported
     force, low, high = (
         float(text) for text in re.search(r"expect ([\d.]+) N \(([\d.]+) N to ([\d.]+) N\)", reported).groups()
@@ -34,7 +35,7 @@ def test_the_range_is_that_of_the_normal_law_where_the_force_is_proportional_to_
 
 def test_of_a_mechanism_whose_errors_nobody_knows_nothing_is_said():
     spec = cfmkit.load("configs/slider_crank_lumped.yaml")  # flexures: which of their sizes err, nobody says
-    assert bench(cfmkit.analyze(spec), Run()) == ""
+    assert expected_forces(cfmkit.analyze(spec), Run()) == ""
 
 
 def test_a_travel_to_the_other_side_is_measured_at_its_end_not_at_rest():
@@ -43,7 +44,7 @@ def test_a_travel_to_the_other_side_is_measured_at_its_end_not_at_rest():
     spec = cfmkit.load("configs/beam_lan2010.yaml").replace(changes)
     spec = spec.replace({"design": {"rescale": {"width": "10 mm"}, "tolerances": {MODULUS: {"normal": "3 %"}}}})
     result = cfmkit.analyze(spec)
-    reported = bench(result, Run())
+    reported = expected_forces(result, Run())
     force = float(re.search(r"press it to -1 mm and -2 mm, and expect .* and (-?[\d.]+) N \(.*at -2 mm", reported)[1])
     assert force == pytest.approx(result.curve.effort[-1], rel=5e-3)
 
@@ -51,7 +52,7 @@ def test_a_travel_to_the_other_side_is_measured_at_its_end_not_at_rest():
 def measured(name, **changes):
     """Return what the sentence says to measure and to determine."""
     spec = cfmkit.load(f"configs/{name}.yaml").replace(changes)
-    return re.search(r"geometry/, (.*), press", bench(cfmkit.analyze(spec), Run())).group(1)
+    return re.search(r"geometry/, (.*), press", expected_forces(cfmkit.analyze(spec), Run())).group(1)
 
 
 def test_a_modulus_is_no_dimension_and_takes_no_place_of_one():
@@ -73,14 +74,12 @@ def test_of_a_strip_its_thickness_is_measured_not_the_error_of_it():
 
 
 def test_ranges_by_the_engines_derivatives_are_those_by_neighbouring_parts(monkeypatch):
-    from cfmkit.studies import expected_forces_at_bench
-
     spec = cfmkit.load("configs/beam_design_arch.yaml")
     result, numbers = cfmkit.analyze(spec), []
-    exact = expected_forces_at_bench.exact_slopes
+    exact = near_parts.rr.exact_derivatives
     for slopes in (exact, lambda *_: {}):
-        monkeypatch.setattr(expected_forces_at_bench, "exact_slopes", slopes)
-        numbers.append([float(text) for text in re.findall(r"([\d.]+) N", bench(result, Run()))])
+        monkeypatch.setattr(near_parts.rr, "exact_derivatives", slopes)
+        numbers.append([float(text) for text in re.findall(r"([\d.]+) N", expected_forces(result, Run()))])
     assert exact(result.spec, np.array([0.006, 0.012]), ("mechanism.beams.s.thickness", "mechanism.thickness"))
     assert len(numbers[0]) == 6
     np.testing.assert_allclose(*numbers, rtol=5e-3)
@@ -89,5 +88,5 @@ def test_ranges_by_the_engines_derivatives_are_those_by_neighbouring_parts(monke
 def test_many_errors_need_no_part_more_where_the_engine_has_the_derivatives():
     spec = cfmkit.load("configs/studies/beam_lan2010_yield.yaml")
     assert 2 * len(spec.design.tolerances) > 24  # more parts than are solved for a sentence
-    reported = bench(cfmkit.analyze(spec), Run())
+    reported = expected_forces(cfmkit.analyze(spec), Run())
     assert re.search(r"measure (beams|nodes)\..* expect [\d.]+ N \(", reported)

@@ -14,12 +14,16 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import analysed, designed
-from cfmkit.specs.units import Share
+from cfmkit.specs.units import Share as TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.share import Share, clopper_pearson
 from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
-from cfmkit.studies.yield_of_drawn_parts import _without, common, judge, yields_of
+from cfmkit.studies.sensitivity.setup import prepare
 
+MODULUS = "mechanism.material.youngs_modulus"
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 
 
@@ -60,7 +64,7 @@ def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says
     assert count == 40 - found.after.good > 10
     assert "the window 2 ... 240 mm is not within the curve" in reason
     assert f"{count} have no value for a requirement and count as bad (the first: " in found.sentence()
-    shares = [one.model_copy(update={"over": (Share(0.02), Share(1.0))}) for one in design.requirements[:2]]
+    shares = [one.model_copy(update={"over": (TravelShare(0.02), TravelShare(1.0))}) for one in design.requirements[:2]]
     of_each = design.replace({"requirements": tuple(shares), "analysis.window": None})
     found = yields_of(replace(cfmkit.analyze(of_each), spec=of_each), None, Run())
     assert (found.lacking, found.after.good) == ((0, ""), 40)
@@ -76,12 +80,12 @@ def test_an_analysis_does_not_judge_a_yield():
 def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
     spec = cam(samples=100)
     result = cfmkit.analyze(spec)
-    made = tolerances_of(spec, spec.design, 0)
-    assert common(made, result, Run()) == (0,)
-    values = made.drawn()
-    judged = judge(made, values, result, Run())
+    made = Parts.of_design(spec, spec.design, 0)
+    assert common_errors(made, result, Run()) == (0,)
+    values = made.draw()
+    judged = analyze_parts(made, values, result, Run())
     values[:, 0] = made.nominal[0]
-    still = judge(made, values, result, Run())
+    still = analyze_parts(made, values, result, Run())
     # without a weight the force is proportional to the stiffness: the trim is the same as no error
     assert judged.share(judged.trimmed).good == still.share().good > judged.share().good
 
@@ -94,17 +98,17 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
     spec = cam(tolerances=scatter, samples=30).replace({**built, "analysis.points": 31, "requirements": (limits,)})
     spec = designed(spec, Run()).design.spec
     result = cfmkit.analyze(spec)
-    made = tolerances_of(spec, spec.design, 0)
-    judged = judge(made, made.drawn(), result, Run())
+    made = Parts.of_design(spec, spec.design, 0)
+    judged = analyze_parts(made, made.draw(), result, Run())
     assert judged.share(judged.trimmed).good == judged.share().good == 30
 
 
 def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_that_of_the_design():
     tolerances = {f"mechanism.springs.{name}": {"normal": "5 %"} for name in ("pivot", "crank_pin", "slider_pin")}
     spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.tolerances": tolerances})
-    made = tolerances_of(spec, spec.design, 0)
-    values = made.drawn(40)
-    judged = judge(made, values, cfmkit.analyze(spec), Run())
+    made = Parts.of_design(spec, spec.design, 0)
+    values = made.draw(40)
+    judged = analyze_parts(made, values, cfmkit.analyze(spec), Run())
     goods = []
     for row in values:
         part = cfmkit.analyze(spec.replace(dict(zip(made.paths, row.tolist(), strict=True)), as_made=True)).curve
@@ -117,9 +121,9 @@ def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_
 def test_parts_without_a_result_are_bad_and_counted():
     spec = cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
     result = cfmkit.analyze(spec)
-    made = tolerances_of(spec, spec.design, 0)
+    made = Parts.of_design(spec, spec.design, 0)
     values = np.array([[made.nominal[0]], [-0.01]])
-    judged = judge(made, values, result, Run())
+    judged = analyze_parts(made, values, result, Run())
     assert judged.failed.tolist() == [False, True]
     assert (judged.share().good, judged.share().failed, judged.share().count) == (1, 1, 2)
     assert "rest_half_width" in judged.why
@@ -165,30 +169,13 @@ def test_a_look_at_metrics_alone_leaves_out_the_rest_and_changes_none_of_them(na
     assert full.key(()) != lean.key(())
 
 
-def test_parts_without_an_error_of_the_modulus_follow_from_those_with_it():
-    """Force and stress go with the modulus: a third of all parts had been analysed again to say so."""
-    spec = cfmkit.load("configs/studies/beam_lan2010_yield.yaml")
-    nominal, made = family("beam").analyze(spec, Run()), tolerances_of(spec, spec.design, 0)
-    modulus = made.paths.index("mechanism.material.youngs_modulus")
-    values = made.drawn(12, 5)
-    values[:, modulus] *= np.linspace(0.8, 1.2, 12)
-    judged = judge(made, values, nominal, Run())
-    without = values.copy()
-    without[:, modulus] = made.nominal[modulus]
-    found, solved = _without(made, (modulus,), values, judged, nominal, Run()), judge(made, without, nominal, Run())
-    assert (found.met == solved.met).all()
-    assert (found.met != judged.met).any()
-    # the force does not go with one beam's thickness
-    assert _without(made, (0,), values, judged, nominal, Run()) is None
-
-
 def test_a_trim_by_the_force_of_one_branch_leaves_the_perfect_part_as_it_is():
     """Ends of the force had been those of both branches: "0 % after a trim", where a tenth was good before it."""
     requirement = {"metric": "deviation_from_target[load]", "max": "3 %", "over": ("3 mm", "35 mm")}
     spec = cfmkit.design("configs/slider_crank_friction.yaml").spec.replace({"requirements": (requirement,)})
     spec = spec.replace({"design.tolerances": {"mechanism.unloaded_angle": {"normal": "0.3 deg"}}})
-    nominal, made = family("slider-crank").analyze(spec, Run()), tolerances_of(spec, spec.design, 0)
-    judged = judge(made, np.array([made.nominal] * 2), nominal, Run())
+    nominal, made = family("slider-crank").analyze(spec, Run()), Parts.of_design(spec, spec.design, 0)
+    judged = analyze_parts(made, np.array([made.nominal] * 2), nominal, Run())
     assert judged.met.all()
     assert judged.trimmed.all()
 
@@ -223,3 +210,47 @@ def test_a_yield_of_a_part_that_errs_nowhere_is_refused_and_never_met():
     assert "err by its process" in found.requirements[1].sentence
     assert int(found.exit_code) == 5
     assert "err by its process" in dict(found.design.notes)["margins"]
+
+
+def test_parts_without_common_errors_are_analysed_themselves():
+    """They had been followed from those with such errors, which held for some parts and not for others."""
+    spec = cfmkit.load("configs/vcfm_pla.yaml")
+    tolerances = {"mechanism.bistable.thickness": {"normal": "0.01 mm"}, MODULUS: {"normal": "3 %"}}
+    spec = spec.replace({"design.tolerances": tolerances, "design.samples": 60})
+    nominal = cfmkit.analyze(spec)
+    found, parts = yields_of(nominal, None, Run()), Parts.of_design(spec, spec.design, 0)
+    assert found.common == (MODULUS,)
+    values = parts.draw()
+    values[:, parts.paths.index(MODULUS)] = spec.at(MODULUS)
+    singly = [cfmkit.analyze(parts.part(one)) for one in values]
+    good = sum(all(outcome.ok for outcome in cfmkit.check(one)) for one in singly)
+    assert found.frozen.good == good != found.after.good
+
+
+def test_the_estimate_and_the_test_plan_draw_the_parts_that_a_study_draws():
+    """Each had a generator of its own: three different sets of parts for one design and one seed."""
+    spec = cfmkit.load("configs/vcfm_pla.yaml")
+    block = {"method": "tolerance", "parameters": {"mechanism.bistable.thickness": {"normal": "0.05 mm"}}, "samples": 5}
+    setup = prepare(spec.replace({"sensitivity": block}), seed=3)
+    stated = spec.replace({"design.tolerances": {"mechanism.bistable.thickness": {"normal": "0.05 mm"}}})
+    parts, whence = Parts.expected(stated, 3)
+    assert whence == "within design.tolerances"
+    assert parts.draw(5).tolist() == setup.parts.draw().tolist()
+    assumed = Parts.assumed(spec, 3)
+    at = assumed.paths.index("mechanism.bistable.thickness")
+    assert assumed.parameters[at].spread.deviation == pytest.approx(3e-5)  # what a laser is assumed to hold
+
+
+@pytest.mark.parametrize(
+    ("fate", "value", "ends"), [("bad", 0.5, (0.5, 0.5)), ("unknown", None, None), ("either", 0.6, (0.5, 0.7))]
+)
+def test_a_share_says_what_failed_parts_count_as(fate, value, ends):
+    share = Share.of(np.arange(10) < 5, np.arange(10) >= 8, fate)
+    assert (share.good, share.failed, share.count) == (5, 2, 10)
+    found = share.as_json()
+    assert found["value"] == value
+    if value is None:
+        assert found["wilson"] == found["clopper_pearson"] == [None, None]
+        return
+    assert share.ends == ends
+    assert found["clopper_pearson"] == [clopper_pearson(5, 10)[0], clopper_pearson(round(10 * ends[1]), 10)[1]]

@@ -14,10 +14,11 @@ from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.studies import requirement_constraints
-from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances, tolerances_of
-from cfmkit.studies.yield_by_assumed_tolerances import expected, first_order_shares
-from cfmkit.studies.yield_of_drawn_parts import judge
+from cfmkit.studies.parts import requirement_rows
+from cfmkit.studies.parts.assumed_errors import assumed, tolerances
+from cfmkit.studies.parts.near_parts import expected_shares, expected_yield
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
 
 STRIP = "configs/slider_crank_strip.yaml"
 
@@ -34,12 +35,12 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
-    shares = first_order_shares(result, assumed(spec), Run())
-    made = tolerances_of(spec, spec.design, 0)
+    shares = expected_shares(result, Parts.assumed(spec, 0), Run())
+    made = Parts.of_design(spec, spec.design, 0)
     assert made.paths == ("mechanism.beam.offset",)
-    judged = judge(made, made.drawn(), result, Run()).share()
-    share = shares.good
-    assert share == shares.measured
+    judged = analyze_parts(made, made.draw(), result, Run()).share()
+    share = shares.good.value
+    assert shares.good == shares.measured
     assert not shares.proportional  # no spread of the modulus is stated
     assert abs(share - judged.value) < 3 * (share * (1 - share) / judged.count) ** 0.5 + 0.02
 
@@ -50,7 +51,7 @@ def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     found = assumed(spec)
     assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))
-    reported = expected(cfmkit.analyze(spec), Run())
+    reported = expected_yield(cfmkit.analyze(spec), Run())
     assert "assumed" in reported
     assert "once the modulus is measured" in reported
     assert "design.process=fdm" in reported
@@ -84,7 +85,7 @@ def test_a_cam_whose_parts_end_in_its_window_gets_no_number_one_with_shares_does
     made = dict(designed(cam.replace({"requirements": stated}), Run()).supplement.lines)["made"]
     assert made.startswith("no yield is estimated for the assumed tolerances of laser: ")
     made = dict(designed(cam, Run()).supplement.lines)["made"]
-    assert made.startswith("about 22 % of parts would meet the requirements if made by laser")
+    assert made.startswith("about 23 % of parts would meet the requirements if made by laser")
     assert "rates of springs within 5 %" in made
     toleranced = cam.replace({"design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}})
     found = designed(toleranced.replace({"design.samples": 20}), Run())
@@ -98,7 +99,7 @@ def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
     )
     result = cfmkit.analyze(spec)
     record, solved, looked = family(spec.family), [], []
-    analyze, sampled = record.analyze, requirement_constraints.function_named(record.sampled)
+    analyze, sampled = record.analyze, requirement_rows.function_named(record.sampled)
 
     def analysed(part, run):
         solved.append(part)
@@ -109,9 +110,9 @@ def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
         return sampled(part, places)
 
     changed = SimpleNamespace(analyze=analysed, sampled=record.sampled)
-    monkeypatch.setattr(requirement_constraints, "family", lambda _name: changed)
-    monkeypatch.setattr(requirement_constraints, "function_named", lambda _name: seen)
-    first_order_shares(result, assumed(spec), Run())
+    monkeypatch.setattr(requirement_rows, "family", lambda _name: changed)
+    monkeypatch.setattr(requirement_rows, "function_named", lambda _name: seen)
+    expected_shares(result, Parts.assumed(spec, 0), Run())
     nominal = spec.mechanism.model_dump()
     assert sum(part.mechanism.model_dump() == nominal for part in looked) == 1
     again = [part for part in solved if part.mechanism.model_dump() == nominal]
@@ -127,9 +128,9 @@ def test_the_process_of_a_part_is_what_it_is_assumed_to_be_made_by_and_its_own_v
     assert assumed(own).deviations == {"mechanism.beam.offset": pytest.approx(7e-6)}
     assert assumed(own).process.least_feature == assumed(named).process.least_feature
     # it says how parts are made where their yield is asked for, and judges no parts otherwise
-    assert tolerances_of(own, own.design, 0) is None
+    assert Parts.of_design(own, own.design, 0) is None
     asked = own.replace({"design.yield": 0.9})
-    assert tolerances_of(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
+    assert Parts.of_design(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
 
 
 def test_the_process_of_a_part_warns_of_what_it_cannot_make():
@@ -153,6 +154,6 @@ def test_a_process_that_is_none_is_refused(change, reported):
 
 def test_tolerances_of_a_search_of_shapes_are_those_of_its_audit_alone():
     spec = cfmkit.load("configs/beam_design_arch.yaml").replace({"design.optimise.tolerances": {"nodes": "0.05 mm"}})
-    assert tolerances_of(spec, spec.design, 0) is None
+    assert Parts.of_design(spec, spec.design, 0) is None
     toleranced = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}}})
-    assert tolerances_of(toleranced, toleranced.design, 0).paths == ("mechanism.nodes.b.at.1",)
+    assert Parts.of_design(toleranced, toleranced.design, 0).paths == ("mechanism.nodes.b.at.1",)

@@ -7,6 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity import failed_sample_policy as failures
 from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
 from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
@@ -169,11 +170,11 @@ def test_steps_that_fail_far_out_leave_the_gradient_to_the_small_ones():
 def test_failed_samples_leave_the_yield_open_or_bounded():
     met = np.array([True] * 80 + [False] * 10 + [False] * 10)
     failed = np.array([False] * 90 + [True] * 10)
-    for policy in ("fail", "resample"):
-        found = monte_carlo_yield.yield_of(met, failed, policy)
-        assert np.isnan(found.value)
-        assert found.failed == 10
-    bounded = monte_carlo_yield.yield_of(met, failed, "bound")
+    found = Share.of(met, failed, "unknown")
+    assert np.isnan([found.value, *found.wilson, *found.clopper_pearson]).all()
+    assert found.failed == 10
+    assert found.as_json()["value"] is None
+    bounded = Share.of(met, failed, "either")
     assert bounded.value == pytest.approx(0.85)
     assert bounded.wilson[0] < 0.8
     assert bounded.wilson[1] > 0.9

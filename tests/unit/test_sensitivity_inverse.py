@@ -10,25 +10,31 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.studies.sensitivity.inverse import WIDEST, LimitsAlong, answered
-from cfmkit.studies.sensitivity.monte_carlo_yield import yield_of
+from cfmkit.studies.parts.allowed_tolerances import WIDEST, LimitsAlong, factors_that_keep
+from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity.output import by_interval, yield_ok
 
 TWO_SIDED = NormalDist().inv_cdf(0.975)
 ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))
 
 
+def in_proportion(by_error):
+    """Return limits that move in proportion to each error, from their derivatives (m, d)."""
+    ends = np.array([-1.0, 0.0, 1.0])
+    return tuple(LimitsAlong(ends, ends[:, None] * one) for one in np.asarray(by_error).T)
+
+
 def test_one_factor_for_all_is_the_quantile_of_the_normal_law():
     # |e0 + e1| <= 4: together a factor f with 1.96 sqrt(2) f = 4
-    found = answered(np.array([4.0, 4.0]), np.array([[1.0, 1.0], [-1.0, -1.0]]), ERRORS, np.ones(2), 0.95)
+    found = factors_that_keep(np.array([4.0, 4.0]), in_proportion([[1.0, 1.0], [-1.0, -1.0]]), ERRORS, np.ones(2), 0.95)
     assert found.together == pytest.approx([4 / (TWO_SIDED * 2**0.5)] * 2, rel=0.02)
     assert found.alone == pytest.approx([((4 / TWO_SIDED) ** 2 - 1) ** 0.5] * 2, rel=0.03)
     assert found.allocated == pytest.approx(found.together, rel=1e-2)
 
 
 def test_what_costs_eight_times_as_much_may_be_twice_as_wide():
-    by_error = np.array([[1.0, 1.0], [-1.0, -1.0]])
-    found = answered(np.array([4.0, 4.0]), by_error, ERRORS, np.array([8.0, 1.0]), 0.95)
+    along = in_proportion([[1.0, 1.0], [-1.0, -1.0]])
+    found = factors_that_keep(np.array([4.0, 4.0]), along, ERRORS, np.array([8.0, 1.0]), 0.95)
     assert found.allocated[0] / found.allocated[1] == pytest.approx(2.0, rel=1e-2)
     assert np.hypot(*found.allocated) == pytest.approx(4 / TWO_SIDED, rel=0.02)
     cost = (np.array([8.0, 1.0]) / found.allocated).sum()
@@ -36,14 +42,16 @@ def test_what_costs_eight_times_as_much_may_be_twice_as_wide():
 
 
 def test_an_error_that_moves_nothing_may_be_as_wide_as_is_looked_at():
-    found = answered(np.array([3.0]), np.array([[1.0, 0.0]]), ERRORS, np.ones(2), 0.95)
+    found = factors_that_keep(np.array([3.0]), in_proportion([[1.0, 0.0]]), ERRORS, np.ones(2), 0.95)
     assert found.alone[1] == WIDEST
     assert found.alone[0] < WIDEST
 
 
 def test_no_tolerance_helps_where_a_perfect_part_is_bad_or_another_error_is_too_large():
-    assert np.isnan(answered(np.array([-1.0]), np.ones((1, 2)), ERRORS, np.ones(2), 0.9).together).all()
-    assert np.isnan(answered(np.array([0.1]), np.array([[0.0, 1.0]]), ERRORS, np.ones(2), 0.9).alone[0])
+    assert np.isnan(
+        factors_that_keep(np.array([-1.0]), in_proportion(np.ones((1, 2))), ERRORS, np.ones(2), 0.9).together
+    ).all()
+    assert np.isnan(factors_that_keep(np.array([0.1]), in_proportion([[0.0, 1.0]]), ERRORS, np.ones(2), 0.9).alone[0])
 
 
 def test_limits_with_a_corner_are_followed_on_both_of_its_sides():
@@ -51,7 +59,7 @@ def test_limits_with_a_corner_are_followed_on_both_of_its_sides():
     offsets = np.array([-1.0, 0.0, 1.0])
     corner, still = LimitsAlong(offsets, -abs(offsets)[:, None]), LimitsAlong(offsets, 0.0 * offsets[:, None])
     assert corner(np.array([-3.0, -0.5, 0.0, 2.0]))[:, 0] == pytest.approx([-3.0, -0.5, 0.0, -2.0])
-    found = answered(np.array([4.0]), (corner, still), ERRORS, np.ones(2), 0.95)
+    found = factors_that_keep(np.array([4.0]), (corner, still), ERRORS, np.ones(2), 0.95)
     assert found.alone == pytest.approx([4 / TWO_SIDED, WIDEST], rel=0.02)
     assert found.share == pytest.approx(1.0, abs=1e-3)
 
@@ -75,8 +83,8 @@ def test_a_range_does_not_reach_beyond_a_jump_that_was_seen_once():
 
 
 def test_costs_that_are_ages_apart_leave_every_tolerance_something():
-    by_error = np.array([[1.0, 1.0], [-1.0, -1.0]])
-    found = answered(np.array([4.0, 4.0]), by_error, ERRORS, np.array([1e300, 1e-300]), 0.95)
+    along = in_proportion([[1.0, 1.0], [-1.0, -1.0]])
+    found = factors_that_keep(np.array([4.0, 4.0]), along, ERRORS, np.array([1e300, 1e-300]), 0.95)
     assert (found.allocated > 0).all()
     assert found.allocated[0] == pytest.approx(4 / TWO_SIDED, rel=0.02)
 
@@ -126,7 +134,7 @@ def test_a_study_states_tolerances_and_judges_parts_within_them():
     ],
 )
 def test_stated_tolerances_miss_their_yield_where_the_parts_rule_it_out_and_not_by_chance(method, good, ok, by_chance):
-    share = yield_of(np.arange(200) < good, np.zeros(200, dtype=bool), "fail")
+    share = Share(good, 0, 200)
     found = SimpleNamespace(setup=SimpleNamespace(block=SimpleNamespace(min_yield=0.8), method=method), all_met=share)
     assert (yield_ok(found), by_interval(found)) == (ok, by_chance)
 

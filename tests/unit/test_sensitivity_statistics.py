@@ -9,16 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from cfmkit.studies.sensitivity import (
-    distributions,
-    local,
-    monte_carlo_yield,
-    morris,
-    oat,
-    probability_confidence_intervals,
-    sobol,
-)
-from cfmkit.studies.sensitivity.distributions import ParameterSpread
+from cfmkit.studies.parts import distributions, share
+from cfmkit.studies.parts.distributions import ParameterSpread
+from cfmkit.studies.parts.share import Share
+from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
 
 RANGE = {"kind": "uniform", "nominal": 0.0}
 
@@ -177,7 +171,7 @@ def made(tolerances, matrix, count=40_000, seed=0, groups=()):
 def test_the_yield_of_a_normal_tolerance_is_that_of_the_normal_distribution():
     points = made([normal(0.1, 5.0)], np.eye(1))[:, 0, 0]
     met = np.abs(points - 5.0) <= 0.15
-    found = monte_carlo_yield.yield_of(met, np.zeros(len(met), bool), "fail")
+    found = Share.of(met, np.zeros(len(met), bool))
     exact = 2 * NormalDist().cdf(1.5) - 1
     assert found.wilson[0] < exact < found.wilson[1]
     assert found.value == pytest.approx(exact, abs=0.005)
@@ -241,7 +235,7 @@ def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
     points = made([normal(1.0), normal(0.1)], np.eye(2), 1000, groups=((1,),))
     met = np.abs(points.sum(axis=2)) < 1
     gain = monte_carlo_yield.yield_gains(met, np.zeros(met.shape, bool), "fail")
-    alone = monte_carlo_yield.yield_of(met[:, 0], np.zeros(len(met), bool), "fail").wilson
+    alone = Share.of(met[:, 0], np.zeros(len(met), bool)).wilson
     assert gain.high[0] - gain.low[0] < 0.5 * (alone[1] - alone[0])
 
 
@@ -249,8 +243,8 @@ def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
 def test_the_exact_interval_covers_the_truth_as_often_as_it_says_and_wilson_on_average(count):
     outcomes = np.arange(count + 1)
     for name, interval in (
-        ("exact", probability_confidence_intervals.clopper_pearson),
-        ("score", probability_confidence_intervals.wilson),
+        ("exact", share.clopper_pearson),
+        ("score", share.wilson),
     ):
         ends = np.array([interval(int(k), count) for k in outcomes])
         covered = []
@@ -266,14 +260,12 @@ def test_the_interval_of_a_paired_difference_covers_the_truth():
     generator, truth, hits = np.random.default_rng(0), 0.1, 0
     for _ in range(400):
         kinds = generator.choice(3, size=120, p=[0.15, 0.05, 0.8])
-        low, high = probability_confidence_intervals.paired_difference(
-            int((kinds == 0).sum()), int((kinds == 1).sum()), 120
-        )
+        low, high = share.paired_difference(int((kinds == 0).sum()), int((kinds == 1).sum()), 120)
         hits += low <= truth <= high
     assert hits / 400 == pytest.approx(0.95, abs=0.025)
 
 
 def test_an_interval_without_samples_says_nothing():
-    assert probability_confidence_intervals.wilson(0, 0) == (0.0, 1.0)
-    assert probability_confidence_intervals.clopper_pearson(0, 0) == (0.0, 1.0)
-    assert probability_confidence_intervals.paired_difference(0, 0, 0) == (-1.0, 1.0)
+    assert share.wilson(0, 0) == (0.0, 1.0)
+    assert share.clopper_pearson(0, 0) == (0.0, 1.0)
+    assert share.paired_difference(0, 0, 0) == (-1.0, 1.0)

@@ -18,8 +18,8 @@ from cfmkit.plots.sensitivity import figures, short
 from cfmkit.plots.style import MM, png
 from cfmkit.results import Status
 from cfmkit.studies.engine import MISSING, run
+from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity.evaluation import Evaluator
-from cfmkit.studies.sensitivity.monte_carlo_yield import yield_of
 from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
 from cfmkit.studies.sensitivity.run_sensitivity_method import METHODS, carry_out
 from cfmkit.studies.sensitivity.setup import points_of, prepare
@@ -139,7 +139,7 @@ def test_a_yield_with_failed_samples_is_kept_only_if_it_is_with_all_of_them_bad(
     """Under `bound` the middle of the interval decided: 93 to 98 % were 95.5 %, and ok."""
     found = study("tolerance", samples=4, on_failure="bound", min_yield="95 %")
     parts = np.arange(100)
-    share = yield_of(parts < good, (parts >= good) & (parts < good + 5), "bound")
+    share = Share.of(parts < good, (parts >= good) & (parts < good + 5), "either")
     found = dataclasses.replace(found, all_met=share)
     assert (yield_ok(found), by_interval(found)) == (met, False)
     sentence = as_json(found)["requirements"][-1]["sentence"]
@@ -216,7 +216,7 @@ def test_the_parts_of_a_list_and_of_a_batch_are_tightened_together():
     names = ("mechanism.roller_radius", "mechanism.rest_half_width")
     setup = prepare(spec("tolerance", parameters={name: {"normal": "0.01 mm"} for name in names}, correlated=joint))
     assert setup.together == ((0, 1),)
-    assert setup.correlation[0, 1] == 0.5
+    assert setup.parts.correlation[0, 1] == 0.5
 
 
 @pytest.mark.parametrize(

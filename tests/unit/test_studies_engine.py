@@ -124,7 +124,7 @@ def test_a_point_is_designed_as_the_design_verb_does_it(monkeypatch):
     def as_solid(_given, design, _run):
         return dataclasses.replace(design, spec=design.spec.replace({"mechanism.offset": 0.0003}))
 
-    monkeypatch.setattr("cfmkit.studies.redesign_for_yield.with_design_margins", margins)
+    monkeypatch.setattr("cfmkit.studies.parts.redesign.with_design_margins", margins)
     monkeypatch.setattr("cfmkit.studies.verify_design_by_solid_model.verified", as_solid)
     spec = spec.replace({"design.verify": "solid"})
     made = cfmkit.design(spec).spec

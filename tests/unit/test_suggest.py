@@ -187,7 +187,7 @@ PRINTED_CAM = {"force": "[9.7 N, 10.3 N]", "process": "fdm"}
 
 @pytest.fixture
 def few_parts(monkeypatch):
-    monkeypatch.setattr(yield_of_proposal, "PARTS", 20)
+    monkeypatch.setattr(yield_of_proposal, "N_DRAWN", 20)
 
 
 def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts):

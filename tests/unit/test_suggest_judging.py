@@ -21,12 +21,13 @@ from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import as_json, exit_code, table
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
-from cfmkit.studies.stated_or_assumed_tolerances import assumed
+from cfmkit.studies.parts.assumed_errors import assumed
+from cfmkit.studies.parts.near_parts import expected_shares
+from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judged, made
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
-from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
@@ -273,7 +274,8 @@ def test_the_rates_of_springs_scatter_by_five_per_cent(config, paths):
     found = assumed(spec)
     assert set(found.rates) <= paths
     assert found.rates
-    for path, (low, high) in found.ranges.items():
+    for one in Parts.assumed(spec, 0).parameters:
+        path, (low, high) = one.path, one.spread.ends
         if path in found.rates:
             assert (low, high) == pytest.approx((0.95 * spec.at(path), 1.05 * spec.at(path)))
 
@@ -286,10 +288,10 @@ def test_the_force_of_a_cam_follows_the_scatter_of_its_springs():
     low, high = (f"{share * mean:.9g} N" for share in (0.975, 1.025))
     asked = {"metric": "force_mean[load]", "min": low, "max": high, "over": ["20 mm", "200 mm"]}
     result = cfmkit.analyze(spec.replace({"requirements": (asked,)}))
-    found = assumed(result.spec)
-    quiet = replace(found, kinds={})
-    share = first_order_shares(result, quiet, Run()).good
-    assert share == pytest.approx(0.5, abs=0.05)
+    rates = {"method": "tolerance", "parameters": {"mechanism.springs.stiffness": {"uniform": "5 %"}}}
+    parts = Parts.of_block(spec, spec.replace({"sensitivity": rates}).sensitivity, 20, 0)
+    share = expected_shares(result, replace(parts, spec=result.spec), Run()).good
+    assert share.value == pytest.approx(0.5, abs=0.05)
 
 
 def test_drawn_parts_need_not_have_the_rate_of_their_wire():

@@ -14,12 +14,12 @@ from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.wishes import Candidate
 from cfmkit.runs.read_wish import wish_of
-from cfmkit.studies.stated_or_assumed_tolerances import assumed
+from cfmkit.studies.parts.near_parts import expected_shares
+from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made, redesigned
 from cfmkit.studies.suggest.search import _key, _Making, _Times
 from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, moved_for_yield
-from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
 
 POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
 MEASURED = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
@@ -40,10 +40,10 @@ def test_after_a_trim_no_error_of_the_modulus_is_left():
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     mean = cfmkit.analyze(spec).metrics["force_mean"].value
     spec = spec.replace({"mechanism.beam.width": spec.mechanism.beam.width * 1.5 / mean, "requirements": asked})
-    shares = first_order_shares(cfmkit.analyze(spec), assumed(spec), Run())
+    shares = expected_shares(cfmkit.analyze(spec), Parts.assumed(spec, 0), Run())
     assert shares.proportional
-    assert shares.good < shares.measured < shares.trimmed
-    assert shares.trimmed > 0.99
+    assert shares.good.value < shares.measured.value < shares.trimmed.value
+    assert shares.trimmed.value > 0.99
 
 
 VS = {"room": "[120 mm, 90 mm, 15 mm]", "material": MEASURED, "force": "[5 N, 6 N]"}

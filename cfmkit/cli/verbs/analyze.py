@@ -130,12 +130,12 @@ def _picture(compared: FidelityComparison) -> Figure:
         Gap(
             index,
             "" if number else f"{item.name} \N{MINUS SIGN} {compared.finest}",
-            compared.places(item.name),
+            compared.differences(item).places,
             each.values,
         )
         for index, item in enumerate(solved)
         if item.name != compared.finest
-        for number, each in enumerate(compared.differences(item).values())
+        for number, each in enumerate(compared.differences(item).curves.values())
         if len(each.values)
     ]
     spec = compared.variants[0].result.spec

@@ -159,7 +159,7 @@ def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
     cfmkit.errors.SpecError
         If the block is not valid with it.
     """
-    from cfmkit.studies.sensitivity.parameters import with_options
+    from cfmkit.studies.parts.uncertain_values import with_options
 
     changes = changes_of(options)
     if not changes or (spec.sensitivity is None and "parameters" not in changes):

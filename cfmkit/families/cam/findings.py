@@ -178,8 +178,12 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
         f"without the {'constant force' if law.constant else 'force it is cut for'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,
-        short=f"force not {'constant' if law.constant else 'as cut for'} over the first {mm(corner)}",
     )
+
+
+def _undercut_in_short(solution: Solution) -> str:
+    law = solution.assembly.track.profile.path.law
+    return f"force not {'constant' if law.constant else 'as cut for'} over the first {mm(solution.corner_travel)}"
 
 
 def _two_contacts(solution: Solution) -> tuple[str, ...]:
@@ -346,7 +350,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     """Return every rule that a solved mechanism may break, the gravest first."""
     number = max(map(len, solution.all_jams))
     return (
-        FindingRule("undercut", _is_undercut, _undercut),
+        FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
         FindingRule("contact_not_single_valued", _is_undercut, _two_contacts),
         FindingRule(
             "corner_pressure",

@@ -2,10 +2,10 @@
 
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
-`oat`, `local`, `morris`, `sobol`, `monte_carlo_yield` and `inverse`, with `distributions` (of the
-parameters), `probability_confidence_intervals` (confidence) and `failed_sample_policy` (what a sample without a value
-means for an index: never "no influence").
+`oat`, `local`, `morris`, `sobol` and `monte_carlo_yield`, with `failed_sample_policy` (what a sample without a value
+means for an index: never "no influence"). Distributions, made parts, shares of good ones and the tolerances that keep a
+yield are those of `cfmkit.studies.parts`.
 
-`parameters` reads the block `sensitivity:` against a specification, `setup` says what is to be done,
-`run_sensitivity_method` joins method and engine, `result_types` and `output` say what came out.
+`setup` says what is to be done, `run_sensitivity_method` joins method and engine, `result_types` and `output` say what
+came out.
 """

@@ -10,8 +10,7 @@ import numpy as np
 
 from cfmkit.results import Status
 from cfmkit.studies.engine import Work
-from cfmkit.studies.plan import Plan, Variable
-from cfmkit.tables import border_values
+from cfmkit.studies.parts.uncertain_values import plan_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,9 +19,9 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
+    from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.point_evaluation import Study
     from cfmkit.studies.row_blocks_for_journal import ResultRows
-    from cfmkit.studies.sensitivity.parameters import Parameter
 
 
 class Interrupted(Exception):
@@ -115,13 +114,3 @@ class Evaluator:
     def failed(self) -> int:
         """Samples without a result."""
         return self.count - self.ends[Status.COMPLETE]
-
-
-def plan_of(parameters: Sequence[Parameter], points: FloatArray) -> Plan:
-    """Return points, (n, d), as a plan of the engine."""
-    columns = map(np.ascontiguousarray, points.T)
-    varied = (
-        Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.place)
-        for one, values in zip(parameters, columns, strict=True)
-    )
-    return Plan(tuple(varied), len(points), joint=True)

@@ -9,18 +9,13 @@ would go away.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.studies.parts.distributions import values_at
+from cfmkit.studies.parts.share import LEVEL, paired_difference
 from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
-from cfmkit.studies.sensitivity.probability_confidence_intervals import (
-    LEVEL,
-    clopper_pearson,
-    paired_difference,
-    wilson,
-)
 from cfmkit.studies.sensitivity.sobol import RESAMPLES, varies_not
 
 if TYPE_CHECKING:
@@ -29,9 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.studies.sensitivity.distributions import ParameterSpread
+    from cfmkit.studies.parts.distributions import ParameterSpread
     from cfmkit.studies.sensitivity.failed_sample_policy import Policy
-    from cfmkit.studies.sensitivity.probability_confidence_intervals import Interval
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
 TIGHTER = 0.5
@@ -52,61 +46,14 @@ def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups)
     groups : tuple of tuple of int
         Tolerances that are tightened together.
     """
-    drawn = _values(unit, spreads)
-    tight = _values(unit, [one.tightened(TIGHTER) for one in spreads])
+    drawn = values_at(spreads, unit)
+    tight = values_at([one.tightened(TIGHTER) for one in spreads], unit)
     blocks = [drawn]
     for group in groups:
         changed = drawn.copy()
         changed[:, group] = tight[:, group]
         blocks.append(changed)
     return np.stack(blocks, axis=1)
-
-
-def _values(unit: FloatArray, spreads: Sequence[ParameterSpread]) -> FloatArray:
-    return np.stack([one.at(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
-
-
-@dataclass(frozen=True)
-class Yield:
-    """The share of good parts among those made."""
-
-    value: float  # between the extremes if failed samples may be either; NaN if it cannot be stated
-    # wilson, clopper_pearson: its confidence intervals; under ``bound`` they hold every fate of the failed samples
-    wilson: Interval
-    clopper_pearson: Interval
-    # good, failed, count: samples that meet everything, that failed, and all
-    good: int
-    failed: int
-    count: int
-
-    @property
-    def ends(self) -> Interval:
-        """The shares of good parts if all failed samples are bad ones, and if all are good ones."""
-        return self.good / self.count, (self.good + self.failed) / self.count
-
-
-def yield_of(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy) -> Yield:
-    """Return the share of samples that are good.
-
-    Parameters
-    ----------
-    met : (n,) array of bool
-        Whether a sample meets what it should.
-    failed : (n,) array of bool
-        Whether nobody knows.
-    policy : {"fail", "resample", "bound"}
-        What a failed sample means.
-    """
-    count, unknown = len(met), int(failed.sum())
-    good = int((met & ~failed).sum())
-    if not count or (unknown and policy != "bound"):
-        gap = (float("nan"), float("nan"))
-        return Yield(float("nan"), gap, gap, good, unknown, count)
-    ends = good, good + unknown
-    value = (ends[0] + ends[1]) / (2.0 * count)
-    score = wilson(ends[0], count)[0], wilson(ends[1], count)[1]
-    exact = clopper_pearson(ends[0], count)[0], clopper_pearson(ends[1], count)[1]
-    return Yield(value, score, exact, good, unknown, count)
 
 
 def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy) -> Index:

@@ -9,7 +9,6 @@ from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.metrics import metrics_json
 from cfmkit.results import Finding, Quantity, Status
-from cfmkit.studies.sensitivity.probability_confidence_intervals import LEVEL
 from cfmkit.studies.sensitivity.setup import MADE
 from cfmkit.studies.tables import results_table
 from cfmkit.studies.varied_axes import written
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.store.safe_disk_changes import Data
-    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
-    from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.parts.share import Share
+    from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.setup import Setup
 
@@ -106,7 +105,7 @@ def yield_ok(found: Findings) -> bool:
     )
 
 
-def _shown_good(share: Yield, wanted: float) -> bool:
+def _shown_good(share: Share, wanted: float) -> bool:
     """Return whether so many parts are good, even if all whose fate is not known are bad."""
     return share.value >= wanted and share.ends[0] >= wanted
 
@@ -163,7 +162,7 @@ def as_json(found: Findings) -> dict[str, Any]:
         "metrics": metrics_json(_metrics(found)),
         "requirements": _requirements(found),
         "warnings": [{"name": item.name, "message": item.message} for item in warnings(found)],
-        "yield": _yield(found.all_met),
+        "yield": found.all_met and found.all_met.as_json(),
         "samples": _samples(found),
         "parameters": [_parameter(one) for one in setup.parameters],
         "correlated": _correlated(setup),
@@ -193,7 +192,7 @@ def _metrics(found: Findings) -> dict[str, Quantity]:
 def _requirements(found: Findings) -> list[dict[str, Any]]:
     outcomes = found.setup.nominal.outcomes
     shares = found.each_met or (None,) * len(outcomes)
-    each = [one.as_json() | {"yield": _yield(share)} for one, share in zip(outcomes, shares, strict=True)]
+    each = [one.as_json() | {"yield": share and share.as_json()} for one, share in zip(outcomes, shares, strict=True)]
     wanted = found.setup.block.min_yield
     if wanted is None or found.all_met is None:
         return each
@@ -206,20 +205,6 @@ def _requirements(found: Findings) -> list[dict[str, Any]]:
     sentence = f"yield {shown}, required >= {100 * wanted:.4g} %: {outcome}"
     bounds = {"value": value, "min": wanted, "max": None, "unit": "1", "over": None, "over_unit": None}
     return [*each, {"metric": "yield", **bounds, "ok": good, "sentence": sentence}]
-
-
-def _yield(share: Yield | None) -> dict[str, Any] | None:
-    if share is None:
-        return None
-    return {
-        "value": _known(share.value),
-        "wilson": [_known(end) for end in share.wilson],
-        "clopper_pearson": [_known(end) for end in share.clopper_pearson],
-        "level": LEVEL,
-        "good": share.good,
-        "failed": share.failed,
-        "parts": share.count,
-    }
 
 
 def _known(value: float) -> float | None:
@@ -250,7 +235,5 @@ def _parameter(one: Parameter) -> dict[str, Any]:
 
 
 def _correlated(setup: Setup) -> list[dict[str, Any]]:
-    from cfmkit.studies.sensitivity.parameters import groups
-
-    pairs = groups(setup.block, setup.paths) if setup.method in MADE else ()
+    pairs = setup.parts.correlated if setup.method in MADE else ()
     return [{"parameters": [setup.paths[k] for k in members], "correlation": value} for members, value in pairs]

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.studies.parts.share import Share
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
-    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
     from cfmkit.studies.sensitivity.setup import Setup
 
 IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
@@ -51,8 +51,8 @@ class Findings:
     points: FloatArray | None = None
     outputs: FloatArray | None = None
     replaced: int = 0  # blocks that were drawn again
-    all_met: Yield | None = None  # of parts that meet all requirements
-    each_met: tuple[Yield, ...] = ()  # of parts that meet one
+    all_met: Share | None = None  # of parts that meet all requirements
+    each_met: tuple[Share, ...] = ()  # of parts that meet one
     interrupted: bool = False  # whether the user stopped it: there are no indices
     fresh: bool = False  # whether it was to reuse nothing: then the same command would begin anew
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.specs.units import border_unit, to_border
+from cfmkit.studies.parts.allowed_tolerances import LEAST_FACTOR, allowed_tolerances
+from cfmkit.studies.parts.distributions import values_across, values_at
+from cfmkit.studies.parts.share import Share
 from cfmkit.studies.point_evaluation import Metric
-from cfmkit.studies.sensitivity import inverse, local, monte_carlo_yield, morris, oat, sobol
-from cfmkit.studies.sensitivity.distributions import draw, values_across, values_at
+from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
@@ -24,15 +26,14 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records, Work
+    from cfmkit.studies.parts.allowed_tolerances import ToleranceFactors
+    from cfmkit.studies.parts.share import Fate
+    from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
-    from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.sensitivity.setup import Setup
+
 DEFAULT_YIELD, ESTIMATED = 0.95, 4000
 """What `inverse` keeps where `min_yield` says nothing, and the parts of its estimate of first order."""
-
-LOOKS, NEAR, LEAST_FACTOR, ROUGHLY = 4, 1.3, 1e-6, 500
-"""How often `inverse` looks at the limits, what it takes for the same tolerance, the least part of a stated one, and
-the parts that tell where to look again."""
 
 DRAWN = "drawn"
 """The role of a sample of a Monte Carlo run."""
@@ -185,7 +186,7 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
 
     def drawn(start: int, number: int) -> FloatArray:
         # One stream, so that more samples leave the first ones as they are.
-        unit = draw(setup.correlation, start + number, np.random.default_rng(setup.seed))[start:]
+        unit = setup.parts.unit(start + number, setup.seed)[start:]
         return monte_carlo_yield.sample(unit.reshape(number, count), spreads, groups)
 
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
@@ -224,17 +225,15 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     """State which tolerances keep the yield, and draw parts within those that are allocated."""
     wanted = setup.block.min_yield or DEFAULT_YIELD
     spreads = [one.spread for one in setup.parameters]
-    unit = draw(setup.correlation, ESTIMATED, np.random.default_rng([setup.seed, 3]))
-    errors = values_at(spreads, unit) - setup.values
+    errors = setup.parts.draw(ESTIMATED, [setup.seed, 3]) - setup.values
     costs = np.array([setup.block.costs.get(path, 1.0) for path in setup.paths])
-    answer = _answered(setup, errors, costs, wanted)
+    answer = allowed_tolerances(setup.parts, setup.nominal.result, errors, costs, wanted)
     found = list(_tolerance_lines(setup, answer))
     factors = np.where(np.isfinite(answer.allocated), np.maximum(answer.allocated, LEAST_FACTOR), 1.0)
     tight = [one.tightened(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
 
     def drawn(start: int, number: int) -> FloatArray:
-        again = draw(setup.correlation, start + number, np.random.default_rng(setup.seed))[start:]
-        return values_at(tight, again)[:, None, :]
+        return values_at(tight, setup.parts.unit(start + number, setup.seed)[start:])[:, None, :]
 
     blocks = evaluated(
         drawn, lambda points: evaluator.outputs(points, [DRAWN]), setup.samples, setup.policy, _verdicts(setup)
@@ -242,33 +241,10 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     plain = Findings(
         setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
     )
-    met = blocks.outputs[..., len(setup.study.metrics) :]
-    failed: NDArray[np.bool_] = np.asarray(np.isnan(met).any(axis=-1))[:, 0]
-    good: NDArray[np.bool_] = (~np.isnan(met) & (met > 0.5))[:, 0]
-    each = (monte_carlo_yield.yield_of(good[:, k], failed, setup.policy) for k in range(good.shape[-1]))
-    whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
-    return replace(plain, all_met=monte_carlo_yield.yield_of(whole, failed, setup.policy), each_met=tuple(each))
+    return _with_shares(plain, *_judged(setup, blocks.outputs))
 
 
-def _answered(setup: Setup, errors: FloatArray, costs: FloatArray, wanted: float) -> inverse.ToleranceFactors:
-    """Return the factors on the tolerances; limits are looked at again where these now end, and all looks count."""
-    from cfmkit.studies.redesign_for_yield import rows_along_errors
-
-    result, factors = setup.nominal.result, np.ones(len(setup.parameters))
-    known: tuple[inverse.LimitsAlong | None, ...] = (None,) * len(setup.parameters)
-    for _ in range(LOOKS):
-        rows, seen = rows_along_errors(setup.study.spec, result, setup.parameters, factors)
-        known = along = tuple(one.and_at(before) for one, before in zip(seen, known, strict=True))
-        answer = inverse.answered(rows, along, errors[:ROUGHLY], costs, wanted)
-        ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
-        ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else inverse.WIDEST)
-        if (np.abs(np.log(ends / factors)) < np.log(NEAR)).all():
-            break
-        factors = ends
-    return inverse.answered(rows, along, errors, costs, wanted)
-
-
-def _tolerance_lines(setup: Setup, answer: inverse.ToleranceFactors) -> Iterator[IndexLine]:
+def _tolerance_lines(setup: Setup, answer: ToleranceFactors) -> Iterator[IndexLine]:
     """Yield what each tolerance may be, in its own unit: a standard deviation, or the half width of a range."""
     for k, one in enumerate(setup.parameters):
         spread = one.spread
@@ -280,23 +256,28 @@ def _tolerance_lines(setup: Setup, answer: inverse.ToleranceFactors) -> Iterator
             yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, ESTIMATED)
 
 
+def _judged(setup: Setup, outputs: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which samples meet which requirement (b, s, r), and of which that is not known (b, s)."""
+    met = outputs[..., len(setup.study.metrics) :]
+    return np.asarray(~np.isnan(met) & (met > 0.5)), np.asarray(np.isnan(met).any(axis=-1))
+
+
+def _with_shares(found: Findings, met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Findings:
+    """Return findings with the shares of parts, as drawn, that meet all requirements and each of them."""
+    fate: Fate = "either" if found.setup.policy == "bound" else "unknown"
+    each = tuple(Share.of(met[:, 0, k], failed[:, 0], fate) for k in range(met.shape[-1]))
+    return replace(found, all_met=Share.of(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0], fate), each_met=each)
+
+
 def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     """Return findings with the share of good parts, and what it gains from tighter tolerances."""
     setup, outputs = found.setup, found.outputs
     if outputs is None:
         return found
-    met = outputs[..., len(setup.study.metrics) :]
-    failed: NDArray[np.bool_] = np.asarray(np.isnan(met).any(axis=-1))
-    good: NDArray[np.bool_] = ~np.isnan(met) & (met > 0.5)
-    whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
-    gains = monte_carlo_yield.yield_gains(whole, failed, setup.policy)
-    each = (monte_carlo_yield.yield_of(good[:, 0, k], failed[:, 0], setup.policy) for k in range(met.shape[-1]))
-    return replace(
-        found,
-        lines=(*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines),
-        all_met=monte_carlo_yield.yield_of(whole[:, 0], failed[:, 0], setup.policy),
-        each_met=tuple(each),
-    )
+    met, failed = _judged(setup, outputs)
+    gains = monte_carlo_yield.yield_gains(np.asarray(met.all(axis=-1)), failed, setup.policy)
+    lines = (*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines)
+    return replace(_with_shares(found, met, failed), lines=lines)
 
 
 def _stated(

@@ -16,9 +16,10 @@ from cfmkit.results import Finding
 from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.design_with_margins_and_verification import delivered
+from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.uncertain_values import together
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
 from cfmkit.studies.variable_paths import length_to_vary
 
 if TYPE_CHECKING:
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Sensitivity, Spec
     from cfmkit.specs.units import Ends
+    from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.failed_sample_policy import Policy
-    from cfmkit.studies.sensitivity.parameters import Parameter
 
 Method = Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"]
 SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000, "inverse": 200}
@@ -61,13 +62,9 @@ class Setup:
     """Everything that a sensitivity study needs."""
 
     block: Sensitivity  # what was requested
-    parameters: tuple[Parameter, ...]  # what varies
+    parts: Parts  # what varies, how many samples are drawn and from where
     study: Study  # what is noted at each sample
     nominal: Nominal  # what comes out without any deviation
-    # samples, seed: how many, and from where
-    samples: int
-    seed: int
-    correlation: FloatArray  # (d, d) of the normal scores
     together: tuple[tuple[int, ...], ...]  # parameters whose tolerances are tightened together
     warnings: tuple[Finding, ...] = ()  # what the user must know
 
@@ -82,14 +79,29 @@ class Setup:
         return self.block.on_failure
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The values that vary."""
+        return self.parts.parameters
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.parts.samples
+
+    @property
+    def seed(self) -> int:
+        """Seed of the samples."""
+        return self.parts.seed
+
+    @property
     def paths(self) -> tuple[str, ...]:
         """Of the parameters."""
-        return tuple(one.path for one in self.parameters)
+        return self.parts.paths
 
     @property
     def values(self) -> FloatArray:
         """Nominal values of the parameters, (d,)."""
-        return np.array([one.spread.nominal for one in self.parameters])
+        return self.parts.nominal
 
     @property
     def ends(self) -> FloatArray:
@@ -126,11 +138,11 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     block = spec.sensitivity
     if block is None:
         raise UsageError(NOTHING.replace("{path}", length_to_vary(spec)[0]))
-    parameters = parameters_of(spec, block)
-    _suits(spec, block, parameters)
     chosen = seed if seed is not None else block.seed or 0
     samples = block.samples or SAMPLES[block.method]
-    paths = tuple(one.path for one in parameters)
+    parts = Parts.of_block(spec, block, samples, chosen)
+    parameters, paths = parts.parameters, parts.paths
+    _suits(spec, block, parameters)
     groups = together(block, paths)
     refuse_too_many(points_of(block.method, samples, len(paths), len(groups)), most)
     made = block.method in ("tolerance", "inverse")
@@ -139,8 +151,7 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
     study, nominal, unvalued = _with_nominal(study, result)
     warnings = (*unvalued, *_cautions(spec, block, parameters, samples))
-    matrix = correlations(block, paths)
-    return Setup(block, parameters, study, nominal, samples, chosen, matrix, groups, warnings)
+    return Setup(block, parts, study, nominal, groups, warnings)
 
 
 def points_of(method: Method, samples: int, parameters: int, groups: int) -> int:

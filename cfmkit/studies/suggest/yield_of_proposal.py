@@ -1,7 +1,7 @@
 """The share of a proposal's manufactured parts that would meet the wish, and values moved until it suffices.
 
 The share is estimated to first order, then counted in random parts. Parts have the tolerances that are assumed of the
-process (`cfmkit.studies.stated_or_assumed_tolerances`) and are drawn as `cfmkit sensitivity` draws them of the block
+process (`cfmkit.studies.parts.assumed_errors`) and are drawn as `cfmkit sensitivity` draws them of the block
 `sensitivity` that the proposal's file says, so that its answer is the same.
 
 A proposal whose made parts miss the wished yield alone is designed again: with margins, as by `design.yield`. What may
@@ -25,12 +25,13 @@ from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
-from cfmkit.studies.redesign_for_yield import Sight, costliest_path, problem_of, written
-from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of
-from cfmkit.studies.sensitivity.parameters import parameters_of
-from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, assumed, tolerances
-from cfmkit.studies.yield_by_assumed_tolerances import YieldUnknown, first_order_shares
-from cfmkit.studies.yield_of_drawn_parts import judge
+from cfmkit.studies.parts.assumed_errors import assumed, tolerances
+from cfmkit.studies.parts.near_parts import Unknown, expected_shares
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.redesign import PartNumbers
+from cfmkit.studies.parts.requirement_rows import requirement_rows
+from cfmkit.studies.parts.share import percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,10 +41,10 @@ if TYPE_CHECKING:
     from cfmkit.families.wishes import Candidate, Wish
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.stated_or_assumed_tolerances import Assumed
-    from cfmkit.studies.yield_by_assumed_tolerances import FirstOrderShares
+    from cfmkit.studies.parts.assumed_errors import Assumed
+    from cfmkit.studies.parts.near_parts import ExpectedShares
 
-PARTS = 100
+N_DRAWN = 100
 """Parts that are drawn of a proposal, each analysed in full: one standard deviation is 3 % where 90 % are good."""
 
 AT_ONCE = 10
@@ -59,7 +60,7 @@ OUT_OF_TIME = "the time budget ended before its manufactured parts were evaluate
 class GoodParts:
     """Yield of a proposal's made parts, and its assumptions."""
 
-    # of them that are good: of `PARTS`, or to first order where `missed` says so; None if nothing is known
+    # of them that are good: of `N_DRAWN`, or to first order where `missed` says so; None if nothing is known
     share: float | None
     missed: str = ""  # why that is not what is wished; empty where it is
     late: bool = False  # whether the time ended it before anything was known
@@ -86,7 +87,7 @@ def with_made_parts(spec: Spec, wish: Wish, seed: int) -> Spec:
         path: one if isinstance(one, tuple) else one.model_dump(exclude_none=True) for path, one in stated.items()
     }
     block = {
-        "method": "tolerance", "parameters": parameters, "samples": PARTS, "seed": seed,
+        "method": "tolerance", "parameters": parameters, "samples": N_DRAWN, "seed": seed,
         "min_yield": f"{100.0 * float(wish.good_parts or 0.0):.12g} %",
     }  # fmt: skip
     return spec.replace({"sensitivity": block})
@@ -112,18 +113,19 @@ def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodPart
         return GoodParts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"
         )
-    first = _first_order(result, found)
+    parts = Parts.of_block(result.spec, result.spec.sensitivity, N_DRAWN, result.spec.sensitivity.seed or 0)
+    first = _first_order(result, parts)
     most = 1.0 if first is None else _most(first, found, wish)
-    if first is not None and first.good < wanted:
-        text = _reported(first.good, f"made by {found.process.name}, to first order", wanted)
-        return GoodParts(first.good, text + _cures(first, found, most, wanted), movable=most >= wanted)
+    if first is not None and first.good.value < wanted:
+        text = _reported(first.good.value, f"made by {found.process.name}, to first order", wanted)
+        return GoodParts(first.good.value, text + _cures(first, found, most, wanted), movable=most >= wanted)
     if not draw:
-        return GoodParts(None if first is None else first.good)
-    drawn = _drawn(result, found, wanted, clock)
+        return GoodParts(None if first is None else first.good.value)
+    drawn = _drawn(result, parts, found, wanted, clock)
     return replace(drawn, movable=first is not None and bool(drawn.missed) and most >= wanted)
 
 
-def _most(first: FirstOrderShares, found: Assumed, wish: Wish) -> float:
+def _most(first: ExpectedShares, found: Assumed, wish: Wish) -> float:
     """Return the largest yield of any shape, by the modulus alone, which no shape makes any surer.
 
     A force that goes with a modulus between E0 and E1, all equally likely, is within [F0, F1] for a share of
@@ -135,33 +137,34 @@ def _most(first: FirstOrderShares, found: Assumed, wish: Wish) -> float:
     return min(1.0, (1.0 - wish.low / wish.high) * high / (high - low))
 
 
-def _cures(first: FirstOrderShares, found: Assumed, most: float, wanted: float) -> str:
+def _cures(first: ExpectedShares, found: Assumed, most: float, wanted: float) -> str:
     """Return what a yield would be without errors that a whole part has in common, and how one gets there."""
     better = {"once the modulus is measured": first.measured, "after a trim of each part's force": first.trimmed}
-    shown = [f"{_percent(share)} {words}" for words, share in better.items() if share > first.good + 0.005]
+    least = first.good.value + 0.005
+    shown = [f"{percent(share.value)} {words}" for words, share in better.items() if share.value > least]
     text = f" ({', '.join(shown)})" if shown else ""
     if most >= wanted or found.modulus is None:
         return text
     ends = " to ".join(format_short(end, "stress") for end in found.modulus)
     return (
-        f"{text}; no shape exceeds {_percent(most)}, because its force is proportional to the modulus of {ends}: "
+        f"{text}; no shape exceeds {percent(most)}, because its force is proportional to the modulus of {ends}: "
         "measure it on a coupon and state it as the wish's material, fit it to a measured part with 'cfmkit "
         "calibrate', or trim the force of each part"
     )
 
 
-def _first_order(result: Result, found: Assumed) -> FirstOrderShares | None:
+def _first_order(result: Result, parts: Parts) -> ExpectedShares | None:
     """Return the shares of good parts; None if only drawn parts can say them."""
     try:
-        return first_order_shares(result, found, Run())
-    except YieldUnknown:
+        return expected_shares(result, parts, Run())
+    except Unknown:
         return None
 
 
-def _drawn(result: Result, found: Assumed, wanted: float, clock: Clock) -> GoodParts:
+def _drawn(result: Result, parts: Parts, found: Assumed, wanted: float, clock: Clock) -> GoodParts:
     """Return how many drawn parts are good; the first that are too many bad ones end it."""
-    good, looked, most_bad = 0, 0, (1.0 - wanted) * PARTS + 1e-9
-    for met in _met(result):
+    good, looked, most_bad = 0, 0, (1.0 - wanted) * N_DRAWN + 1e-9
+    for met in _met(result, parts):
         if clock.late():
             return GoodParts(None, OUT_OF_TIME, late=True)
         looked += len(met)
@@ -172,23 +175,15 @@ def _drawn(result: Result, found: Assumed, wanted: float, clock: Clock) -> GoodP
     return GoodParts(good / looked)
 
 
-def _met(result: Result) -> Iterator[NDArray[np.bool_]]:
+def _met(result: Result, parts: Parts) -> Iterator[NDArray[np.bool_]]:
     """Yield which of the next parts are good, (n,) of bool."""
-    spec = result.spec
-    block = spec.sensitivity
-    assert block is not None
-    made = DesignTolerances(spec, block, parameters_of(spec, block), PARTS, block.seed or 0)
-    values = made.drawn()
-    for begin in range(0, PARTS, AT_ONCE):
-        yield np.asarray(judge(made, values[begin : begin + AT_ONCE], result, Run()).met.all(axis=1))
+    values = parts.draw()
+    for begin in range(0, len(values), AT_ONCE):
+        yield np.asarray(analyze_parts(parts, values[begin : begin + AT_ONCE], result, Run()).met.all(axis=1))
 
 
 def _reported(share: float, made: str, wanted: float) -> str:
-    return f"yield {_percent(share)} {made}, wanted at least {_percent(wanted)}"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+    return f"yield {percent(share)} {made}, wanted at least {percent(wanted)}"
 
 
 def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, run: Run) -> MovedForYield | None:
@@ -217,20 +212,17 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
     nominal = family(spec.family).analyze(spec, Run())
     if not free or block is None or nominal.status is not Status.COMPLETE:
         return None
-    places = places_of(nominal)
-    first = sampled_of(spec, places, run)
-    if first is None:
+    rows = requirement_rows(nominal, spec, run)
+    if rows is None:
         return None
-    made = DesignTolerances(spec, block, parameters_of(spec, block), block.samples or PARTS, run.seed)
-    sight = Sight(spec, tuple(free), made, rows_of(nominal, first, places), run)
-    problem = problem_of(sight, free, asked, Clock.of(run.time_budget))
+    parts = Parts.of_block(spec, block, block.samples or N_DRAWN, run.seed)
+    numbers = PartNumbers(parts, tuple(free), rows, run)
+    problem = numbers.problem(free, asked, Clock.of(run.time_budget))
     try:
-        found = with_margins(problem, np.array([float(spec.at(path)) for path in free]), STEPS)
+        found = with_margins(problem, numbers.start, STEPS)
     except NoPart:
         return None
-    return MovedForYield(
-        written(sight, found, problem), found.began, found.share, costliest_path(sight, found, problem)
-    )
+    return MovedForYield(numbers.written(found, problem), found.began, found.share, numbers.costliest(found, problem))
 
 
 def _free(candidate: Candidate, spec: Spec, wish: Wish) -> dict[str, tuple[float, float]]:

@@ -1,8 +1,9 @@
 """The inverse of a tolerance study: which tolerance on each parameter keeps the requested yield.
 
-Requirements become rows of force and stress at a few poses (`studies.redesign_for_yield`). How they move with each
-error alone is known exactly at some of its sizes and linear between; errors of several parameters add. With that the
-yield of any set of tolerances is estimated without one more solution. Three answers follow:
+Requirements become rows of force and stress at a few poses (`requirement_rows`). How they move with each error alone is
+solved at some of its sizes and linear between; errors of several parameters add. A derivative would not do: tolerances
+may become twenty times as wide as stated. With that the yield of any set of tolerances is estimated without one more
+solution. Three answers follow:
 
 - alone: how wide one tolerance may be while all others stay as they are stated;
 - together: all of them by one factor;
@@ -11,7 +12,6 @@ yield of any set of tolerances is estimated without one more solution. Three ans
   multiplier of sum c/t under sum (t s)^2).
 
 The allocated set is then drawn and analysed part by part: the yield that is reported is that of those parts.
-
 """
 
 from __future__ import annotations
@@ -21,10 +21,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.errors import SolutionError
+from cfmkit.families.run_control import Run
+from cfmkit.studies.parts.requirement_rows import numbers_of, numbers_of_parts, requirement_rows
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.results import Result
+    from cfmkit.studies.parts.parts import Parts
+
+ERRORS_TRIED = np.array([-2.5, -1.7, -0.85, 0.85, 1.7, 2.5])
+"""Errors at which limits are solved, in standard deviations; 1.7 is just within the ends of a range."""
+
+MAX_SOLUTIONS, SAME_FACTOR, LEAST_FACTOR, N_ROUGH = 4, 1.3, 1e-6, 500
+"""How often limits are solved, what is taken for the same tolerance, the least part of a stated one, and the parts that
+decide where to solve again."""
 
 WIDEST = 20.0
 """A tolerance is not made wider than so many times what is stated: first order does not reach farther."""
@@ -57,10 +70,40 @@ class LimitsAlong:
         return LimitsAlong(offsets, np.concatenate([self.changes, other.changes])[at])
 
 
-def in_proportion(by_error: FloatArray) -> tuple[LimitsAlong, ...]:
-    """Return limits that move in proportion to each error, from their derivatives (m, d)."""
-    ends = np.array([-1.0, 0.0, 1.0])
-    return tuple(LimitsAlong(ends, ends[:, None] * one) for one in by_error.T)
+def limits_along_errors(
+    parts: Parts, nominal: Result, factors: FloatArray
+) -> tuple[FloatArray, tuple[LimitsAlong, ...]]:
+    """Return the limits of a perfect part (m,), and how they move with the error of each parameter.
+
+    `factors`, (d,): on the stated tolerances: limits are solved as far as such tolerances go.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If the perfect part, or one near it, cannot be followed at a few poses.
+    """
+    run, spec = Run(), parts.spec
+    rows = requirement_rows(nominal, spec, run)
+    middle = None if rows is None else numbers_of(spec, rows, run)
+    if rows is None or middle is None:
+        raise SolutionError("the specification cannot be followed at a few poses: no tolerance can be stated")
+    found = []
+    for one, factor in zip(parts.parameters, factors.tolist(), strict=True):
+        tight = one.spread.tightened(factor)
+        offsets = factor * ERRORS_TRIED * one.spread.standard_deviation
+        there = one.spread.nominal + offsets
+        tried = (offsets != 0.0) & (tight.low <= there) & (there <= tight.high)
+        near = numbers_of_parts(spec, {one.path: there[tried]}, rows, run)
+        known = dict(zip(offsets[tried].tolist(), near, strict=True))
+        moved = {offset: numbers - middle for offset, numbers in sorted(known.items()) if numbers is not None}
+        if not moved:
+            raise SolutionError(
+                f"parts with an error of {one.path} cannot be followed: state a smaller tolerance for it"
+            )
+        offsets, at = np.array(list(moved)), int(np.searchsorted(list(moved), 0.0))
+        changes = np.array(list(moved.values())) @ rows.matrix.T
+        found.append(LimitsAlong(np.insert(offsets, at, 0.0), np.insert(changes, at, 0.0, axis=0)))
+    return rows.limits(middle), tuple(found)
 
 
 @dataclass(frozen=True)
@@ -75,29 +118,18 @@ class ToleranceFactors:
     perfect: float  # yield without errors, 0 or 1
 
 
-def answered(
+def factors_that_keep(
     rows: FloatArray,
-    by_error: FloatArray | tuple[LimitsAlong, ...],
+    along: tuple[LimitsAlong, ...],
     errors: FloatArray,
     costs: FloatArray,
     wanted: float,
 ) -> ToleranceFactors:
-    """Return the factors on tolerances that keep a yield.
+    """Return the factors on tolerances that keep a wanted yield.
 
-    Parameters
-    ----------
-    rows : (m,) array
-        Limits of a perfect part; at least zero where they hold.
-    by_error : (m, d) array or d LimitsAlong
-        Their derivatives by the errors, or how they move with each.
-    errors : (k, d) array
-        Errors of parts as the tolerances are stated.
-    costs : (d,) array
-        Cost of each tolerance: c over its width.
-    wanted : float
-        The yield.
+    `rows`, (m,): limits of a perfect part, at least zero where they hold; `along`, of d errors: how they move with
+    each; `errors`, (k, d): of parts as the tolerances are stated; `costs`, (d,): of each tolerance, over its width.
     """
-    along = by_error if isinstance(by_error, tuple) else in_proportion(by_error)
     stated = [one(error) for one, error in zip(along, errors.T, strict=True)]
     all_moved: FloatArray = np.sum(stated, axis=0)
     ones = np.ones(errors.shape[1])
@@ -119,6 +151,24 @@ def answered(
     return ToleranceFactors(
         alone, together * ones, np.minimum(allocated * shape, WIDEST), good(all_moved), good(0.0 * all_moved)
     )
+
+
+def allowed_tolerances(
+    parts: Parts, nominal: Result, errors: FloatArray, costs: FloatArray, wanted: float
+) -> ToleranceFactors:
+    """Return the factors on the tolerances; limits are solved again where these now end, and all solutions count."""
+    factors = np.ones(len(parts.parameters))
+    known: tuple[LimitsAlong | None, ...] = (None,) * len(factors)
+    for _ in range(MAX_SOLUTIONS):
+        rows, seen = limits_along_errors(parts, nominal, factors)
+        known = along = tuple(one.and_at(before) for one, before in zip(seen, known, strict=True))
+        answer = factors_that_keep(rows, along, errors[:N_ROUGH], costs, wanted)
+        ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
+        ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else WIDEST)
+        if (np.abs(np.log(ends / factors)) < np.log(SAME_FACTOR)).all():
+            break
+        factors = ends
+    return factors_that_keep(rows, along, errors, costs, wanted)
 
 
 def _largest(share: Callable[[float], float], wanted: float) -> float:

@@ -7,7 +7,19 @@ import pytest
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import Undefined, Window
-from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.compare import (
+    Compared,
+    Difference,
+    Differences,
+    Points,
+    compare,
+    counterpart,
+    effort_at,
+    largest,
+    mean,
+    overlap,
+    rms,
+)
 from cfmkit.plots.curves import plot_curve
 from cfmkit.plots.style import new_figure
 from cfmkit.tables import curve_table, read_csv, to_csv
@@ -24,7 +36,11 @@ def line(motion, effort, branch="load", **label):
 
 def summary(*values, tag=""):
     named = {f"b{k}": Difference(np.array(item, dtype=float), f"reason {k}") for k, item in enumerate(values)}
-    return {name: item.value for name, item in summarize(named, MEASURES, "force", tag).items()}
+    return {name: item.value for name, item in summarize(named, tag).items()}
+
+
+def summarize(curves, tag=""):
+    return Differences(curves, np.empty(0), None, ()).summarize(MEASURES, "force", tag)
 
 
 def test_the_largest_difference_keeps_its_sign():
@@ -39,7 +55,7 @@ def test_several_branches_are_told_one_by_one_and_together():
 
 def test_a_gap_leaves_no_number_but_the_reason_of_its_branch():
     values = {"up": Difference(np.ones(3), "none"), "down": Difference(np.array([1.0, np.nan]), "why")}
-    found = summarize(values, MEASURES, "force")
+    found = summarize(values)
     assert found["d_rms[up]"].value == 1.0
     for name in ("d_rms", "d_rms[down]"):
         assert (found[name].value, found[name].reason) == (None, "why")
@@ -79,3 +95,29 @@ def test_a_word_that_tells_curves_apart_names_their_lines():
     motion = np.linspace(0, 1, 20)
     plot_curve([line(motion, motion, model="fine"), line(motion, 1 + motion, model="coarse")], ax)
     assert {"fine", "coarse"} <= {text.get_text() for text in ax.texts}
+
+
+def test_two_curves_a_measurement_and_metrics_are_compared_by_one_function():
+    fine, coarse = line([0.0, 2.0], [1.0, 3.0]), line([-1.0, 1.0], [1.5, 3.5], "up")
+    found = compare(Compared("fine", fine), Compared("coarse", coarse))
+    assert found.window == Window(0.0, 1.0)
+    np.testing.assert_allclose(found.curves["load"].values, 1.5)
+    points = {"load": Points(np.array([0.5, 3.0]), np.array([2.0, 2.0]), "up", np.array([1.0, 0.0]))}
+    found = compare(Compared("measured", points=points), Compared("model", coarse))
+    np.testing.assert_array_equal(found.curves["load"].values, [1.0, np.nan])
+    before, after = {"a": {"value": 2.0, "unit": "N"}, "b": {"value": "x"}}, {"a": {"value": 2.5, "unit": "N"}}
+    changes = compare(Compared("before", metrics=before), Compared("spec.yaml", metrics=after), tolerance=0.3).changes
+    assert [(one.spec, one.name, one.relative, one.beyond) for one in changes] == [
+        ("spec.yaml", "a", 0.25, False),
+        ("spec.yaml", "b", None, True),
+    ]
+    assert changes[0].sentence == "a: 2 -> 2.5 N (+25 %)"
+
+
+def test_what_cannot_be_compared_says_why():
+    some, apart = line([0.0, 1.0], [1.0, 1.0]), line([2.0, 3.0], [1.0, 1.0])
+    back = line([0.0, 1.0, 0.5], [0.0, 1.0, 2.0])
+    for other, why in ((None, "there is no coarse curve"), (apart, "they have no travel in common")):
+        found = compare(Compared("fine", some), Compared("coarse", other))
+        assert (found.window, found.curves[""].reason) == (None, why)
+    assert "many-valued" in compare(Compared("fine", some), Compared("coarse", back)).curves["load"].reason

@@ -10,7 +10,8 @@ drawn anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,34 +27,33 @@ from cfmkit.designing.robust_design import (
     with_margins,
 )
 from cfmkit.designing.run_many_starts import Clock
-from cfmkit.errors import CfmError, SolutionError, SpecError
+from cfmkit.errors import CfmError, SpecError
 from cfmkit.errors import Problem as Fault
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
-from cfmkit.studies.requirement_constraints import (
+from cfmkit.studies.parts.parts import NO_TOLERANCE, Parts
+from cfmkit.studies.parts.requirement_rows import (
     RequirementRows,
+    exact_derivatives,
     numbers_in,
     numbers_of,
-    places_of,
-    rows_of,
+    numbers_of_parts,
+    requirement_rows,
     sampled_of,
     stated_places,
 )
-from cfmkit.studies.sensitivity.inverse import LimitsAlong
-from cfmkit.studies.sensitivity.probability_confidence_intervals import clopper_pearson
-from cfmkit.studies.stated_or_assumed_tolerances import NO_TOLERANCE, tolerances_of
+from cfmkit.studies.parts.share import Share
 from cfmkit.studies.variable_paths import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.sensitivity.parameters import Parameter
-    from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances
 
 
 ESTIMATED = 4000
@@ -74,32 +74,33 @@ LOWER = 4
 DRAWN = 48
 """Parts that `design.robust` solves at each step: of Lan's shape 96 % are good after it, after 24 of them 93 %."""
 
-LOOKED_AT = np.array([-2.5, -1.7, -0.85, 0.85, 1.7, 2.5])
-"""Errors at which limits are looked at, in standard deviations; 1.7 is just within the ends of a range."""
-
 NOTHING_FREE = "this design has no values that may change ('design.free')"
 
 DIGITS = 6
 """Decimals of a value that is written, as a share of its range."""
 
 
-@dataclass
-class Sight:
-    """Requirement values of one manufactured part: `cfmkit.designing.robust_design.SeenPart`."""
+@dataclass(frozen=True)
+class PartNumbers:
+    """Numbers of one manufactured part: `cfmkit.designing.robust_design.SeenPart`."""
 
-    spec: Spec  # the design that the search began with
+    parts: Parts  # of the design that the search began with
     free: tuple[str, ...]  # paths of the values that may move
-    made: DesignTolerances  # what errors there are
-    rows: RequirementRows  # what is looked at
-    run: Run  # seed
+    rows: RequirementRows  # what the numbers are
+    run: Run = field(default_factory=Run)  # seed
+
+    @property
+    def start(self) -> FloatArray:
+        """The values that may move, where the search began, (n,) [SI]."""
+        return np.array([float(self.parts.spec.at(path)) for path in self.free])
 
     def variant(self, x: FloatArray, errors: FloatArray) -> Spec:
         """Return the specification of a part."""
-        changes = dict(zip(self.free, x.tolist(), strict=True))
-        for path, error, at in zip(self.made.paths, errors.tolist(), self.made.nominal.tolist(), strict=True):
+        parts, changes = self.parts, dict(zip(self.free, x.tolist(), strict=True))
+        for path, error, at in zip(parts.paths, errors.tolist(), parts.nominal.tolist(), strict=True):
             if error:
                 changes[path] = changes.get(path, at) + error
-        return self.spec.replace(changes, as_made=bool(errors.any()))
+        return parts.spec.replace(changes, as_made=bool(errors.any()))
 
     def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
         """Return the numbers of a part; None if it has none."""
@@ -108,84 +109,82 @@ class Sight:
         except CfmError:
             return None
 
-    def is_good(self, x: FloatArray, errors: FloatArray) -> bool:
-        """Return whether a part keeps every row, over all of the windows."""
-        try:
-            numbers = numbers_of(self.variant(x, errors), self.rows, self.run, stated_places(self.spec))
-        except CfmError:
-            return False
-        return numbers is not None and bool((self.rows.matrix @ numbers + self.rows.constant >= 0).all())
+    def are_good(self, x: FloatArray, errors: FloatArray) -> NDArray[np.bool_]:
+        """Return which parts with errors (k, d) keep every row, over all of the windows, (k,); each is solved."""
+        design = self.variant(x, np.zeros(errors.shape[1]))
+        middle = np.array([float(design.at(path)) for path in self.parts.paths])
+        values = dict(zip(self.parts.paths, (middle + errors).T, strict=True))
+        found = numbers_of_parts(design, values, self.rows, self.run, stated_places(self.parts.spec))
+        return np.array([one is not None and (self.rows.limits(one) >= 0).all() for one in found], dtype=bool)
 
     def slopes(self, x: FloatArray, errors: FloatArray) -> PartSlopes | None:
         """Return the exact derivatives of the numbers of a part, as far as its family knows them; None of none."""
-        quick = family(self.spec.family).sampled_slopes
-        # metrics are extremes of a whole analysis: nobody has their derivatives
-        if quick is None or self.rows.metrics:
+        if self.rows.metrics:  # extremes of a whole analysis: nobody has their derivatives
             return None
+        paths = self.parts.paths
         try:
-            part = self.variant(x, errors)
-            found = function_named(quick)(part, self.rows.places, tuple({*self.free, *self.made.paths}))
+            found = exact_derivatives(self.variant(x, errors), self.rows.places, tuple({*self.free, *paths}))
         except CfmError:
             return None
-        if found is None:
-            return None
         unknown = np.full(len(self.rows.matrix.T), np.nan)
-        by = {path: numbers_in(one) for path, one in found.by.items()}
-        return PartSlopes(
-            np.array([by.get(path, unknown) for path in self.free]).T,
-            np.array([by.get(path, unknown) for path in self.made.paths]).T,
+        by = {path: numbers_in(one) for path, one in found.items()}
+        by_x, by_error = (np.array([by.get(path, unknown) for path in names]).T for names in (self.free, paths))
+        return PartSlopes(by_x, by_error) if by else None
+
+    def checked(self, x: FloatArray) -> int:
+        """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
+        return int(self.are_good(x, self._fresh_errors).sum())
+
+    @cached_property
+    def _fresh_errors(self) -> FloatArray:
+        """Errors of the parts that are solved, (n, d)."""
+        return np.asarray(self.parts.draw(CHECKED, self.parts.seed + SEARCH_SEED + 1) - self.parts.nominal)
+
+    def ends_early(self) -> int:
+        """Return how many of those parts have numbers, but not over all of the stated windows."""
+        stated, x = stated_places(self.parts.spec), self.start
+        if not stated:
+            return 0
+        return sum(self._follows(x, one, ()) and not self._follows(x, one, stated) for one in self._fresh_errors)
+
+    def _follows(self, x: FloatArray, errors: FloatArray, reached: tuple[float, ...]) -> bool:
+        try:
+            return sampled_of(self.variant(x, errors), self.rows.places, self.run, reached) is not None
+        except CfmError:
+            return False
+
+    def problem(self, free: Mapping[str, tuple[float, float]], wanted: float, clock: Clock) -> RobustProblem:
+        """Return how values with ranges `free` [SI] are to move until a share of parts is good, or time ends."""
+        parts, rows = self.parts, self.rows
+
+        def tell(share: float, steps: int) -> None:
+            reported = f"step {steps}: about {100.0 * share:.3g} % of parts good"
+            self.run.progress(min(0.99, steps / 20.0), reported)
+
+        return RobustProblem(
+            self,
+            np.array(list(free.values())).reshape(-1, 2),
+            parts.draw(ESTIMATED, parts.seed + SEARCH_SEED) - parts.nominal,
+            parts.deviations,
+            rows.matrix,
+            rows.constant,
+            np.array(rows.about),
+            wanted,
+            clock.late,
+            tell,
+            self.slopes,
         )
 
+    def written(self, found: RobustResult, problem: RobustProblem) -> Spec:
+        """Return the design with its values moved, as few digits of them as matter."""
+        steps = 10.0**-DIGITS * problem.reach
+        x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
+        return self.variant(np.array([float(f"{value:.9g}") for value in x]), problem.perfect)
 
-def rows_along_errors(
-    spec: Spec, nominal: Result, parameters: tuple[Parameter, ...], factors: FloatArray
-) -> tuple[FloatArray, tuple[LimitsAlong, ...]]:
-    """Return the rows of a specification's requirements (m,), and how they move with the error of each parameter.
-
-    Parameters
-    ----------
-    spec, nominal : Spec and Result
-        The perfect part.
-    parameters : tuple of Parameter
-        What errs.
-    factors : (d,) array
-        On the stated tolerances: errors are looked at as far as such tolerances go.
-
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If it, or a part near it, cannot be followed at a few poses.
-    """
-    run, places = Run(), places_of(nominal)
-    first = sampled_of(spec, places, run)
-    rows = None if first is None else rows_of(nominal, first, places)
-    middle = None if rows is None else numbers_of(spec, rows, run)
-    if rows is None or middle is None:
-        raise SolutionError("the specification cannot be followed at a few poses: no tolerance can be stated")
-    found = []
-    for one, factor in zip(parameters, factors.tolist(), strict=True):
-        known = {}
-        for offset in (factor * LOOKED_AT * deviation_of(one)).tolist():
-            there = one.spread.nominal + offset
-            if offset and one.spread.tightened(factor).low <= there <= one.spread.tightened(factor).high:
-                try:
-                    known[offset] = numbers_of(spec.replace({one.path: there}), rows, run)
-                except CfmError:
-                    continue
-        moved = {offset: numbers - middle for offset, numbers in sorted(known.items()) if numbers is not None}
-        if not moved:
-            raise SolutionError(
-                f"parts with an error of {one.path} cannot be followed: state a smaller tolerance for it"
-            )
-        offsets, at = np.array(list(moved)), int(np.searchsorted(list(moved), 0.0))
-        changes = np.array(list(moved.values())) @ rows.matrix.T
-        found.append(LimitsAlong(np.insert(offsets, at, 0.0), np.insert(changes, at, 0.0, axis=0)))
-    return rows.matrix @ middle + rows.constant, tuple(found)
-
-
-def deviation_of(one: Parameter) -> float:
-    """Return the standard deviation of a parameter [SI]."""
-    return one.spread.standard_deviation
+    def costliest(self, found: RobustResult, problem: RobustProblem) -> str:
+        """Return the value whose tolerance costs most; several that err as one are joined by commas."""
+        groups = self.parts.joined
+        return ", ".join(self.parts.paths[k] for k in groups[costliest(found, problem, groups)])
 
 
 def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
@@ -278,39 +277,39 @@ def _moved(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -
         return 0, design
     free = free_of(given, design.spec)
     nominal = family(given.family).analyze(design.spec, run)
-    made = tolerances_of(design.spec, block, run.seed)
-    if made is None:
+    parts = Parts.of_design(design.spec, block, run.seed)
+    if parts is None:
         return 0, replace(design, notes=(*design.notes, ("margins", f"none: {NO_TOLERANCE}")))
     if nominal.status is not Status.COMPLETE:
         return 0, design
-    places = places_of(nominal)
-    first = sampled_of(design.spec, places, run)
-    if first is None:
+    rows = requirement_rows(nominal, design.spec, run)
+    if rows is None:
         return 0, replace(design, notes=(*design.notes, ("margins", "the design cannot be followed: no margins")))
-    sight = Sight(design.spec, tuple(free), made, rows_of(nominal, first, places), run)
-    problem = problem_of(sight, free, wanted, clock)
-    start = np.array([float(design.spec.at(path)) for path in free])
+    numbers = PartNumbers(parts, tuple(free), rows, run)
+    problem = numbers.problem(free, wanted, clock)
     try:
-        found, good = _held(problem, sight, start, largest)
+        found, good = _with_margins(problem, numbers, numbers.start, largest)
         if block.robust is not None and free:
             again = drawn(problem, found, DRAWN, block.robust == "worst")
-            better = checked(sight, again.x)
+            better = numbers.checked(again.x)
             found, good = (again, better) if better >= good else (found, good)
     except NoPart:
         return 0, replace(
             design, notes=(*design.notes, ("margins", "a neighbour of the design has no curve: no margins"))
         )
-    return good, _designed(design, sight, found, good, problem)
+    return good, _designed(design, numbers, found, good, problem)
 
 
-def _held(problem: RobustProblem, sight: Sight, start: FloatArray, largest: bool = True) -> tuple[RobustResult, int]:
+def _with_margins(
+    problem: RobustProblem, numbers: PartNumbers, start: FloatArray, largest: bool = True
+) -> tuple[RobustResult, int]:
     """Return the design with margins and how many of `CHECKED` parts are good; more is requested until enough are."""
     best: tuple[RobustResult, int] | None = None
     asked, x, began = problem.share, start, None
     for _ in range(ROUNDS):
         found = with_margins(replace(problem, share=asked), x)
         began = found.began if began is None else began
-        good = checked(sight, found.x)
+        good = numbers.checked(found.x)
         if best is None or good > best[1]:
             best = replace(found, began=began), good
         short = problem.share - good / CHECKED
@@ -318,16 +317,16 @@ def _held(problem: RobustProblem, sight: Sight, start: FloatArray, largest: bool
             break
         asked, x = min(MOST_ASKED, max(found.share, asked) + 0.5 * short), found.x
     assert best is not None
-    return _largest(problem, sight, start, best) if largest and _misses(best[1], problem) else best
+    return _largest(problem, numbers, start, best) if largest and _misses(best[1], problem) else best
 
 
 def _misses(good: int, problem: RobustProblem) -> bool:
     """Return whether so many of `CHECKED` parts exclude that the requested share is good, with 95 % confidence."""
-    return clopper_pearson(good, CHECKED)[1] < problem.share
+    return Share(good, 0, CHECKED).excludes(problem.share)
 
 
 def _largest(
-    problem: RobustProblem, sight: Sight, start: FloatArray, best: tuple[RobustResult, int]
+    problem: RobustProblem, numbers: PartNumbers, start: FloatArray, best: tuple[RobustResult, int]
 ) -> tuple[RobustResult, int]:
     """Return the design with the largest yield that is found where the requested one is not.
 
@@ -340,7 +339,7 @@ def _largest(
         if problem.late():
             break
         found = with_margins(replace(problem, share=asked), start)
-        good = checked(sight, found.x)
+        good = numbers.checked(found.x)
         if good > best[1]:
             best = replace(found, reached=False), good
         low, high = (max(asked, best[1] / CHECKED), high) if good >= CHECKED * asked else (best[1] / CHECKED, asked)
@@ -349,74 +348,11 @@ def _largest(
     return best
 
 
-def checked(sight: Sight, x: FloatArray) -> int:
-    """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
-    return sum(sight.is_good(x, one) for one in _errors(sight))
-
-
-def _ends_early(sight: Sight, x: FloatArray) -> int:
-    """Return how many of the parts that are solved have numbers, but not over all of the stated windows."""
-    stated = stated_places(sight.spec)
-    if not stated:
-        return 0
-    places, run, short = sight.rows.places, sight.run, 0
-    for one in _errors(sight):
-        try:
-            part = sight.variant(x, one)
-            short += sampled_of(part, places, run, stated) is None and sampled_of(part, places, run) is not None
-        except CfmError:
-            continue
-    return short
-
-
-def _errors(sight: Sight) -> FloatArray:
-    """Return the errors of the parts that are solved, (n, d)."""
-    return np.asarray(sight.made.drawn(CHECKED, sight.made.seed + SEARCH_SEED + 1) - sight.made.nominal)
-
-
-def problem_of(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, clock: Clock) -> RobustProblem:
-    """Return how values with ranges `free` [SI] are to move until a share `wanted` of parts is good, or time ends."""
-    made, run = sight.made, sight.run
-    values = made.drawn(ESTIMATED, made.seed + SEARCH_SEED)
-    errors = values - made.nominal
-    sigma = np.array([one.spread.standard_deviation for one in made.parameters])
-
-    def tell(share: float, steps: int) -> None:
-        run.progress(min(0.99, steps / 20.0), f"step {steps}: about {100.0 * share:.3g} % of parts good")
-
-    return RobustProblem(
-        sight,
-        np.array(list(free.values())).reshape(-1, 2),
-        errors,
-        sigma,
-        sight.rows.matrix,
-        sight.rows.constant,
-        np.array(sight.rows.about),
-        wanted,
-        clock.late,
-        tell,
-        sight.slopes,
-    )
-
-
-def written(sight: Sight, found: RobustResult, problem: RobustProblem) -> Spec:
-    """Return the design with its values moved, as few digits of them as matter."""
-    steps = 10.0**-DIGITS * problem.reach
-    x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
-    return sight.variant(np.array([float(f"{value:.9g}") for value in x]), problem.perfect)
-
-
-def costliest_path(sight: Sight, found: RobustResult, problem: RobustProblem) -> str:
-    """Return which value it is whose tolerance costs most; several that err as one are joined by commas."""
-    groups = sight.made.joined()
-    return ", ".join(sight.made.paths[k] for k in groups[costliest(found, problem, groups)])
-
-
-def _designed(design: Design, sight: Sight, found: RobustResult, good: int, problem: RobustProblem) -> Design:
+def _designed(design: Design, part: PartNumbers, found: RobustResult, good: int, problem: RobustProblem) -> Design:
     """Return the design with its values moved, or why there is none, and what the search says of it."""
-    x, spec, worst = found.x, written(sight, found, problem), costliest_path(sight, found, problem)
+    x, spec, worst = found.x, part.written(found, problem), part.costliest(found, problem)
     if _misses(good, problem):
-        return _impossible(design, sight, good, worst, problem)
+        return _impossible(design, part, good, worst, problem)
     solved = f"of {CHECKED} parts that were solved {good} are good; the tolerance that costs most is that of {worst}"
     reported = (
         f"{len(x)} values moved in {found.steps} steps: to first order about {100 * found.began:.3g} % of parts were "
@@ -429,13 +365,13 @@ def _designed(design: Design, sight: Sight, found: RobustResult, good: int, prob
         "margins_first_order": (found.share, "ratio", "share of good parts, estimated to first order"),
         "margins_solved": (good / CHECKED, "ratio", f"share of {CHECKED} parts that were solved at a few poses"),
     }
-    places = sight.rows.places
-    motion = sight.spec.motion
-    about = searched(numbers, sight.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
+    places = part.rows.places
+    motion = part.parts.spec.motion
+    about = searched(numbers, part.parts.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
     return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", reported)))
 
 
-def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: RobustProblem) -> Design:
+def _impossible(design: Design, part: PartNumbers, good: int, worst: str, problem: RobustProblem) -> Design:
     """Return why no design was found: the largest yield, and what stands in its way."""
     value = 100.0 * good / CHECKED
     wanted = f"{100 * problem.share:.4g} % of parts are good"
@@ -446,7 +382,7 @@ def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Ro
         f": {value:.3g} % at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: "
         f"make it tighter, {cure} or require less"
     )
-    if short := _ends_early(sight, np.array([float(sight.spec.at(path)) for path in sight.free])):
+    if short := part.ends_early():
         reported += (
             f". {short} of {CHECKED} parts end before the windows of the requirements do: state windows as shares of "
             "the travel, such as [1 %, 100 %], which then follow the travel of each part"

@@ -7,11 +7,15 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.spec import Tolerance
 from cfmkit.specs.units import meant_as_percent, read_number, read_quantity
-from cfmkit.studies.sensitivity.distributions import Incompatible, ParameterSpread, correlation_matrix
+from cfmkit.studies.parts.distributions import Incompatible, ParameterSpread, correlation_matrix
+from cfmkit.studies.plan import Plan, Variable
 from cfmkit.studies.variable_paths import CannotVary, Leaf, leaf
+from cfmkit.tables import border_values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -226,3 +230,13 @@ def with_options(block: Sensitivity | None, changes: Mapping[str, Any]) -> dict[
     if block is not None and changes.get("method", block.method) != block.method:
         reported.pop("samples", None)
     return reported | {key: value for key, value in changes.items() if value is not None}
+
+
+def plan_of(parameters: Sequence[Parameter], points: FloatArray) -> Plan:
+    """Return points, (n, d), as a plan of the engine."""
+    columns = map(np.ascontiguousarray, points.T)
+    varied = (
+        Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.place)
+        for one, values in zip(parameters, columns, strict=True)
+    )
+    return Plan(tuple(varied), len(points), joint=True)

@@ -1,8 +1,7 @@
-"""How parameters are distributed, alone and together.
+"""Distributions of parameters, alone and together.
 
-A parameter is uniform or normal, perhaps truncated. Several are joined by a Gaussian
-copula: correlation is that of the normal scores, so that each parameter keeps its own
-distribution whatever it is correlated with.
+A parameter is uniform or normal, perhaps truncated. Several are joined by a Gaussian copula: correlation is that of the
+normal scores, so that each parameter keeps its own distribution whatever it is correlated with.
 """
 
 from __future__ import annotations
@@ -82,14 +81,7 @@ def values_across(spreads: Sequence[ParameterSpread], unit: FloatArray) -> Float
 
 
 def correlation_matrix(count: int, groups: Iterable[tuple[Sequence[int], float]]) -> FloatArray:
-    """Return the correlations of all parameters.
-
-    Parameters
-    ----------
-    count : int
-        Number of parameters.
-    groups : iterable of (sequence of int, float)
-        Parameters that belong together, and the correlation of each two of them.
+    """Return the correlations of so many parameters, from groups of them and the correlation of each two of a group.
 
     Raises
     ------

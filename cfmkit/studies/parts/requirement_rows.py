@@ -12,20 +12,26 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
+from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE, Sampled, function_named
+from cfmkit.families.rows import Variants
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
 from cfmkit.specs.units import Share
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.variants_in_rows import SolvedVariants
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
+    from cfmkit.metrics.metrics_of_rows import CurveRows
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric
@@ -52,6 +58,15 @@ class RequirementRows:
     constant: FloatArray
     metrics: tuple[Metric, ...]  # those that are numbers of their own: the last ones
     about: tuple[int, ...]  # to which requirement each row belongs
+
+    @property
+    def efforts(self) -> int:
+        """How many of the numbers, the first ones, are efforts."""
+        return len(self.branches) * len(self.places)
+
+    def limits(self, numbers: FloatArray) -> FloatArray:
+        """Return what parts with numbers (..., q) leave of each limit, (..., m)."""
+        return np.asarray(numbers @ self.matrix.T + self.constant)
 
 
 class _RowsOfMargins:
@@ -265,6 +280,13 @@ def places_of(nominal: Result) -> FloatArray:
     return np.asarray(places[near])
 
 
+def requirement_rows(nominal: Result, spec: Spec, run: Run) -> RequirementRows | None:
+    """Return the requirements on a specification, whose result is known; None if it is not followed at a few poses."""
+    places = places_of(nominal)
+    first = sampled_of(spec, places, run)
+    return None if first is None else rows_of(nominal, first, places)
+
+
 def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementRows:
     """Return the requirements on a result as rows of what is seen of its parts."""
     builder = _RowsOfMargins(nominal, places, first)
@@ -327,31 +349,109 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float
         found = sampled_on_curves(result, rows.places, reached)
     if not _has_columns(found, rows):
         return None
-    numbers = [numbers_in(found)]
-    if rows.metrics:
-        metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
-        if metrics is None:
+    if not rows.metrics:
+        return numbers_in(found)
+    metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
+    return None if metrics is None else np.concatenate([numbers_in(found), metrics])
+
+
+def numbers_of_parts(
+    spec: Spec, values: Mapping[str, FloatArray], rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()
+) -> list[FloatArray | None]:
+    """Return `numbers_of` many parts, as rows of one solution where the family has them; None of an invalid part.
+
+    `values`: dotted path -> values of the parts, (k,) [SI].
+    """
+    columns = {path: np.asarray(column) for path, column in values.items()}
+    count = min(map(len, columns.values()), default=0)
+
+    def part(k: int) -> Spec:
+        return spec.replace({path: column[k].item() for path, column in columns.items()}, as_made=True)
+
+    parts = Variants(spec.model_copy(update={"requirements": ()}), columns, part, count)
+    found = _numbers_in_rows(parts, rows, reached)
+
+    def alone(k: int) -> FloatArray | None:
+        try:
+            return numbers_of(part(k), rows, run, reached)
+        except CfmError:
             return None
-        numbers.append(metrics)
-    return np.concatenate(numbers)
+
+    return [found[k] if k in found else alone(k) for k in range(count)]
+
+
+def _numbers_in_rows(
+    parts: Variants, rows: RequirementRows, reached: tuple[float, ...]
+) -> dict[int, FloatArray | None]:
+    """Return the numbers of those parts that are solved together and have complete curves."""
+    found: dict[int, FloatArray | None] = {}
+    solve = family(parts.spec.family).rows
+    if solve is None or not len(parts):
+        return found
+    study = Study(parts.spec, tuple(parts.values), rows.metrics, lean=True)
+    try:
+        for members, solved in solve(parts):
+            known = SolvedVariants(study, parts, members, solved)
+            if tuple(solved.branches) != rows.branches or not known.known:
+                continue
+            numbers = _looked_up(solved.branches, rows, known)
+            if numbers is not None:
+                good = known.usable & np.isfinite(numbers).all(axis=1)
+                there = _get_to(solved.branches, rows, reached)
+                found |= {int(members[row]): numbers[row] if there[row] else None for row in np.flatnonzero(good)}
+    except CfmError:  # each part says by itself what is wrong with it
+        return {}
+    return found
+
+
+def _get_to(branches: Mapping[str, CurveRows], rows: RequirementRows, reached: tuple[float, ...]) -> NDArray[np.bool_]:
+    """Return which rows of a solution get to all places that must be reached, on every branch."""
+    slack = 1e-9 * float(rows.places[-1] - rows.places[0])
+    ends = [curves.extent for curves in branches.values()]
+    there = np.ones(len(ends[0][0]), dtype=bool)
+    for low, high in ends:
+        for place in reached:
+            there &= (low - slack <= place) & (place <= high + slack)
+    return there
+
+
+def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, known: SolvedVariants) -> FloatArray | None:
+    """Return the numbers of each row of a solution, (m, q); None if it has other stresses than the rows look at."""
+    columns, stresses = [], []
+    for curves in branches.values():
+        low, high = curves.extent
+        places = np.clip(np.broadcast_to(rows.places, (len(low), len(rows.places))), low[:, None], high[:, None])
+        with np.errstate(all="ignore"):
+            columns.append(curves.all_at(places))
+        if curves.stress is not None:
+            # between the points of its curve, as of a part alone
+            points = curves.stress.samples[0]
+            each = zip(points.motion, points.values, points.count.tolist(), strict=True)
+            stresses.append([np.interp(rows.places, motion[:n], values[:n]) for motion, values, n in each])
+    if len(stresses) != rows.stresses:
+        return None
+    return np.hstack([*columns, *map(np.array, stresses), known.rows().values])
 
 
 def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:
-    """Return `numbers_of` a part that was analysed and looked at the quick way already: nothing is solved again.
+    """Return `numbers_of` a part whose analysis is known: nothing is solved again; stated windows must be reached.
 
-    Parameters
-    ----------
-    result : Result
-        Its analysis, with all metrics.
-    quick : Sampled or None
-        From `quickly_sampled`, at the places of the rows; None of a family without a quick way.
-    rows : RequirementRows
-        What is looked at; windows that are stated in its specification must be reached.
+    `quick`: what `quickly_sampled` says of it at the places of the rows; None of a family without a quick way.
     """
     found = sampled_on_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
     if not _has_columns(found, rows):
         return None
     return np.concatenate([numbers_in(found), metrics_in(result, rows)]) if rows.metrics else numbers_in(found)
+
+
+def exact_derivatives(spec: Spec, places: FloatArray, paths: Sequence[str]) -> dict[str, Sampled]:
+    """Return the derivatives of effort and stress at places, by those values of a design by which they are known."""
+    name = family(spec.family).sampled_slopes
+    try:
+        found = None if name is None else function_named(name)(spec, places, tuple(paths))
+    except CfmError:
+        return {}
+    return {} if found is None else dict(found.by)
 
 
 def _has_columns(found: Sampled | None, rows: RequirementRows) -> TypeGuard[Sampled]:

@@ -1,0 +1,103 @@
+"""The test plan in one sentence: what to make, what to measure on it, and what force to expect where, of 95 % of parts.
+
+Forces are those of parts to first order, drawn from `design.tolerances` or from what the process is assumed to hold.
+The dimensions are those whose errors move the force most: what is worth measuring before the force is looked at. What
+is no dimension and moves it as much, a modulus or the rate of a spring, is named beside them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import CfmError
+from cfmkit.families import family
+from cfmkit.metrics import window_of
+from cfmkit.specs.units import format_short
+from cfmkit.studies.parts.near_parts import N_DRAWN, Unknown, efforts_of_parts
+from cfmkit.studies.parts.parts import Parts
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.run_control import Run
+    from cfmkit.results import Result
+
+SHARE = 0.95
+"""Share of parts whose forces are named."""
+
+DIMENSIONS = 3
+"""How many dimensions are named: more are not measured."""
+
+SIZES = ("length", "angle")
+"""What a dimension is measured in."""
+
+
+def expected_forces(result: Result, run: Run) -> str:
+    """Return the sentence; empty of a part of whose errors nothing is known, or that cannot be followed."""
+    if not result.curves:
+        return ""
+    try:
+        parts, whence = Parts.expected(result.spec, run.seed)
+        if parts is None:
+            return ""
+        places = _places(result)
+        near = efforts_of_parts(parts, places, result.curve.branches[0], run)
+    except (CfmError, Unknown):
+        return ""
+    errors = parts.draw(N_DRAWN) - parts.nominal
+    low, high = np.quantile(near.numbers(errors), ((1.0 - SHARE) / 2.0, (1.0 + SHARE) / 2.0), axis=0)
+    weight = (np.abs(near.by_error) * errors.std(axis=0)).sum(axis=0)
+    curve = result.curve
+    at = [format_short(place, curve.motion_dimension) for place in places]
+    ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(near.middle, low, high, strict=True)]
+    expected = [f"{one[0]} ({one[1]} to {one[2]}) at {place}" for one, place in zip(ends, at, strict=True)]
+    make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
+    verb = "press" if curve.motion_dimension == "length" else "turn"
+    return (
+        f"{make}, {_to_measure(parts, weight)}, {verb} it to {_listed(at)}, and expect {_listed(expected)}: each range "
+        f"holds for {100 * SHARE:.0f} % of parts {whence}, to first order"
+    )
+
+
+def _to_measure(parts: Parts, weight: FloatArray) -> str:
+    """Return what to measure, of parameters that move the force by `weight` (d,): the first few dimensions.
+
+    Then what else is among as many of all parameters.
+    """
+    order = [int(k) for k in np.argsort(-weight) if weight[k] > 0]
+    sizes = [k for k in order if parts.parameters[k].dimension in SIZES][:DIMENSIONS]
+    others = [k for k in order[:DIMENSIONS] if parts.parameters[k].dimension not in SIZES]
+    reported = [f"measure {_listed([_dimension(parts, k) for k in sizes])}"] if sizes else []
+    if others:
+        reported.append(f"determine {_listed([_named(parts, k) + ' in the design)' for k in others])}")
+    return ", ".join(reported)
+
+
+def _dimension(parts: Parts, k: int) -> str:
+    """Return a dimension with its drawn value, as ``bistable.thickness (1.01 mm as drawn)``."""
+    parent, _, last = parts.paths[k].rpartition(".")
+    thickness = getattr(parts.spec.at(parent), "thickness", None)
+    if last != "offset" or thickness is None:
+        return f"{_named(parts, k)} as drawn)"
+    # an error of all thicknesses is nothing that is drawn
+    ends = (min(thickness), max(thickness)) if isinstance(thickness, tuple) else (thickness,)
+    reported = " to ".join(format_short(end, "length") for end in ends)
+    return f"{parent.removeprefix('mechanism.')}.thickness ({reported} as drawn)"
+
+
+def _named(parts: Parts, k: int) -> str:
+    """Return the name and the value of a parameter, the bracket still open."""
+    value = format_short(float(parts.nominal[k]), parts.parameters[k].dimension)
+    return f"{parts.paths[k].removeprefix('mechanism.')} ({value}"
+
+
+def _listed(items: list[str]) -> str:
+    return ", ".join(items[:-1]) + (" and " if len(items) > 1 else "") + items[-1]
+
+
+def _places(result: Result) -> FloatArray:
+    """Return the two ends of the window, or the middle and the end of the travel."""
+    found, motion = window_of(result), result.curve.motion
+    least, most = float(motion.min()), float(motion.max())
+    return np.array([found.lo, found.hi] if found else [0.5 * (most + least), most if most > 0.0 else least])

@@ -1,0 +1,249 @@
+"""Parts near a design, without drawing one to be solved: which share is good, and how their numbers move with errors.
+
+The estimate is of first order and takes a few solutions: it says whether a design is worth drawing parts of, no more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.designing.first_order import SIGMA_STEP, NearParts, differentiate
+from cfmkit.errors import CfmError
+from cfmkit.families import family
+from cfmkit.families.base import function_named
+from cfmkit.metrics import window_of
+from cfmkit.specs.units import format_short
+from cfmkit.stock.processes import SPRING_RATE
+from cfmkit.studies.parts import requirement_rows as rr
+from cfmkit.studies.parts.assumed_errors import MODULUS, assumed
+from cfmkit.studies.parts.outcomes import SCALED
+from cfmkit.studies.parts.parts import Parts
+from cfmkit.studies.parts.share import Share
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.run_control import Run
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+    from cfmkit.studies.parts.assumed_errors import Assumed
+    from cfmkit.studies.parts.requirement_rows import RequirementRows
+
+    Numbers = Callable[[Spec], FloatArray | None]
+
+N_DRAWN = 4000
+"""Parts that are drawn: the standard error of a share is then 0.8 % at most."""
+
+PROPORTIONAL = 1e-3
+"""To this share a force goes with the modulus; differences are as good as that."""
+
+FEW_POINTS, SAME_RTOL = 31, 1e-6
+"""Points on the curves of parts, where the design's metrics are the same with so few, but for this share of them."""
+
+MAX_QUICK, MAX_ANALYSES = 24, 12
+"""Parts solved for an estimate that nobody requested, by the quick way or by analyses: some tenths of a second."""
+
+
+class Unknown(Exception):
+    """Why nothing is said of parts near a design."""
+
+
+def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, known: FloatArray | None = None) -> NearParts:
+    """Return the numbers of parts to first order.
+
+    `middle`: those of the design, (q,); `numbers`: of a part, all of them or those after the exactly known ones;
+    `known`: exact derivatives of the first numbers by all errors, (k, d).
+
+    Raises
+    ------
+    Unknown
+        If a part near the design has no numbers.
+    """
+    if known is not None and len(known) == len(middle):
+        return NearParts(middle, known)
+
+    def moved(k: int, value: float) -> FloatArray:
+        return _finite(numbers, parts.spec.replace({parts.paths[k]: value}, as_made=True))
+
+    step = SIGMA_STEP * parts.deviations
+    found = differentiate(moved, np.column_stack([parts.nominal - step, parts.nominal + step]))
+    assert found is not None  # a part without numbers has ended the estimate
+    return NearParts(middle, found if known is None else np.concatenate([known, found]))
+
+
+def _finite(numbers: Numbers, part: Spec) -> FloatArray:
+    try:
+        return _complete(numbers(part))
+    except CfmError as error:
+        raise Unknown(str(error)) from None
+
+
+def _complete(found: FloatArray | None) -> FloatArray:
+    """Return the numbers of a part, if it has them all."""
+    if found is None or not np.isfinite(found).all():
+        raise Unknown(
+            "a part near the design has no curve, or it ends within a window of the requirements (windows in shares of "
+            "the travel, such as [1 %, 100 %], follow the travel of each part)"
+        )
+    return found
+
+
+def _refuse_many(parts: Parts, quick: bool = True) -> None:
+    quick = quick and family(parts.spec.family).sampled is not None
+    count = 2 * len(parts.paths)
+    if count > (MAX_QUICK if quick else MAX_ANALYSES):
+        raise Unknown(f"it needs {count} {'parts' if quick else 'analyses'}, and takes a while")
+
+
+def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) -> NearParts:
+    """Return the effort of parts on one branch at places (p,), to first order.
+
+    Raises
+    ------
+    Unknown
+        If it would take long, or a part near the design cannot be followed.
+    """
+
+    def efforts(part: Spec) -> FloatArray | None:
+        found = rr.sampled_of(part, places, run)
+        return None if found is None else found.effort.get(branch)
+
+    exact = rr.exact_derivatives(parts.spec, places, parts.paths)
+    columns = [exact[path].effort.get(branch) for path in parts.paths if path in exact]
+    known = np.array(columns).T if len(columns) == len(parts.paths) and all(c is not None for c in columns) else None
+    if known is None:
+        _refuse_many(parts)
+    return near_parts(parts, _finite(efforts, parts.spec), efforts, known)
+
+
+@dataclass(frozen=True)
+class ExpectedShares:
+    """Shares of good parts to first order."""
+
+    good: Share  # of parts as they are made
+    measured: Share  # of parts whose modulus is as it should be
+    trimmed: Share  # of parts whose mean force is brought to that of the design
+    # whether the force goes with the modulus, as that of a part of one material without bought springs does
+    proportional: bool
+
+
+def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
+    """Return which shares of the parts of an analysed design are good, to first order.
+
+    Raises
+    ------
+    Unknown
+        If it would take long, or a part near the design has no curve.
+    """
+    spec, places = result.spec, rr.places_of(result)
+    quick = rr.quickly_sampled(spec, places)
+    first = rr.sampled_on_curves(result, places, ()) if quick is None else quick
+    if first is None:
+        raise Unknown("the design cannot be followed at a few poses")
+    rows = rr.rows_of(result, first, places)
+    middle = _complete(rr.numbers_of_known(result, quick, rows))
+    exact = rr.exact_derivatives(spec, places, parts.paths)
+    known = None
+    if set(parts.paths) <= set(exact):
+        known = np.array([rr.numbers_in(exact[path]) for path in parts.paths]).T
+    if rows.metrics or known is None:
+        _refuse_many(parts, quick=not rows.metrics)
+    if rows.metrics and (thin := _thinned(result)) is not None:
+        count, numbers = len(rows.metrics), _finite(lambda part: _numbers(part, rows, run, quick is None), thin)
+        if np.allclose(numbers[-count:], middle[-count:], rtol=SAME_RTOL, atol=0.0):
+            parts, middle = replace(parts, spec=thin), np.concatenate([middle[: len(middle) - len(numbers)], numbers])
+    near = near_parts(parts, middle, lambda part: _numbers(part, rows, run, known is None), known)
+    values = parts.draw(N_DRAWN)
+    errors, still, proportional = values - parts.nominal, values, False
+    if MODULUS in parts.paths:
+        k = parts.paths.index(MODULUS)
+        still = parts.without(values, (k,))
+        change = parts.nominal[k] * near.by_error[: rows.efforts, k]
+        proportional = bool(np.allclose(change, middle[: rows.efforts], rtol=PROPORTIONAL, atol=0.0))
+    made = near.numbers(errors)
+
+    def share(numbers: FloatArray) -> Share:
+        kept = rows.limits(numbers) >= -1e-9 * np.abs(rows.constant)  # a design on its limit keeps it
+        return Share(int(kept.all(axis=1).sum()), 0, len(numbers))
+
+    measured, trimmed = near.numbers(still - parts.nominal), _trimmed(result, rows, middle, made)
+    return ExpectedShares(share(made), share(measured), share(trimmed), proportional)
+
+
+def _numbers(part: Spec, rows: RequirementRows, run: Run, whole: bool) -> FloatArray | None:
+    """Return what rows look at of a part, all of it or metrics alone."""
+    return rr.numbers_of(part, rows, run, rr.stated_places(part)) if whole else rr.metrics_of_part(part, rows, run)
+
+
+def _thinned(result: Result) -> Spec | None:
+    """Return a design whose curve has fewer points; None if metrics are taken from points, or are few already.
+
+    Where the model knows the curve between its points, metrics are those of the whole curve.
+    """
+    points = getattr(getattr(result.spec, "analysis", None), "points", None)
+    if result.closed is None or not isinstance(points, int) or points <= FEW_POINTS:
+        return None
+    return result.spec.replace({"analysis.points": FEW_POINTS})
+
+
+def _trimmed(result: Result, rows: RequirementRows, middle: FloatArray, parts: FloatArray) -> FloatArray:
+    """Return the numbers of parts after a trim, (n, q): the mean effort of each on the first branch is the design's.
+
+    Efforts and the metrics that go with them are scaled, stresses stay: as of parts that are analysed.
+    """
+    window = window_of(result)
+    low, high = (rows.places[0], rows.places[-1]) if window is None else (window.lo, window.hi)
+    slack = 1e-9 * (rows.places[-1] - rows.places[0])
+    at = np.flatnonzero((rows.places >= low - slack) & (rows.places <= high + slack))
+    level, means = (np.trapezoid(one[..., at], rows.places[at], axis=-1) for one in (middle, parts))
+    scaled = np.arange(len(middle)) < rows.efforts
+    scaled[len(middle) - len(rows.metrics) :] = [one.dimension in SCALED for one in rows.metrics]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.where(means, level / means, np.nan)  # without a force there is nothing to trim: never good
+    return np.asarray(np.where(scaled, parts * factor[:, None], parts))
+
+
+def expected_yield(result: Result, run: Run) -> str:
+    """Return in a sentence how many parts of a design would be good, or why that is not known; empty of no part."""
+    spec = result.spec
+    found = assumed(spec)
+    if found is None or not spec.part_requirements or not result.curves:
+        return ""
+    name = found.process.name
+    again = f"the same command with --set design.process={name}"
+    try:
+        shares = expected_shares(result, Parts.assumed(spec, run.seed), run)
+    except Unknown as why:
+        return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
+    chosen = family(spec.family).free
+    if chosen is None or not function_named(chosen)(spec, spec):
+        return f"{_reported(found, shares)}; margins need 'design.free' to name values that may change"
+    return f"{_reported(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
+
+
+def _reported(found: Assumed, shares: ExpectedShares) -> str:
+    process = found.process
+    used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
+    reported = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
+    if found.modulus is not None:
+        low, high = (format_short(end, "stress") for end in found.modulus)
+        reported.append(f"modulus {low} to {high}")
+    if found.rates:
+        reported.append(f"rates of springs within {100.0 * SPRING_RATE:g} %")
+    if found.as_stated:
+        reported.append("moduli of beams' own materials as stated")
+    reason = f": {process.reason}" if "thickness" in used else ""
+    text = f"{_about(shares.good)} parts would meet the requirements if made by {process.name} "
+    text += f"({', '.join(reported)}; assumed{reason}; to first order)"
+    return text if found.modulus is None else f"{text}, {_about(shares.measured)} parts once the modulus is measured"
+
+
+def _about(share: Share) -> str:
+    """Return a share of drawn parts, before the word 'parts': to two digits, and never as all of them or none."""
+    if 100.0 * share.value >= 99.5:
+        return "over 99 % of"
+    return f"about {100.0 * share.value:.2g} % of" if share.good else "hardly any"

@@ -1,0 +1,195 @@
+"""Parts as they are made of a specification: what errs, by how much, and parts drawn at random.
+
+Errors are those that a block `design` or `sensitivity` states, else those that the process is assumed to cause
+(`assumed_errors`). Whoever draws parts, a study, a design or a proposal, draws the same ones from the same seed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import SpecError
+from cfmkit.specs.spec import DesignKeys, Sensitivity
+from cfmkit.studies.parts.assumed_errors import assumed, process_of_part, tolerances
+from cfmkit.studies.parts.distributions import draw, values_at
+from cfmkit.studies.parts.uncertain_values import correlations, groups, parameters_of
+from cfmkit.studies.variable_paths import CannotVary, leaf
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.specs.spec import DesignBlock, Spec
+    from cfmkit.studies.parts.uncertain_values import Parameter
+
+NO_TOLERANCE = "no value of this part is known to err by its process: state 'design.tolerances'"
+
+Seed = int | list[int]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Parts of a specification, with the errors of their values."""
+
+    spec: Spec  # what is made
+    parameters: tuple[Parameter, ...]  # what errs, lists taken apart
+    correlated: tuple[tuple[tuple[int, ...], float], ...]  # numbers of parameters, correlation of each two of them
+    correlation: FloatArray  # (d, d) of the normal scores
+    samples: int  # how many parts are drawn
+    seed: int  # of the generator
+
+    @classmethod
+    def of_block(cls, spec: Spec, block: Sensitivity, samples: int, seed: int) -> Parts:
+        """Return the parts whose errors are the parameters of a block.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            With every fault, at ``sensitivity.parameters`` and the path.
+        """
+        parameters = parameters_of(spec, block)
+        paths = tuple(one.path for one in parameters)
+        return cls(spec, parameters, groups(block, paths), correlations(block, paths), samples, seed)
+
+    @classmethod
+    def of_design(cls, spec: Spec, design: DesignBlock, seed: int) -> Parts | None:
+        """Return the parts of a specification with the tolerances of a `design` block or of its process; None if none.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If a path is not in the specification, at ``design.tolerances`` and the path.
+        """
+        stated = stated_tolerances(spec, design)
+        if not stated:
+            return None
+        try:
+            return cls.of_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
+        except SpecError as error:
+            raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
+
+    @classmethod
+    def expected(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
+        """Return the parts that a shop will make, by stated or else by assumed errors, and in words whose errors."""
+        design = getattr(spec, "design", None)
+        if not isinstance(design, DesignKeys):
+            return None, ""
+        if design.tolerances_of(spec)[0]:
+            return cls.of_design(spec, design, seed), "within design.tolerances"
+        found = assumed(spec, process)
+        if found is None:
+            return None, ""
+        return cls.assumed(spec, seed, process), f"made by {found.process.name} (assumed tolerances)"
+
+    @classmethod
+    def assumed(cls, spec: Spec, seed: int, process: str | None = None) -> Parts:
+        """Return the parts that a process is assumed to make, for a specification some of whose values err by it."""
+        design = getattr(spec, "design", None)
+        known = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
+        return cls.of_block(spec, _block(tolerances(spec, process)), *known)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the values that err."""
+        return tuple(one.path for one in self.parameters)
+
+    @cached_property
+    def nominal(self) -> FloatArray:
+        """The values of a perfect part, (d,) [SI]."""
+        return np.array([one.spread.nominal for one in self.parameters])
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """Standard deviations of the errors, (d,) [SI]."""
+        return np.array([one.spread.standard_deviation for one in self.parameters])
+
+    def unit(self, samples: int, seed: Seed) -> FloatArray:
+        """Return the shares of all parts that lie below each value of drawn parts, (n, d)."""
+        return draw(self.correlation, samples, np.random.default_rng(seed))
+
+    def draw(self, samples: int | None = None, seed: Seed | None = None) -> FloatArray:
+        """Return the values of drawn parts, (n, d) [SI]; of another seed those that no search has seen."""
+        unit = self.unit(samples or self.samples, self.seed if seed is None else seed)
+        return values_at([one.spread for one in self.parameters], unit)
+
+    def part(self, values: FloatArray) -> Spec:
+        """Return the specification of one part, of its values (d,)."""
+        return self.spec.replace(dict(zip(self.paths, values.tolist(), strict=True)), as_made=True)
+
+    def without(self, values: FloatArray, members: tuple[int, ...]) -> FloatArray:
+        """Return the values of the same parts without the errors of some parameters."""
+        still = values.copy()
+        still[:, members] = self.nominal[list(members)]
+        return still
+
+    @property
+    def joined(self) -> list[tuple[int, ...]]:
+        """Parameters that deviate as one: those correlated by 1 together, each other one alone."""
+        many = [members for members, correlation in self.correlated if correlation == 1.0]
+        taken = {k for members in many for k in members}
+        return [*many, *((k,) for k in range(len(self.parameters)) if k not in taken)]
+
+
+def _block(stated: dict[str, Any], correlated: tuple[Any, ...] = ()) -> Sensitivity:
+    return Sensitivity.model_construct(method="tolerance", parameters=stated, correlated=correlated, metrics=())
+
+
+def _count_and_seed(spec: Spec, design: DesignKeys, seed: int) -> tuple[int, int]:
+    return design.tolerances_of(spec)[1], seed if design.seed is None else design.seed
+
+
+def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
+    """Return the tolerances that a `design` block gives, else those of the process that it or the part names."""
+    stated = design.tolerances_of(spec)[0]
+    return dict(stated) if stated or not is_made(spec, design) else tolerances(spec)
+
+
+def is_made(spec: Spec, design: DesignBlock) -> bool:
+    """Return True if it is said how parts are made: by a block `design`, or of a part whose yield is requested."""
+    if design.tolerances_of(spec)[0] or design.process is not None:
+        return True
+    asked = getattr(design, "yield") is not None or len(spec.part_requirements) < len(spec.requirements)
+    return asked and process_of_part(spec) is not None
+
+
+def errs_nowhere(spec: Spec, design: DesignBlock) -> bool:
+    """Return True if no value of a part that `is_made` errs; of a solid that is seen only once it is drawn."""
+    return spec.fidelity != "solid" and not stated_tolerances(spec, design)
+
+
+def _renamed(path: str) -> str:
+    """Return where a fault of a block `sensitivity` stands in a block `design`."""
+    head, _, rest = path.partition(".parameters.")
+    return f"design.tolerances.{rest}" if rest else head.replace("sensitivity", "design", 1)
+
+
+def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what is wrong with a block's keys on made parts as far as that can be seen before anything is designed."""
+    for path in design.tolerances or ():
+        try:
+            found = leaf(type(spec), path.replace(".*", ".0"))
+        except CannotVary as problem:
+            yield ("design", "tolerances", path), str(problem)
+            continue
+        if found.kind not in ("quantity", "number"):
+            yield ("design", "tolerances", path), f"{path!r} does not vary continuously"
+    for path in design.free:
+        try:
+            leaf(type(spec), path)
+        except CannotVary as problem:
+            yield ("design", "free", path), str(problem)
+    wanted = getattr(design, "yield") is not None
+    if design.robust is not None and not wanted:
+        yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
+    if wanted and not is_made(spec, design):
+        lacking = "a yield is a share of manufactured parts: state their tolerances in 'design.tolerances'"
+        yield ("design", "yield"), lacking
+    elif wanted and errs_nowhere(spec, design):
+        yield ("design", "yield"), NO_TOLERANCE
+    if design.tolerances and not spec.part_requirements:
+        reported = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
+        yield ("design", "tolerances"), reported
