@@ -16,7 +16,8 @@ import numpy as np
 
 from cfmkit.families.findings import mm
 from cfmkit.families.flattest_window import flattest
-from cfmkit.families.slider_crank.printed.part import PAD, drawing
+from cfmkit.families.slider_crank.printed.outline import drawing
+from cfmkit.families.slider_crank.printed.part import PAD
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import (
