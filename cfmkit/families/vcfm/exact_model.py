@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.kinds import SpringChain
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
     from cfmkit.families.vcfm.leaves_spec import Bistable
-    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
+    from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
+    from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 DOWN = -0.5 * np.pi
 
@@ -57,7 +58,7 @@ def leaf_network(spec: VcfmSpec) -> Network:
     return _network_of(parts.bistable, parts.material, parts.wide_beams)
 
 
-def _network_of(about: Bistable, made_of: LeafMaterial, wide: bool) -> Network:
+def _network_of(about: Bistable, made_of: MaterialSpec, wide: bool) -> Network:
     from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, guided
 
     law = leaf_law(about, made_of)
@@ -80,7 +81,7 @@ in one room after another."""
 
 
 @lru_cache(maxsize=KEPT)
-def _leaf_path(about: Bistable, made_of: LeafMaterial, wide: bool, end: float, branch: str | None) -> Traced:
+def _leaf_path(about: Bistable, made_of: MaterialSpec, wide: bool, end: float, branch: str | None) -> Traced:
     """Return what a leaf does up to `end` [m]; a branch is followed, and its waviness counts, where one is stated."""
     control = {} if branch is None else {"branch": branch, "imperfection": about.waviness}
     return traced(_network_of(about, made_of, wide), "shuttle", end, **control)
