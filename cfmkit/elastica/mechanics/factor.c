@@ -218,33 +218,29 @@ static int eliminate_two(Factors *f, Int one, Int other) {
     return 1;
 }
 
-static int is_free(const Factors *f, const Int *leaves, Int element, Int at) { return leaves[f->index[at]] <= element; }
-
-/* Return whether two unknowns of the front are large enough together beside what they are coupled with. */
-static int is_pivot(const Factors *f, Int at, Int partner) {
-    const double d = entry(f, at, at), c = entry(f, partner, partner), b = entry(f, at, partner), det = d * c - b * b;
-    const double most = fabs(det) / THRESHOLD, mine = largest_beside(f, at, partner), its = largest_beside(f, partner, at);
-    return det != 0.0 && fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most;
-}
-
 /* Eliminate what no later element holds; return 0 if there is no memory, or at the end if the matrix is singular. */
 int factors_eliminate(Factors *f, const Int *leaves, Int element) {
     int progress = 1;
     while (progress) { /* what had no pivot may have one after the others */
         progress = 0;
-        for (Int at = f->fronts - 1; at >= 0; at--) { /* one by one: forces have a pivot of their own behind rotations */
-            if (at >= f->fronts || !is_free(f, leaves, element, at)) continue;
+        for (Int at = f->fronts - 1; at >= 0; at--) {
+            if (at >= f->fronts || leaves[f->index[at]] > element) continue;
             const double d = entry(f, at, at);
-            if (d == 0.0 || fabs(d) < THRESHOLD * largest_beside(f, at, -1)) continue;
-            if (!eliminate_one(f, at)) return 0;
-            progress = 1;
-        }
-        for (Int at = f->fronts - 1; at >= 0 && !progress; at--) {
-            if (!is_free(f, leaves, element, at)) continue;
+            if (d != 0.0 && fabs(d) >= THRESHOLD * largest_beside(f, at, -1)) {
+                if (!eliminate_one(f, at)) return 0;
+                progress = 1;
+                continue;
+            }
             const Int partner = find_partner(f, leaves, element, at);
-            if (partner < 0 || !is_pivot(f, at, partner)) continue;
-            if (!eliminate_two(f, at, partner)) return 0;
-            progress = 1;
+            if (partner < 0) continue;
+            const double c = entry(f, partner, partner), b = entry(f, at, partner), det = d * c - b * b;
+            const double most = fabs(det) / THRESHOLD;
+            if (det == 0.0) continue;
+            const double mine = largest_beside(f, at, partner), its = largest_beside(f, partner, at);
+            if (fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most) {
+                if (!eliminate_two(f, at, partner)) return 0;
+                progress = 1;
+            }
         }
     }
     return 1;
