@@ -20,7 +20,7 @@ from cfmkit.elastica.model.contact import NodeOnObstacle
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.folds import pass_fold
-from cfmkit.numerics.continuation.follow import follow, follow_on
+from cfmkit.numerics.continuation.follow import LOCKED, LOCKED_FORCE, LOCKED_STEP, follow, follow_on
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import hermite
@@ -83,6 +83,25 @@ def follow_in_contact(
         for number, contact in enumerate(problem.mesh.contacts)
         if problem.values(start.x, start.drive)[contact.unknown] > FORCE_ROUNDING
     )
+    yield from _until_full(_follow(problem, start, targets, options, branch, closed), options)
+
+
+def _until_full(items: Iterator[Item], options: Options) -> Iterator[Item]:
+    """Yield the items of a path, at most as many points as are allowed."""
+    between = 0
+    for item in items:
+        yield item
+        between += isinstance(item, Point) and item.target < 0
+        if between > options.most_points:
+            assert isinstance(item, Point)
+            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")
+            return
+
+
+def _follow(
+    problem: NetworkProblem, start: PathEquilibrium, targets: FloatArray, options: Options, branch: PathBranch | None,
+    closed: frozenset[int],
+) -> Iterator[Item]:  # fmt: skip
     part = _Part(problem, closed, options)
     items = follow(part.own, part.shrink(start), targets, options, branch)
     walk, count, place = Walk(part.own, options, targets, start, 0.0, branch=branch), 0, np.inf
@@ -106,11 +125,11 @@ def follow_in_contact(
         part, at, sense, turned = after
         yield change._replace(after=at.unstable)
         names, what = part.say(change.number), change.kind
-        if at.unstable > change.before and options.branch != "primary" and not options.through_folds:
-            yield PathStop(WhyStopped.JUMPS, place, LOSES.format(names=names, what=what))
-            return
         if turned and not options.through_folds:
             yield PathStop(WhyStopped.LIMIT_POINT, place, SNAPS.format(names=names, what=what))
+            return
+        if at.unstable > change.before and options.branch != "primary" and not options.through_folds:
+            yield PathStop(WhyStopped.JUMPS, place, LOSES.format(names=names, what=what))
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
@@ -183,6 +202,8 @@ def _follow_part(
         assert isinstance(item, Point)
         assert at is not None
         yield item._replace(at=at)
+        if previous is not None and part.is_locked(previous, at):
+            return PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED)
         if item.target >= 0:
             walk = replace(walk, number=item.target + 1)
         walk, previous = replace(walk, branch=item.branch), at
@@ -256,6 +277,12 @@ class _Part:
         near = None if event.near is None else self.grow(event.near)
         modes = None if event.modes is None else self._spread(event.modes)
         return replace(event, near=near, modes=modes, within=within)
+
+    def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
+        """Return True if forces are as large as where a structure locks, between two points that nearly coincide."""
+        forces = (np.abs(at.x) / self.whole.unit)[~self.whole.motions]
+        near = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
+        return bool(near and forces.max(initial=0.0) > LOCKED_FORCE)
 
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:

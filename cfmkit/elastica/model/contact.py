@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 BESIDE_END = 1e-9  # share of a piece by which the foot of a point may lie beyond its end: rounding
+POINTS_PER_TURN = 120  # of an arc that is drawn
 STRAIGHT_ON = 1e-12  # turn of a polyline below which it has no corner [rad]
 
 
@@ -76,6 +77,18 @@ class Outline(ShortRepr):
     def smallest_hollow(self) -> float:
         """Smallest radius of an arc that is hollow as seen from the free side [m]; infinite without one."""
         return float(self.radius[self.bulge < 0].min(initial=math.inf))
+
+    def lines(self, reach: float) -> list[FloatArray]:
+        """Return its parts as points along them, (n, 2) each; endless ones are `reach` [m] long."""
+        found, last = [], len(self.length) - 1
+        for number, (start, along, length) in enumerate(zip(self.start, self.along, self.length, strict=True)):
+            low = -reach if number == 0 and not self.closed else 0.0
+            high = length + reach if number == last and not self.closed else length
+            found.append(np.array([start + low * along, start + high * along]))
+        for centre, radius, first, sweep in zip(self.centre, self.radius, self.first, self.sweep, strict=True):
+            angle = first + sweep * np.linspace(0.0, 1.0, 2 + math.ceil(POINTS_PER_TURN * abs(sweep) / math.tau))
+            found.append(centre + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+        return found
 
     def distance(self, places: Any) -> Distance:
         """Return the signed distance of places (..., 2) [m] from the nearest point of the outline.

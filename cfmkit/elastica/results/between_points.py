@@ -315,8 +315,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _unstable(self) -> Any:
         counts = np.array(self.path.unstable[self._order])
-        if self._order != slice(None):  # at a contact they are those of the path behind it
-            counts[self._contacts] = counts[self._contacts + 1]
+        counts[self._contacts] = counts[self._contacts + 1]  # such a point begins a stretch
         return counts
 
     @cached_property

@@ -318,7 +318,8 @@ def trace_on(
                 points.append(item)
             elif isinstance(item, ContactChange):
                 changes.setdefault(len(points) - 1, []).append(item)
-                points[-1] = points[-1]._replace(at=points[-1].at._replace(unstable=item.after))
+                stabler = points[-1].at._replace(unstable=min(item.before, item.after))
+                points[-1] = points[-1]._replace(at=stabler)
             elif isinstance(item, PathEvent):
                 events.append(item)
                 if first is None and item.modes is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cfmkit.curves import Column
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
+from cfmkit.elastica.results.beam_states import states
 from cfmkit.families.beam.contact_spec import column_names, pads_of
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
@@ -41,6 +42,7 @@ LARGEST_FORCE = (
     "largest normal force: of a stop or an obstacle on one copy, or between tip and `analysis.surface` in both "
     "directions of the motion"
 )
+N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners
 PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
 NEAR_GAP = 0.01  # share of the thinnest beam's thickness below which a gap that stays open is reported
@@ -232,8 +234,8 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
         outline = obstacle.outline()
         pads = pads_of(mechanism, obstacle)
         for beam, own in path.network.beams.items():
-            found = path.states(beam)
-            places = np.stack([found.x, found.y], axis=-1)[keep]
+            found = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
+            places = np.stack([found.x, found.y], axis=-1)
             depth = 0.5 * thickest_of(own.section) - outline.distance(places).value
             slack = PENETRATION * thickest_of(own.section)
             # an elastic obstacle yields at its pads, and the beam with them
@@ -242,7 +244,7 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
             deep = depth > slack + max(yields, 0.0)
             if deep.any():
                 first = int(deep.any(axis=1).argmax())
-                place = float(path.places(beam)[int(depth[first].argmax())])
+                place = float(found.place[int(depth[first].argmax())])
                 yield (
                     "side_in_obstacle",
                     f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "

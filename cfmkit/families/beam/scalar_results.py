@@ -334,7 +334,10 @@ def extremes(solution: OnCurve) -> dict[str, float | None]:
     if not (np.diff(along.motion) > 0).all() or not np.isfinite(along.effort).all():
         return numbers
     x, force = along.knots
-    peak = _turn(along, first_extreme(x, force, corners=along.corners))
+    # before a contact begins there may be no force at all, but for rounding
+    bearing = np.flatnonzero(np.abs(force) > (solution.effort_error or 0.0))
+    begin = float(x[bearing[0] - 1]) if len(bearing) and bearing[0] > 1 else -np.inf
+    peak = _turn(along, first_extreme(x, force, after=begin, corners=along.corners))
     if peak is None:
         return numbers
     valley = _turn(along, first_extreme(x, force, -1, after=peak[0], corners=along.corners))
