@@ -57,7 +57,7 @@ class GapBounds:
         self.gap = np.full(len(places), -np.inf)
 
     def are_open(self, z: FloatArray) -> Any:
-        """Return which contacts without a force are open for sure, (contacts,)."""
+        """Return which contacts without a force are certainly open, (contacts,)."""
         where = poses(self.mesh.attachments, z, self.places).place
         if self.turning.any():
             where = np.where(self.turning[:, None], np.stack([z[self.turns], 0 * z[self.turns]], axis=1), where)

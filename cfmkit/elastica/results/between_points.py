@@ -336,9 +336,8 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _events(self) -> FloatArray:
         """Bifurcations of the path and changes of contacts, dimensionless, increasing."""
-        scale = self.path.mesh.scales.drive
-        bifurcations = [one.drive / scale for one in self.path.events if one.kind == "bifurcation"]
-        return np.sort([*bifurcations, *self._drive[self._contacts].tolist()])
+        places = [one.drive / self._scale for one in self.path.events if one.kind == "bifurcation"]
+        return np.sort([*places, *self._drive[self._contacts].tolist()])
 
     def _nearest(self, wanted: FloatArray, left: Any) -> Any:
         """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
@@ -445,8 +444,7 @@ class BetweenLoads(BetweenPoints):
 
     @cached_property
     def _events(self) -> FloatArray:
-        # bifurcations are told by their loads, of which there may be several motions
-        return np.sort(self._drive[self._contacts])
+        return np.sort(self._drive[self._contacts])  # bifurcations are reported by loads: motions may be several
 
 
 def between_loads(
