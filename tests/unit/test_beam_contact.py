@@ -135,7 +135,7 @@ def test_a_rotation_that_is_stopped_has_a_moment():
             "obstacles.o", "its hollow of 2 mm is too tight for the pad of 'tip', radius 3 mm",
         ),
         (
-            "  obstacles: {o: {kind: polyline, points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]], fillet: 10 mm}}\n",
+            "  obstacles:\n    o: {kind: polyline, points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]], fillet: 10 mm}\n",
             "obstacles.o", "the sides allow a fillet of at most 9 mm",
         ),
         (
@@ -189,3 +189,33 @@ def test_obstacles_stops_and_touching_pads_are_drawn():
         figure = figures(solved(name))["shapes"]()
         drawn = {artist.get_gid() for artist in figure.axes[0].get_children()}
         assert parts <= drawn
+
+
+def test_a_contact_that_a_constant_load_closes_is_reported_from_the_start():
+    text = CANTILEVER.replace(
+        "kind: displacement, node: tip, direction: -90 deg", "kind: force, node: tip, direction: 0 deg"
+    )
+    text = text.replace("travel: 100 mm", "force: 0.01 N")
+    contacts = (
+        "  stops: {end: {node: tip, direction: -90 deg, gap: 9 mm}}\n  loads: [{kind: point, node: tip, fy: -0.1 N}]\n"
+    )
+    result = cfmkit.analyze(stated(contacts, text))
+    (said,) = (finding.message for finding in result.warnings if finding.name == "contact_begins")
+    assert said == "closed before the drive moves: stop 'end'"
+    assert result.values["first_contact"].value == result.curve.displacement[0]
+    free = 3 * 0.02 * 0.009 / 0.4**3  # what bends the leaf by the gap, to first order [N]
+    assert result.curve.extra["stop_end_force"].values[0] == pytest.approx(0.1 - free, rel=2e-3)
+
+
+def test_a_support_that_is_pushed_against_a_rigid_stop_has_no_start():
+    text = (
+        CANTILEVER.replace(
+            "root: {at: [0 mm, 0 mm], support: clamped}",
+            "root: {at: [0 mm, 0 mm], support: clamped, moved: {across: -20 mm}}",
+        )
+        .replace("node: tip, direction: -90 deg}", "node: tip, direction: 0 deg}")
+        .replace("travel: 100 mm", "travel: 1 mm")
+    )
+    result = cfmkit.analyze(stated("  stops: {end: {node: root, direction: -90 deg, gap: 10 mm}}\n", text))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "the drive is blocked by stop 'end' at 0.5 of the constant loads" in result.message

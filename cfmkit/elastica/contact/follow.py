@@ -38,6 +38,7 @@ GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
 SAME_PLACE = 1e-11  # share of the range within which a change is at a point
 FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may close and open again
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
+FAR = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
 STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
@@ -287,8 +288,9 @@ class _Part:
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
         """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n)."""
-        mesh, problem = self.whole.mesh, self.whole
-        z = np.array([problem.values(row, drive) for row, drive in zip(x, drives.tolist(), strict=True)])
+        mesh, way = self.whole.mesh, drives[:, None]
+        z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
+        z[:, mesh.free] = x
         return np.array(
             [
                 z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
@@ -329,6 +331,8 @@ class _Part:
     def find_change(self, first: PathEquilibrium, last: PathEquilibrium) -> ContactChange | PathStop | None:
         """Return the first change of a contact between two points of the piece; None if there is none."""
         step = _StepBetween(self, first, last)
+        if step.is_far:
+            return None
         values = step.values
         rounding = self.roundings(values)
         dips = (values < -rounding[:, None])[:, 1:]
@@ -411,20 +415,29 @@ class _StepBetween:
         wanted = SAMPLES_PER_RADIUS * self.moved * length / min(radii, default=np.inf)
         return np.linspace(0.0, 1.0, int(np.clip(np.ceil(wanted), FEWEST_SAMPLES, MOST_SAMPLES)) + 1)
 
+    @property
+    def is_far(self) -> bool:
+        """True if every contact is open and its gap is more than the step can close."""
+        if self.part.closed:
+            return False
+        mesh, ends = self.part.whole.mesh, self.part.values(*self.at(np.array([[0.0], [1.0]])))
+        arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
+        return bool((ends > FAR * self.moved * (1.0 + arms[:, None])).all())
+
     @cached_property
     def values(self) -> FloatArray:
         """Forces of closed and gaps of open contacts there, (contacts, shares)."""
-        states = [self.at(share) for share in self.shares.tolist()]
-        return self.part.values(np.array([x for x, _ in states]), np.array([drive for _, drive in states]))
+        return self.part.values(*self.at(self.shares[:, None]))
 
-    def at(self, share: float) -> tuple[FloatArray, float]:
-        """Return the unknowns and the drive at a share of the step."""
+    def at(self, share: Any) -> tuple[FloatArray, Any]:
+        """Return the unknowns (n,) and the drive at a share of the step, or (m, n) and (m,) at m of them, (m, 1)."""
         drive = self.first.drive + share * (self.last.drive - self.first.drive)
-        if share == 1.0:
-            return self.last.x, self.last.drive
         if self._is_smooth:
-            return hermite(self.first, self.last, drive), drive
-        return self.first.x + share * (self.last.x - self.first.x), drive
+            x = hermite(self.first, self.last, drive)
+        else:
+            x = self.first.x + share * (self.last.x - self.first.x)
+        x = np.where(share == 1.0, self.last.x, x)
+        return x, np.where(share == 1.0, self.last.drive, drive)[..., 0] if np.ndim(share) else drive
 
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""

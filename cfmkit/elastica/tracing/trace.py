@@ -413,6 +413,8 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
             return PathStatus.NO_START, RIGID
         what, stop = start.stopped
         jumps = stop.end is WhyStopped.JUMPS
+        if stop.end is WhyStopped.BLOCKED:
+            return PathStatus.NO_START, stop.message.format(place=f"{stop.drive:.3g} of the {what}")
         if jumps:
             return PathStatus.JUMPS, f"stability is lost under {100 * stop.drive:.3g} % of the {what}"
         text = f"no equilibrium to start from: lost at {stop.drive:.3g} of the constant loads and displacements; "

@@ -73,8 +73,8 @@ class RotationStop(StopBase):
 
 def _kind_of_stop(given: Any) -> str:
     """Return which kind of stop is meant: one with a direction, unless a rotation is named."""
-    turns = given.get("rotation", False) if isinstance(given, Mapping) else isinstance(given, RotationStop)
-    return "rotation" if turns is not False else "motion"
+    turns = "rotation" in given if isinstance(given, Mapping) else isinstance(given, RotationStop)
+    return "rotation" if turns else "motion"
 
 
 StopSpec = Annotated[

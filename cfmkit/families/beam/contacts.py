@@ -111,6 +111,8 @@ def contact_values(solution: Solution, run: Run) -> dict[str, Quantity]:
         motion = replace(solution, path=there, keep=np.arange(len(there)), ends=()).motion
         place = float(motion[int(np.abs(there.drive - first.drive).argmin())])
         found["first_contact"] = Quantity(place, *DEFINITIONS["first_contact"])
+    elif not turns and any(path.contact_force(number)[0] > 0 for number in range(len(contacts))):
+        found["first_contact"] = Quantity(float(solution.motion[0]), *DEFINITIONS["first_contact"])
     window = window_of(solution)
     pushing = [number for number, contact in enumerate(contacts) if not contact.turns]
     if pushing:
@@ -174,7 +176,9 @@ def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterat
     if not path.network.contacts or not len(solution.keep):
         return
     sentences = [_sentence(solution, event, say(event.drive)) for event in path.contact_events]
-    told = [text for text in sentences if text]
+    resting = [describe(one) for number, one in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0]
+    before = [f"closed before the drive moves: {', '.join(resting)}"] if resting else []
+    told = [*before, *(text for text in sentences if text)]
     if told:
         more = f"; and {len(told) - MOST_NAMED} more changes" if len(told) > MOST_NAMED else ""
         yield "contact_begins", "; ".join(told[:MOST_NAMED]) + more

@@ -254,8 +254,8 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
                 continue
             x, y, _ = path.motion(contact.node)[point]
             place = np.array([[float(np.real(node.x)) + x, float(np.real(node.y)) + y]])
-            for image in _both(solution, [place]):
-                ax.plot(*parts.mm(image[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
+            for at_pad in _both(solution, [place]):
+                ax.plot(*parts.mm(at_pad[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
                         gid=f"touch-{number}-{pose}")  # fmt: skip
 
 
