@@ -135,7 +135,8 @@ def test_a_rotation_that_is_stopped_has_a_moment():
             "obstacles.o", "its hollow of 2 mm is too tight for the pad of 'tip', radius 3 mm",
         ),
         (
-            "  obstacles:\n    o: {kind: polyline, points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]], fillet: 10 mm}\n",
+            "  obstacles:\n    o: {kind: polyline, fillet: 10 mm, "
+            "points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]]}\n",
             "obstacles.o", "the sides allow a fillet of at most 9 mm",
         ),
         (

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.follow import ContactChange, follow_in_contact
+from cfmkit.elastica.contact.changes import ContactChange
+from cfmkit.elastica.contact.follow import follow_in_contact
 from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.results.path import Event

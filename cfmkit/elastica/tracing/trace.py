@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.follow import ContactChange, follow_in_contact
+from cfmkit.elastica.contact.changes import ContactChange
+from cfmkit.elastica.contact.follow import follow_in_contact
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
