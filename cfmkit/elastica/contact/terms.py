@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
 
-class Gap(NamedTuple):
+class ContactGap(NamedTuple):
     """Gap of a contact with its derivatives by the n unknowns that change it."""
 
     value: Any
@@ -23,13 +23,13 @@ class Gap(NamedTuple):
     hessian: Any  # (n, n)
 
 
-def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> Gap:
+def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> ContactGap:
     """Return the gap of a contact at the values of all unknowns (size,)."""
     item, length = contact.item, mesh.scales.length
     at = poses(mesh.attachments, z, [contact.place])
     if isinstance(item, Stop) and item.turns:
         turn = at.unknowns[0, 3]
-        return Gap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
+        return ContactGap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
     arm, jacobian = at.arm[0], at.jacobian[0]
     if isinstance(item, Stop):
         normal = -_direction(item)
@@ -41,7 +41,7 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> Gap:
         across = np.array([normal[1], -normal[0]]) @ jacobian
         hessian = found.curvature * length * np.outer(across, across)
     hessian[2, 2] -= normal @ arm
-    return Gap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
+    return ContactGap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
 
 
 def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:

@@ -29,9 +29,6 @@ SIDE_SHARE = 0.5
 RUN_IN_SHARE = 0.1
 """Travel to 98 % of the force, as a share of all, above which the kink is called large."""
 
-CLOSE = 5e-3
-"""Difference of the second opinion, as a share, above which it is reported."""
-
 
 def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...]:
     """Return everything worth a warning, the gravest first."""
@@ -44,7 +41,6 @@ def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...
             *_width(spec, solution),
             *_guide(solution),
             *friction_left_out(spec),
-            *_opinion(solution),
         )
     )
 
@@ -145,14 +141,3 @@ def _guide(solution: Solution) -> Iterator[Finding]:
             "slider cancels it",
             "mechanism.copies=mirrored",
         )
-
-
-def _opinion(solution: Solution) -> Iterator[Finding]:
-    check = solution.recheck
-    if check is None or (max(abs(check.force), abs(check.stress)) <= CLOSE and check.stable):
-        return
-    yield finding(
-        "second_opinion",
-        f"{check.elements} corotational elements differ by {100 * check.force:.2g} % in force and "
-        f"{100 * check.stress:.2g} % in stress" + ("" if check.stable else ", and find the equilibrium unstable"),
-    )

@@ -29,9 +29,7 @@ DEFINITIONS = {
     "stress_place": ("length", "position of the largest stress along the centre line from the clamped end"),
     "stress_stroke": ("length", "travel at which the allowable stress is reached"),
     "width_ratio": ("factor", "smallest width over thickness"),
-    "recheck_force": ("ratio", "largest relative difference between the force and that of corotational elements"),
     **OF_SOLIDS,
-    "recheck_stress": ("ratio", "largest relative difference between the stress and that of corotational elements"),
 }
 
 
@@ -50,12 +48,8 @@ def numbers(solution: Solution) -> Iterator[tuple[str, float | None, str]]:
     yield "stress_stroke", *stress_stroke(solution)
     yield "width_ratio", solution.width_ratio, ""
     yield "energy_max", float(solution.energy.max()), ""
-    check = solution.recheck
-    why = "set 'analysis.recheck' to compute it"
     for name in OF_SOLIDS:
         yield name, None, "only the model of the part as a solid has it"
-    yield "recheck_force", None if check is None else check.force, why
-    yield "recheck_stress", None if check is None else check.stress, why
 
 
 def stress_stroke(solution: Solution) -> tuple[float | None, str]:
