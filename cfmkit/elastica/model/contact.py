@@ -50,7 +50,7 @@ class Distance(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Outline(ShortRepr):
+class ObstacleEdge(ShortRepr):
     """A smooth line of segments and arcs with the free side to its left: endless, or closed.
 
     Its first and last segment go on for ever unless it is closed.
@@ -135,19 +135,19 @@ class Outline(ShortRepr):
         return found
 
 
-def line(through: Sequence[float], direction: float) -> Outline:
+def line(through: Sequence[float], direction: float) -> ObstacleEdge:
     """Return a straight line through a point [m], along a direction [rad]; the free side is to its left."""
     along = np.array([[math.cos(direction), math.sin(direction)]])
     return _outline([np.asarray(through, float)], along, [0.0], [])
 
 
-def circle(centre: Sequence[float], radius: float, hole: bool = False) -> Outline:
+def circle(centre: Sequence[float], radius: float, hole: bool = False) -> ObstacleEdge:
     """Return a disc, free outside, or a hole, free inside [m]."""
     arc = (np.asarray(centre, float), radius, 0.0, math.tau, -1.0 if hole else 1.0)
     return _outline([], [], [], [arc], closed=True)
 
 
-def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> Outline:
+def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> ObstacleEdge:
     """Return straight sides through points [m] with rounded corners; the free side is to the left.
 
     Raises
@@ -186,7 +186,7 @@ def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = Fa
     return _outline(ring[:-1] + along * cut[:, :1], along, np.maximum(left, 0.0), arcs, closed)
 
 
-def arc(centre: Sequence[float], radius: float, start: float, end: float) -> Outline:
+def arc(centre: Sequence[float], radius: float, start: float, end: float) -> ObstacleEdge:
     """Return a part of the edge of a disc [m], between two angles [rad], that goes on straight at both ends.
 
     The free side is outside of the disc.
@@ -198,11 +198,11 @@ def arc(centre: Sequence[float], radius: float, start: float, end: float) -> Out
     return _outline(starts, along, [0.0, 0.0], [(middle, radius, high, low - high, 1.0)])
 
 
-def _outline(start: Any, along: Any, length: Any, arcs: Sequence[Any], closed: bool = False) -> Outline:
+def _outline(start: Any, along: Any, length: Any, arcs: Sequence[Any], closed: bool = False) -> ObstacleEdge:
     centre = np.array([one[0] for one in arcs], float).reshape(-1, 2)
     radius, first, sweep, bulge = (np.array([one[k] for one in arcs], float) for k in range(1, 5))
     starts, ways = np.asarray(start, float).reshape(-1, 2), np.asarray(along, float).reshape(-1, 2)
-    return Outline(starts, ways, np.asarray(length, float), centre, radius, first, sweep, bulge, closed)
+    return ObstacleEdge(starts, ways, np.asarray(length, float), centre, radius, first, sweep, bulge, closed)
 
 
 def _turn(one: FloatArray, other: FloatArray) -> float:
@@ -216,7 +216,7 @@ class NodeOnObstacle:
 
     name: str
     node: str
-    outline: Outline = field(compare=False)
+    outline: ObstacleEdge = field(compare=False)
     radius: float = 0.0  # of the pad [m]
     stiffness: float = math.inf  # [N/m]
 

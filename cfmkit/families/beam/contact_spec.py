@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
-from cfmkit.elastica.model.contact import Contact, NodeOnObstacle, Outline, Stop, arc, circle, line, polyline
+from cfmkit.elastica.model.contact import Contact, NodeOnObstacle, ObstacleEdge, Stop, arc, circle, line, polyline
 from cfmkit.specs.spec import Model, PositiveLength, Requirement
 from cfmkit.specs.units import Angle, Length, RotationalStiffness, Stiffness, format_short
 
@@ -94,7 +94,7 @@ class ObstacleBase(Model):
         None, description="of the obstacle at a pad; default: it is rigid"
     )
 
-    def outline(self) -> Outline:
+    def outline(self) -> ObstacleEdge:
         """Return its edge, the free side to the left."""
         raise NotImplementedError
 
@@ -106,7 +106,7 @@ class LineObstacle(ObstacleBase):
     through: Point = Field(description="a point of the wall")
     direction: Angle = Field(description="of the wall, from the x axis; the free side is to its left")
 
-    def outline(self) -> Outline:
+    def outline(self) -> ObstacleEdge:
         """Return its edge."""
         return line(self.through, self.direction)
 
@@ -118,7 +118,7 @@ class DiscObstacle(ObstacleBase):
     centre: Point = Field(description="its middle")
     radius: PositiveLength = Field(description="its radius")
 
-    def outline(self) -> Outline:
+    def outline(self) -> ObstacleEdge:
         """Return its edge."""
         return circle(self.centre, self.radius)
 
@@ -130,7 +130,7 @@ class HoleObstacle(ObstacleBase):
     centre: Point = Field(description="its middle")
     radius: PositiveLength = Field(description="its radius")
 
-    def outline(self) -> Outline:
+    def outline(self) -> ObstacleEdge:
         """Return its edge."""
         return circle(self.centre, self.radius, hole=True)
 
@@ -155,7 +155,7 @@ class PolylineObstacle(ObstacleBase):
         self.outline()
         return self
 
-    def outline(self) -> Outline:
+    def outline(self) -> ObstacleEdge:
         """Return its edge."""
         return polyline(self.points, self.fillet or 0.0, self.closed)
 
@@ -184,7 +184,7 @@ class ArcObstacle(_BeginsAnywhere):
             raise ValueError("between 'from' and 'to' there must be more than 0 and at most 180 deg")
         return self
 
-    def outline(self) -> Outline:
+    def outline(self) -> ObstacleEdge:
         """Return its edge."""
         return arc(self.centre, self.radius, *self.ends)
 
