@@ -229,8 +229,11 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
     ------
     cfmkit.errors.InputError
         If a variable changes the make-up of the network, moves a corner of a beam and a step of its thickness past
-        each other, or moves one side of a step only. Outputs raise it where the tangent is singular at a point.
+        each other, or moves one side of a step only; and for networks with contacts, whose gaps depend on a design,
+        too. Outputs raise it where the tangent is singular at a point.
     """
+    if path.network.contacts:
+        raise InputError("derivatives by design variables are not known of networks with contacts")
     x = np.asarray(variables, dtype=float)
     pairs = []
     for k in range(len(x)):

@@ -128,7 +128,8 @@ def frequencies(
     Raises
     ------
     cfmkit.errors.InputError
-        If a beam has no density, a mass is at no node, the count is not positive, or the unknowns are too many.
+        If a beam has no density, a mass is at no node, the count is not positive, the unknowns are too many, or there
+        are contacts.
     """
     _check(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
@@ -154,6 +155,8 @@ def frequencies(
 def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     if count < 1:
         raise InputError(f"at least one frequency must be requested, got {count}")
+    if path.network.contacts:
+        raise InputError("natural frequencies are not known of networks with contacts")
     if missing := [name for name in path.network.beams if name not in masses.density]:
         raise InputError(f"no density is given for the beams {', '.join(missing)}")
     for name in masses.nodes:

@@ -269,8 +269,14 @@ def definitions(kind: Kind | None = "force", extra: Iterable[Definition] = ()) -
 
 
 def values_of_family(values: Mapping[str, tuple[str, str]]) -> tuple[Definition, ...]:
-    """Return definitions of the scalar results that a family computes itself: name -> (dimension, definition)."""
-    return tuple(Definition(name, *about, scope="value", windowed=False) for name, about in values.items())
+    """Return definitions of the scalar results that a family computes itself: name -> (dimension, definition).
+
+    One of something that is named in brackets has in its name what that is: ``contact_force[contact]``.
+    """
+    return tuple(
+        Definition(plain, *about, scope="value", windowed=False, argument=argument or "")
+        for (plain, argument), about in ((split_name(name), about) for name, about in values.items())
+    )
 
 
 def split_name(name: str) -> tuple[str, str | None]:
@@ -392,13 +398,13 @@ def time_of(text: str) -> float:
 
 def branch_fault(meant: Definition, branch: str, branches: Sequence[str]) -> str:
     """Return what is wrong with asking for one branch of a metric; nothing if it can be had."""
-    if meant.argument:
+    if meant.argument == "time":
         try:
             time_of(branch)
         except QuantityError as problem:
             return f"{meant.name}[{branch}]: {problem}"
         return ""
-    if not meant.per_branch:
+    if not meant.per_branch and not meant.argument:
         return f"{meant.name!r} does not refer to a single branch; write it without [{branch}]"
     if branches and branch not in branches:
         return f"there is no branch {branch!r}; there are {', '.join(map(repr, branches))}"

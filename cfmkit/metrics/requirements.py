@@ -11,7 +11,15 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_metrics, split_name, unknown_metric, words
+from cfmkit.metrics.metric_definitions import (
+    Definition,
+    branch_fault,
+    known_metrics,
+    split_name,
+    unknown_metric,
+    values_of_family,
+    words,
+)
 from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, meant_as_percent, read_one_of, to_border
@@ -250,10 +258,7 @@ def check(
         If a requirement is not well put: see `validate_requirements`.
     """
     kind = kind_of(result)
-    own = (
-        Definition(name, one.dimension, one.definition, scope="value", windowed=False)
-        for name, one in result.values.items()
-    )
+    own = values_of_family({name: (one.dimension, one.definition) for name, one in result.values.items()})
     known = [*known_metrics(kind, tuple(extra_definitions)), *own]
     problems = tuple(requirement_problems(requirements, known, kind))
     if problems:

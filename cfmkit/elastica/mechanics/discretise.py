@@ -19,6 +19,7 @@ import numpy as np
 from cfmkit.elastica.mechanics.element_tables import element_tables, smooth_marks
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
+from cfmkit.elastica.model.contact import Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import driven
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam, Fit
+    from cfmkit.elastica.model.contact import Contact
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
 
@@ -84,6 +86,15 @@ class Attached(NamedTuple):
     grows: bool = False  # with the drive
 
 
+class ContactAt(NamedTuple):
+    """A contact, where it acts, and the unknown that is its force."""
+
+    item: Contact
+    place: int  # attachment
+    unknown: int
+    closed: bool | None = None  # None: as force and gap say
+
+
 @dataclass(frozen=True, eq=False)
 class Discretisation:
     """All arrays of a network under a drive, and the names behind its unknowns."""
@@ -93,7 +104,7 @@ class Discretisation:
     attachments: Attachments
     springs: tuple[Attached, ...]
     loads: tuple[Attached, ...]
-    size: int  # unknowns, held ones included; the last two an element are its force
+    size: int  # unknowns, held ones included: motions, two forces an element, forces of contacts
     free: Any  # indices of those that are solved for
     base: Any  # (size,) values of the held ones
     rate: Any  # (size,) their change with the drive
@@ -104,6 +115,7 @@ class Discretisation:
     floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
     pieces: int = 1  # elements for every smooth piece of a beam, at least
     tension: Mapping[str, float] | None = None  # beams that were cut for a large tension
+    contacts: tuple[ContactAt, ...] = ()
 
     @cached_property
     def known(self) -> dict[Any, Any]:
@@ -131,7 +143,7 @@ class Discretisation:
     @property
     def n_motions(self) -> int:
         """Number of unknowns that are motions; forces come behind them."""
-        return self.size - 2 * len(self.elements.length)
+        return int(self.elements.unknowns[:, -2:].min())
 
 
 def discretise(
@@ -203,16 +215,26 @@ class _ArrayBuilder:
             Attached(load, (self._attach(load.node),), grows) for load, grows in given if isinstance(load, PointLoad)
         )
         nodes = {name: self._attach(name) for name in self.network.nodes}
+        touching = [self._attach(contact.node) for contact in self.network.contacts]
         dofs, arms, origins, frames = zip(*self.places, strict=True)
         frame = np.array([(1.0, 0.0)] * len(frames)) if not any(frames) else _direction(np.array(frames))
         attachments = Attachments(np.array(dofs), np.array(arms), np.array(origins), frame)
         floors = np.array([self._floor(name, beam) for name, beam in beams.items()])
         each = np.array([len(own) - 1 for own in cuts.values()])
         elements, size = self._elements(cuts, tables, ends, attachments, np.repeat(floors, each))
-        free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
+        contacts = tuple(
+            ContactAt(contact, place, size + number)
+            for number, (contact, place) in enumerate(zip(self.network.contacts, touching, strict=True))
+        )
+        acting = [*springs, *loads, *(Attached(one.item, (one.place,)) for one in contacts)]
+        free, base, rate = self._constraints(size, elements, attachments, acting)
+        if contacts:
+            size += len(contacts)
+            free = np.append(free, [one.unknown for one in contacts])
+            base, rate = (np.append(values, np.zeros(len(contacts))) for values in (base, rate))
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension,
+            self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension, contacts,
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
@@ -391,6 +413,8 @@ def _used(size: int, elements: BeamElements, attachments: Attachments, acting: l
         for unknowns, has_arm in zip(attachments.unknowns[list(places)], arms[list(places)], strict=True):
             if isinstance(item, TorsionSpring):
                 used[unknowns[3]] = True
+                continue
+            if isinstance(item, Stop) and item.turns:  # alone it holds no rotation
                 continue
             used[unknowns[:2]] = True
             used[unknowns[2]] |= has_arm

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
@@ -84,6 +85,8 @@ def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
 def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
     for attached in (*mesh.springs, *mesh.loads):
         yield TERMS[type(attached.item)](mesh, attached, z, share, drive)
+    for contact in mesh.contacts:
+        yield press(mesh, contact, z)
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
@@ -167,15 +170,15 @@ def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) ->
     strain = e.axial * at.normal**2 + e.shear * at.shear**2
     beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
     springs = (TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
-    return beams.sum() / 2 + sum(springs)
+    return beams.sum() / 2 + sum(springs) + sum(press(mesh, contact, z).energy for contact in mesh.contacts)
 
 
 def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     """Return the number of unstable directions at a held drive from the tangent of the free unknowns [Ha].
 
     Without loads that follow: the negative pivots of L D L^T less one for every component of a section force. Those
-    are maxima of the functional, or constraints with one negative and one positive pivot each. Under loads that follow:
-    the negative real eigenvalues of the motions' stiffness.
+    are maxima of the functional, or constraints with one negative and one positive pivot each; so are forces of
+    contacts, those of open ones, too. Under loads that follow: the negative real eigenvalues of the motions' stiffness.
     """
     from scipy.linalg import lapack
 
@@ -185,7 +188,7 @@ def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
     single = pivots > 0
     negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
-    return negative - 2 * len(mesh.elements.length)
+    return negative - int((mesh.free >= mesh.n_motions).sum())
 
 
 def motion_eigenvalues(mesh: Discretisation, tangent: Any) -> Any:

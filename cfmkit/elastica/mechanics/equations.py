@@ -278,11 +278,12 @@ class NumpyEquations:
 
 
 def force_units(mesh: Discretisation) -> FloatArray:
-    """Return the unit of each free unknown that is a section force, EI/L^2 of its element; infinite for motions."""
+    """Return the unit of each free unknown that is a force, EI/L^2 of its element or 1; infinite for motions."""
     e = mesh.elements
     bending = (np.real(e.rigidity) * np.real(e.weight)).sum(axis=1) * np.real(e.length)
     unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / np.real(e.length) ** 2)[:, None]
+    unit[[contact.unknown for contact in mesh.contacts]] = 1.0
     return np.asarray(unit[mesh.free])
 
 

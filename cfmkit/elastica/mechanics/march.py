@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.equations import ContactEquations, without_contacts
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.discretise import BeamElements
@@ -91,7 +92,10 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
     if key not in mesh.known:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(KNOWN) and mesh.degree <= MAX_DEGREE
-        mesh.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(mesh, ramp)
+        if mesh.contacts:
+            mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(without_contacts(mesh), ramp))
+        else:
+            mesh.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(mesh, ramp)
     return mesh.known[key]  # type: ignore[no-any-return]
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
 ROOM = 50  # states of a march besides two for each requested value, until it is looked at again
+ROOM_IN_CONTACT = 8  # of a march with closed contacts, behind which it is seen whether one begins or ends
 FIRST_POWERS, N_POWERS, STIFF_SHARE = 8, 3, 1e-2
 """Powers by which the softest mode is estimated, and its flexibility as a share of a critical one's that is none."""
 MIX = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
@@ -92,7 +93,8 @@ class NetworkProblem:
         here, before, left = _state(walk.here), walk.before, walk.targets[walk.number :]
         plan = MarchPlan(
             walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
-            self.next_correction, on_branch=walk.branch is not None, room=2 * len(left) + ROOM,
+            self.next_correction, on_branch=walk.branch is not None,
+            room=ROOM_IN_CONTACT if self.mesh.contacts else 2 * len(left) + ROOM,
         )  # fmt: skip
         marched = self.equations.march(here, left, plan)
         states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)

@@ -25,12 +25,16 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)
     unknowns = np.hstack([e.unknowns[:, :8], bubbles, forces])
-    size = ends + count * (degree + 1)
+    forces_end = ends + count * (degree + 1)
+    size = forces_end + len(mesh.contacts)
+    contacts = tuple(one._replace(unknown=forces_end + number) for number, one in enumerate(mesh.contacts))
     free = np.concatenate([mesh.free[mesh.free < ends], np.arange(ends, size)])
     base, rate = np.zeros(size, mesh.base.dtype), np.zeros(size)
     base[:ends], rate[:ends] = mesh.base[:ends], mesh.rate[:ends]
     elements = e._replace(**tables, unknowns=unknowns)
-    return replace(mesh, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate)
+    return replace(
+        mesh, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate, contacts=contacts
+    )
 
 
 def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
@@ -40,9 +44,11 @@ def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
     found[..., :ends] = z[..., :ends]
     found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
     found[..., new[:, -2:]] = z[..., old[:, -2:]]
+    if mesh.contacts:
+        found[..., -len(mesh.contacts) :] = z[..., -len(mesh.contacts) :]
     return found
 
 
 def _n_end_motions(mesh: Discretisation) -> int:
     """Return the number of unknowns that move ends of elements; bubbles and forces come behind them."""
-    return mesh.size - len(mesh.elements.length) * (mesh.degree + 1)
+    return int(mesh.elements.unknowns[:, 8].min())

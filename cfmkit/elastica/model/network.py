@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.contact import Contact
 
 
 _NONE = (0.0, 0.0, 0.0)  # not displaced
@@ -170,6 +171,7 @@ class Network(ShortRepr):
     links: tuple[Link, ...] = ()
     springs: tuple[Spring, ...] = ()
     loads: tuple[LoadOn, ...] = field(default=())
+    contacts: tuple[Contact, ...] = ()  # stops and obstacles of nodes
 
     def __post_init__(self) -> None:
         """Freeze the mappings and check that names match."""
@@ -187,12 +189,14 @@ class Network(ShortRepr):
                 self._known(end, "a spring")
         for load in self.loads:
             self.check_load(load)
+        for contact in self.contacts:
+            self._known(contact.node, f"contact {contact.name!r}")
         if self.links:
             self._check_links()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what pickling needs (mapping proxies do not pickle)."""
-        return type(self), (dict(self.nodes), dict(self.beams), self.links, self.springs, self.loads)
+        return type(self), (dict(self.nodes), dict(self.beams), self.links, self.springs, self.loads, self.contacts)
 
     def check_load(self, load: LoadOn) -> None:
         """Raise an error if what the load acts on is not there."""

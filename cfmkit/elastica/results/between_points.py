@@ -314,7 +314,9 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def _unstable(self) -> Any:
-        return self.path.unstable[self._order]
+        counts = np.array(self.path.unstable[self._order])
+        counts[self._contacts] = counts[self._contacts + 1]  # such a point begins a stretch
+        return counts
 
     @cached_property
     def _stretch(self) -> Any:
@@ -322,13 +324,20 @@ class BetweenPoints(ShortRepr):
         parted = np.zeros(len(self._drive), dtype=bool)
         branch = self.path.branch[self._order]
         parted[1:] = (branch[1:] != branch[:-1]) | (self._unstable[1:] != self._unstable[:-1])
+        parted[self._contacts] = True
         return np.cumsum(parted)
 
     @cached_property
+    def _contacts(self) -> Any:
+        """Numbers of the points at which a contact begins or ends, but for both ends of the path."""
+        found = np.flatnonzero(self.path.changes_contact[self._order])
+        return found[(found > 0) & (found < len(self.path) - 1)]
+
+    @cached_property
     def _events(self) -> FloatArray:
-        """Bifurcations of the path, dimensionless, increasing."""
-        scale = self.path.mesh.scales.drive
-        return np.sort([one.drive / scale for one in self.path.events if one.kind == "bifurcation"])
+        """Bifurcations of the path and changes of contacts, dimensionless, increasing."""
+        places = [one.drive / self._scale for one in self.path.events if one.kind == "bifurcation"]
+        return np.sort([*places, *self._drive[self._contacts].tolist()])
 
     def _nearest(self, wanted: FloatArray, left: Any) -> Any:
         """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
@@ -347,6 +356,9 @@ class BetweenPoints(ShortRepr):
         names, found = list(dict.fromkeys(self.path.branch.tolist())), {}
         rounding = AT_POINT * (drive[-1] - drive[0])
         for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
+            if right in self._contacts:
+                found[int(stretches[right])] = Corner(float(drive[right]), np.asarray(self._y[right]), False, False)
+                continue
             before, behind = drive[right - 1], drive[right]
             here = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
             if len(here) != 1:
@@ -426,11 +438,13 @@ class BetweenLoads(BetweenPoints):
     def _stretch(self) -> Any:
         """Parted by other branches only: at a largest load a path is smooth."""
         branch = self.path.branch[self._order]
-        return np.cumsum(np.concatenate([[False], branch[1:] != branch[:-1]]))
+        parted = np.concatenate([[False], branch[1:] != branch[:-1]])
+        parted[self._contacts] = True
+        return np.cumsum(parted)
 
     @cached_property
     def _events(self) -> FloatArray:
-        return np.empty(0)  # told by their loads, of which there may be several motions
+        return np.sort(self._drive[self._contacts])  # bifurcations are reported by loads: motions may be several
 
 
 def between_loads(

@@ -82,6 +82,8 @@ def neighbouring(path: EquilibriumPath, network: Network, drive: Drive, largest_
         status=status,
         message=message,
         events=(),
+        contact_events=(),
+        at_contact=False,
         accurate=read_only(np.ones(len(kept), dtype=bool), np.bool_),
         imperfection="",
     )

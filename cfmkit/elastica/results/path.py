@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
+from cfmkit.elastica.contact.terms import gaps, press
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -40,6 +41,7 @@ class PathStatus(Enum):
 
     COMPLETE = "all requested points were reached"
     LIMIT_POINT = "the drive cannot go further: a limit point"
+    BLOCKED = "the drive is blocked by a contact"
     JUMPS = "stability is lost and no stable equilibrium is near"
     LOST = "the path was lost: no step converged"
     OUTSIDE = "the path left the range of the drive"
@@ -59,6 +61,17 @@ class Event:
 
     kind: str
     drive: float
+    before: int
+    after: int
+
+
+@dataclass(frozen=True)
+class ContactEvent:
+    """The begin or end of a contact, or a contact that blocks the drive; unstable directions before and after."""
+
+    kind: Literal["begins", "ends", "blocks"]
+    number: int  # of the contact in `Network.contacts`
+    drive: float  # [m, rad or 1]
     before: int
     after: int
 
@@ -88,6 +101,8 @@ class EquilibriumPath(ShortRepr):
     error: float  # estimated error of forces and positions, relative to the largest of the path
     accurate: Any  # (n,) False at points whose own error is above the tolerance, or not known
     imperfection: str = ""  # what was added to the shapes: size and mode; empty for the network as given
+    contact_events: tuple[ContactEvent, ...] = ()  # in path order
+    at_contact: Any = False  # (n,) points at which a contact begins or ends; False for all
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -117,6 +132,7 @@ class EquilibriumPath(ShortRepr):
             requested=self.requested[points],
             branch=self.branch[points],
             accurate=self.accurate[points],
+            at_contact=self.changes_contact[points],
         )
 
     def joined(self, other: EquilibriumPath) -> EquilibriumPath:
@@ -130,6 +146,7 @@ class EquilibriumPath(ShortRepr):
             requested=read_only(np.concatenate([self.requested, other.requested]), np.int64),
             branch=read_only(np.concatenate([self.branch, other.branch]), np.str_),
             accurate=read_only(np.concatenate([self.accurate, other.accurate]), np.bool_),
+            at_contact=read_only(np.concatenate([self.changes_contact, other.changes_contact]), np.bool_),
         )
 
     def with_states(self, near: Any, free: FloatArray, drive: FloatArray, accurate: Any = True) -> EquilibriumPath:
@@ -155,7 +172,25 @@ class EquilibriumPath(ShortRepr):
             requested=read_only(np.full(count, -1), np.int64),
             branch=self.branch[near],
             accurate=read_only(np.broadcast_to(accurate, count), np.bool_),
+            at_contact=False,
         )
+
+    @property
+    def changes_contact(self) -> Any:
+        """True at points at which a contact begins or ends, (n,)."""
+        return np.broadcast_to(self.at_contact, (len(self),))
+
+    def contact_force(self, number: int) -> FloatArray:
+        """Return the force of a contact at every point, (n,) [N], of a stop that limits a rotation the moment [N m]."""
+        mesh, contact = self.mesh, self.mesh.contacts[number]
+        unit = mesh.scales.moment if contact.item.turns else mesh.scales.force
+        return read_only(self.at.z[:, contact.unknown] * unit)
+
+    def contact_gap(self, number: int) -> FloatArray:
+        """Return the gap of a contact at every point, (n,) [m or rad]; negative by what an elastic one yields."""
+        mesh, contact = self.mesh, self.mesh.contacts[number]
+        unit = 1.0 if contact.item.turns else mesh.scales.length
+        return read_only(gaps(mesh, contact, self.at.z) * unit)
 
     @cached_property
     def drive(self) -> FloatArray:
@@ -354,6 +389,8 @@ def strain_energy(at: Equilibria) -> Any:
         total = total + np.array(
             [term(at.mesh, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
         )
+    for contact in at.mesh.contacts:
+        total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
     return total
 
 

@@ -70,7 +70,7 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
 
 def _get_common_values(network: Network) -> Any:
     """Return what is the same in networks that are set up together; None if this one cannot be."""
-    if not all(is_plain(beam) and beam.closure == "rotscale" for beam in network.beams.values()):
+    if network.contacts or not all(is_plain(beam) and beam.closure == "rotscale" for beam in network.beams.values()):
         return None
     supports = [node.support for node in network.nodes.values()]
     arms = [apart(network, link.node) for link in network.links]

@@ -18,13 +18,13 @@ from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.polynomials import integrals, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.drive import Displacement
-from cfmkit.elastica.model.network import Network
 from cfmkit.elastica.model.shapes import Bent
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.network import Network
     from cfmkit.numerics.continuation.path import PathEvent
 
 DEGREE = 14  # of the polynomials that the rotations are given as
@@ -60,7 +60,7 @@ def bend(network: Network, drive: Drive, buckling: Buckling | None, size: float)
             for offset, node in ((beam.start_offset, beam.start), (beam.end_offset, beam.end))
         )
         beams[name] = replace(beam, shape=Bent(beam.shape, added), start_offset=first, end_offset=last)
-    bent = Network(nodes, beams, network.links, network.springs, network.loads)
+    bent = replace(network, nodes=nodes, beams=beams)
     return bent, f"{size:.6g} m of the buckling mode {_where(drive, buckling)}"
 
 

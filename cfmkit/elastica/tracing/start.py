@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.elastica.contact.changes import ContactChange
+from cfmkit.elastica.contact.follow import follow_in_contact
 from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
-from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
@@ -64,7 +65,9 @@ def find_start(mesh: Discretisation, control: Control) -> DriveStart:
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
             return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
-        for item in follow(ramp, begin, np.ones(1), options, branch):
+        for item in follow_in_contact(ramp, begin, np.ones(1), options, branch):
+            if isinstance(item, ContactChange):
+                continue
             if isinstance(item, PathEvent):
                 if control.branch != "primary" and item.before != item.after:  # nothing is lost on a path straight on
                     events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.changes import ContactChange
+from cfmkit.elastica.contact.follow import follow_in_contact
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.model.plain_beams_at_once import coils
-from cfmkit.elastica.results.path import Event, Path, PathStatus
+from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
 from cfmkit.numerics.continuation.events import relocate
-from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
@@ -229,8 +230,9 @@ def raise_attempt(attempt: TraceAttempt, resolution: DegreeAndPieces, control: C
 
 def _can_be_raised(attempt: TraceAttempt) -> bool:
     path = attempt.path
-    complete = path.status is PathStatus.COMPLETE and not attempt.start.events
-    return complete and path.error < MAX_RAISED_ERROR and _span(path) > 0
+    complete = path.status is PathStatus.COMPLETE
+    quiet = not attempt.start.events and not path.contact_events
+    return complete and quiet and path.error < MAX_RAISED_ERROR and _span(path) > 0
 
 
 def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
@@ -269,16 +271,21 @@ def _finer(path: Path) -> Discretisation:
 
 
 def _with_error(attempt: TraceAttempt, finer: Discretisation) -> TraceAttempt:
-    path, unit = attempt.path, attempt.path.mesh.scales.drive
-    errors = point_errors(path, finer, pick_points(path, [event.drive * unit for event in attempt.events]))
+    path = attempt.path
+    errors = point_errors(path, finer, pick_points(path, _event_places(attempt)))
     told = replace(path, error=float(errors.max(initial=0.0)))
     vars(told)["effort"] = path.effort  # is known
     return attempt._replace(path=told)
 
 
+def _event_places(attempt: TraceAttempt) -> list[float]:
+    unit = attempt.path.mesh.scales.drive
+    return [*(event.drive * unit for event in attempt.events), *(event.drive for event in attempt.path.contact_events)]
+
+
 def _end_alike(path: Path, before: Path) -> bool:
     """Return True if two paths end early at the same place: no degree leads further."""
-    early = (PathStatus.LIMIT_POINT, PathStatus.JUMPS, PathStatus.LOST, PathStatus.OUTSIDE)
+    early = (PathStatus.LIMIT_POINT, PathStatus.BLOCKED, PathStatus.JUMPS, PathStatus.LOST, PathStatus.OUTSIDE)
     if path.status not in early or path.status is not before.status or not len(path) or not len(before):
         return False
     return bool(abs(path.drive[-1] - before.drive[-1]) < SAME_END * _span(path))
@@ -287,6 +294,7 @@ def _end_alike(path: Path, before: Path) -> bool:
 def _first_buckling(network: Network, drive: Drive, control: Control) -> Buckling | None:
     """Return the first loss of stability on the primary path of a network."""
     primary = replace(control, branch="primary", through_folds=False)
+    network = replace(network, contacts=())  # it is a property of the beams, not of what they may meet
     return trace_on(network, drive, primary, DegreeAndPieces(DEGREE_OF_MODES), first_only=True).first
 
 
@@ -303,12 +311,18 @@ def trace_on(
     arrays = resolution.arrays(network, drive, fits)
     start = find_start(arrays, control)
     events, first, points = list[PathEvent](), start.first, list[Point]()
+    changes: dict[int, list[ContactChange]] = {}  # by the points they are at
     ending = PathStop(WhyStopped.LOST, 0.0)
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
-        for item in follow(start.problem, start.at, drive.points / unit, _options(drive, control, unit), start.branch):
+        options = _options(drive, control, unit)
+        for item in follow_in_contact(start.problem, start.at, drive.points / unit, options, start.branch):
             if isinstance(item, Point):
                 points.append(item)
+            elif isinstance(item, ContactChange):
+                changes.setdefault(len(points) - 1, []).append(item)
+                stabler = points[-1].at._replace(unstable=min(item.before, item.after))
+                points[-1] = points[-1]._replace(at=stabler)
             elif isinstance(item, PathEvent):
                 events.append(item)
                 if first is None and item.modes is not None:
@@ -323,7 +337,16 @@ def trace_on(
     if events:
         points = [_at_event(point, events, drive, unit) for point in points]
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
-    path = _without_locked_points(_path(network, drive, start, points, told, status, message))
+    path = _path(network, drive, start, points, told, status, message)
+    if changes:
+        touched = tuple(
+            ContactEvent(one.kind, one.number, one.at.drive * unit, one.before, one.after)
+            for found in changes.values()
+            for one in found
+        )
+        marked = read_only(np.isin(np.arange(len(points)), list(changes)), np.bool_)
+        path = replace(path, contact_events=touched, at_contact=marked)
+    path = _without_locked_points(path)
     branches = tuple(point.branch for point in points[: len(path)])
     return TraceAttempt(path, resolution, start, first, tuple(events), branches)
 
@@ -393,6 +416,8 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
             return PathStatus.NO_START, RIGID
         what, stop = start.stopped
         jumps = stop.end is WhyStopped.JUMPS
+        if stop.end is WhyStopped.BLOCKED:
+            return PathStatus.NO_START, stop.message.format(place=f"{stop.drive:.3g} of the {what}")
         if jumps:
             return PathStatus.JUMPS, f"stability is lost under {100 * stop.drive:.3g} % of the {what}"
         text = f"no equilibrium to start from: lost at {stop.drive:.3g} of the constant loads and displacements; "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
@@ -132,6 +133,7 @@ def shapes(result: Result) -> Figure:
     motion = f"{result.curve.motion_name}:"
     color_key(figure, (17.0, 12.0 + height * scale + 2.0), [(motion, INK), *_key(solution, list(drawn))])
     _supports(solution, ax)
+    _contacts(solution, ax, box, list(drawn))
     parts.to_scale(ax, box)
     ax.set_ylabel("y [mm]")
     place_labels(ax, [peak, *_names(solution)])
@@ -209,6 +211,34 @@ def _supports(solution: Solution, ax: Axes) -> None:
                 *parts.mm(at[0]), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
                 markerfacecolor=color if support.along or color != INK else "white", linestyle="", gid=f"at-{name}",
             )  # fmt: skip
+
+
+def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, float], poses: list[int]) -> None:
+    """Draw obstacles, the bars of stops at the ends of their gaps, and a dot where a pad touches in a pose."""
+    path, size = solution.path, max(box[2] - box[0], box[3] - box[1])
+    outlines = {
+        contact.name: contact.outline for contact in path.network.contacts if isinstance(contact, NodeOnObstacle)
+    }
+    for name, outline in outlines.items():
+        for number, line in enumerate(_both(solution, outline.lines(2 * size))):
+            parts.edge(ax, line, f"obstacle-{name}-{number}", color=INK, linewidth=1.8, zorder=1.6)
+    for number, contact in enumerate(path.network.contacts):
+        node = path.network.nodes[contact.node]
+        if isinstance(contact, Stop) and contact.direction is not None:
+            along = np.array([np.cos(contact.direction), np.sin(contact.direction)])
+            at = np.array([float(np.real(node.x)), float(np.real(node.y))]) + contact.gap * along
+            bar = 0.03 * size * np.array([[-along[1], along[0]], [along[1], -along[0]]])
+            for image, line in enumerate(_both(solution, [at + bar])):
+                parts.edge(ax, line, f"stop-{contact.name}-{number}-{image}", color=INK, linewidth=2.6, zorder=1.6)
+        for color, pose in zip(_colors(len(poses)), poses, strict=True):
+            point = int(solution.keep[pose])
+            if contact.turns or not path.contact_force(number)[point] > 0:
+                continue
+            x, y, _ = path.motion(contact.node)[point]
+            place = np.array([[float(np.real(node.x)) + x, float(np.real(node.y)) + y]])
+            for at_pad in _both(solution, [place]):
+                ax.plot(*parts.mm(at_pad[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
+                        gid=f"touch-{number}-{pose}")  # fmt: skip
 
 
 def reactions(result: Result) -> Figure:

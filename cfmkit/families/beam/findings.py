@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,8 @@ import numpy as np
 from cfmkit.elastica import PathStatus, hindered_curling
 from cfmkit.elastica.mechanics.discretise import discretise, without_floor
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.families.beam.contacts import FINDINGS as ON_CONTACTS
+from cfmkit.families.beam.contacts import contact_sentences
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
@@ -68,6 +71,7 @@ FINDINGS = {
     "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
     "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "feature_small": "a beam is thinner than can be made",
+    **ON_CONTACTS,
 }
 
 finding = finder(FINDINGS)
@@ -207,7 +211,8 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
     return tuple(
         one
         for source in (
-            _ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _width, _gaps,
+            _ending, _closure, _contacts, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _width,
+            _gaps,
         )
         for one in source(solution)
     )  # fmt: skip
@@ -215,7 +220,7 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
 
 def _ending(solution: Solution) -> Iterator[Finding]:
     path = solution.path
-    if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
+    if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE, PathStatus.BLOCKED):
         why = ending_of(solution)
         yield finding("ends_early", why.message, *why.cures)
 
@@ -256,6 +261,11 @@ def _closure(solution: Solution) -> Iterator[Finding]:
         for name, one in fits.items()
     )
     yield finding("closure_adjusted", f"beams were turned and scaled to fit between their nodes: {reported}")
+
+
+def _contacts(solution: Solution) -> Iterator[Finding]:
+    for name, message in contact_sentences(solution, partial(drive_text, solution.assembly)):
+        yield finding(name, message)
 
 
 def _moved(solution: Solution) -> list[str]:

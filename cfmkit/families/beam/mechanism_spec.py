@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from cfmkit.families.beam.contact_spec import ObstacleSpec, StopSpec, contact_faults
 from cfmkit.families.beam.network_elements_spec import (
     HELD,
     Copies,
@@ -44,7 +45,7 @@ _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 def faults(mechanism: Mechanism) -> Iterator[Fault]:
     """Yield what is wrong with a mechanism whose keys are each right by themselves."""
-    for group in ("nodes", "beams", "springs"):
+    for group in ("nodes", "beams", "springs", "stops", "obstacles"):
         for name in getattr(mechanism, group):
             if not _NAME.fullmatch(name):
                 yield (group, name), "a name is a letter and then at most 39 letters, digits, '_' or '-'"
@@ -66,6 +67,7 @@ def faults(mechanism: Mechanism) -> Iterator[Fault]:
     yield from () if beams else _loose_nodes(mechanism)
     yield from _drive_faults(mechanism)
     yield from _copy_faults(mechanism)
+    yield from contact_faults(mechanism)
     if mechanism.shear and not mechanism.axial:
         yield ("shear",), "beams that shear stretch, too: add 'axial: true'"
 
@@ -90,6 +92,11 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
         for key in ("start", "end", "node"):
             if (node := getattr(spring, key, None)) is not None:
                 yield ("springs", name, spring.kind, key), "node", node
+    for name, stop in mechanism.stops.items():
+        yield ("stops", name, stop.kind_tag, "node"), "node", stop.node
+    for name, obstacle in mechanism.obstacles.items():
+        for node in obstacle.nodes or ():
+            yield ("obstacles", name, obstacle.kind, "nodes", node), "node", node
     driving = mechanism.drive.loads if isinstance(mechanism.drive, LoadsDrive) else ()
     for place, loads in ((("loads",), mechanism.loads), (("drive", "loads", "loads"), driving)):
         for index, load in enumerate(loads):
@@ -249,6 +256,12 @@ class Mechanism(RoundedCorners, Model):
     links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
     springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
     loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
+    stops: dict[str, StopSpec] = Field(
+        {}, description="by name: {end: {node: tip, direction: -90 deg, gap: 3 mm}}, or with {rotation: true}"
+    )
+    obstacles: dict[str, ObstacleSpec] = Field(
+        {}, description="rigid bodies that nodes may touch, by name; of `kind` line, disc, hole, polyline or arc"
+    )
     drive: DriveSpec = Field(description="the drive; of `kind` displacement, rotation, force, moment or loads")
     copies: Copies | None = Field(None, description="copies of the part described here")
     part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")

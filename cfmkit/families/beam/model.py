@@ -23,6 +23,7 @@ from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
+from cfmkit.families.beam.contacts import contact_columns
 from cfmkit.families.beam.curve_along_its_motion import travel_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
@@ -166,10 +167,16 @@ def _kept(assembly: Assembly, path: Path) -> tuple[Any, Any]:
     """
     spec = assembly.spec
     if spec.analysis.through_folds or not spec.mechanism.drive.by_motion:
-        keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_requested
+        keep = np.arange(len(path)) if spec.analysis.through_folds else _with_contacts(path, path.at_requested)
         return read_only(keep, np.int64), read_only(np.empty(0), np.int64)
     on_curve = assembly.on_curve[path.requested[path.at_requested]]
-    return read_only(path.at_requested[on_curve], np.int64), read_only(path.at_requested[~on_curve], np.int64)
+    keep = _with_contacts(path, path.at_requested[on_curve])
+    return read_only(keep, np.int64), read_only(np.setdiff1d(path.at_requested[~on_curve], keep), np.int64)
+
+
+def _with_contacts(path: Path, points: Any) -> Any:
+    """Return points of a path together with those at which a contact begins or ends."""
+    return np.union1d(points, np.flatnonzero(path.changes_contact)) if path.contact_events else points
 
 
 def _ending(solution: Solution) -> tuple[Status, str]:
@@ -195,7 +202,7 @@ def _curve(solution: Solution) -> Curve:
             f"{name}_force_y": Column(y, "force"),
             f"{name}_moment": Column(moment, "torque"),
         }
-    extra |= _outputs(solution) | _frequencies(solution)
+    extra |= contact_columns(solution) | _outputs(solution) | _frequencies(solution)
     return Curve(
         solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, _kind(solution)
     )

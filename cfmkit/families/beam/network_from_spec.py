@@ -27,6 +27,7 @@ from cfmkit import elastica as engine
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
+from cfmkit.families.beam.contact_spec import contacts_of
 from cfmkit.families.beam.network_elements_spec import (
     HELD,
     DisplacementDrive,
@@ -174,6 +175,7 @@ def assemble(spec: BeamSpec) -> Assembly:
         links=tuple(engine.Link(link.master, link.node) for link in mechanism.links),
         springs=tuple(_spring(spring) for spring in mechanism.springs.values()),
         loads=tuple(_load(load) for load in mechanism.loads) if spec.analysis.loads_first else (),
+        contacts=contacts_of(mechanism),
     )
     if mechanism.closure == "chain":
         network = chained(network)
@@ -359,7 +361,7 @@ def chained(network: Network) -> Network:
         name: replace(node, x=placed[name].real, y=placed[name].imag) if name in placed else node
         for name, node in network.nodes.items()
     }
-    return Network(nodes, network.beams, network.links, network.springs, network.loads)
+    return replace(network, nodes=nodes)
 
 
 def _own_chord(network: Network, beam: Beam) -> complex:

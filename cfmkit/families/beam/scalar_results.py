@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.beam.contacts import DEFINITIONS as OF_CONTACTS
+from cfmkit.families.beam.contacts import contact_values
 from cfmkit.families.beam.curve_along_its_motion import AlongMotion, window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
@@ -76,13 +78,14 @@ DEFINITIONS = {
     "peak_stress_x": ("length", "x of the place of the largest stress in the window, on the part before any load"),
     "peak_stress_y": ("length", "y of the place of the largest stress in the window, on the part before any load"),
     **OF_SOLIDS,
+    **OF_CONTACTS,
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 
 
 def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None if a value does not exist, or takes long and is not looked at."""
-    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
+    numbers: dict[str, float | None] = dict.fromkeys(name for name in DEFINITIONS if name not in OF_CONTACTS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         "error_estimate": solution.path.error,
         "strain_energy_max": float(solution.path.energy.max()) * solution.assembly.parallel,
@@ -99,7 +102,7 @@ def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
         numbers |= extremes(solution) | _events(solution)
     if solution.spec.mechanism.drive.is_displacement:
         numbers |= ranges(solution)
-    return quantities(DEFINITIONS, numbers) | unknown_to_beams()
+    return quantities(DEFINITIONS, numbers) | unknown_to_beams() | contact_values(solution, run)
 
 
 def within(solution: OnCurve, low: float, high: float) -> Any:
@@ -331,7 +334,10 @@ def extremes(solution: OnCurve) -> dict[str, float | None]:
     if not (np.diff(along.motion) > 0).all() or not np.isfinite(along.effort).all():
         return numbers
     x, force = along.knots
-    peak = _turn(along, first_extreme(x, force, corners=along.corners))
+    # before a contact begins there may be no force at all, but for rounding
+    bearing = np.flatnonzero(np.abs(force) > (solution.effort_error or 0.0))
+    begin = float(x[bearing[0] - 1]) if len(bearing) and bearing[0] > 1 else -np.inf
+    peak = _turn(along, first_extreme(x, force, after=begin, corners=along.corners))
     if peak is None:
         return numbers
     valley = _turn(along, first_extreme(x, force, -1, after=peak[0], corners=along.corners))

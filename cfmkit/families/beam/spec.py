@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from cfmkit.families.beam.contact_spec import contact_requirement_faults
 from cfmkit.families.beam.mechanism_spec import Mechanism
 from cfmkit.families.beam.network_elements_spec import BeamMaterial, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
@@ -261,6 +262,11 @@ class BeamSpec(Spec):
         return self
 
     @model_validator(mode="after")
+    def _can_be_in_contact(self) -> Self:
+        refuse("BeamSpec", dict(_contact_faults(self)))
+        return self
+
+    @model_validator(mode="after")
     def _has_what_is_reported(self) -> Self:
         refuse("BeamSpec", {("analysis", "outputs", *place): text for place, text in _output_faults(self)})
         return self
@@ -356,6 +362,17 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
                 yield ("nodes",), f"the columns of {name!r} would have the names of those of the beam {beam!r}"
 
 
+def _contact_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what cannot be done with stops and obstacles, and requirements on those that are not there."""
+    yield from contact_requirement_faults(spec.mechanism, spec.requirements)
+    if not (spec.mechanism.stops or spec.mechanism.obstacles):
+        return
+    if spec.analysis.modes:
+        yield ("analysis", "modes"), "natural frequencies are not known with stops or obstacles: leave it out"
+    if spec.design is not None and spec.design.optimise is not None:
+        yield ("design", "optimise"), "shapes are searched without stops and obstacles: leave these out"
+
+
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     """Yield what the model of the part as a solid cannot do: the key, and why."""
     mechanism, analysis, beams = spec.mechanism, spec.analysis, spec.mechanism.beams
@@ -386,6 +403,8 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
             "with constant loads the force is not proportional to the width",
         ),
         ("analysis.loads_first", mechanism.loads and not analysis.loads_first, "constant loads act from the start"),
+        ("mechanism.stops", mechanism.stops, "contact is not modelled"),
+        ("mechanism.obstacles", mechanism.obstacles, "contact is not modelled"),
         ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and springs are not part of it"),
         (", ".join(moved), moved, "the part is solved as drawn, and supports stay where they are"),
         (", ".join(pins), pins, "the outline is one piece at every node"),
@@ -441,7 +460,11 @@ def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
     if not mechanism.drive.is_displacement:
         yield "needs a drive of kind 'displacement': the force at the end of its window is scaled"
     moved = any(node.moved is not None for node in mechanism.nodes.values())
-    if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection:
-        yield "Eq. 6 is about beams alone: springs, loads, moved supports and imperfections do not scale with them"
+    contacts = mechanism.stops or mechanism.obstacles
+    if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection or contacts:
+        yield (
+            "Eq. 6 is about beams alone: springs, loads, stops, obstacles, moved supports and imperfections do not "
+            "scale with them"
+        )
     if _several(spec, "material"):
         yield "Eq. 6 is about beams of one material"

@@ -22,6 +22,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
+from cfmkit.families.beam.contacts import LARGEST_FORCE
 from cfmkit.families.beam.findings import finding
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
@@ -133,7 +134,7 @@ DEFINITIONS = {
     "tip_force_max": ("force", "largest axial force of the tip along the surface"),
     "tip_force_band": ("ratio", "(max - min)/max of the axial force along the surface"),
     "surface_relief": ("length", "largest minus smallest height of the surface, as far as it is followed"),
-    "contact_force_max": ("force", "largest normal force between tip and surface, in both directions of the motion"),
+    "contact_force_max": ("force", LARGEST_FORCE),
     "lateral_force_max": ("force", "largest force against the motion along the surface, in both directions of "
     "the motion"),
     "surface_reach": ("length", "distance along the surface that the mechanism can follow"),

@@ -27,11 +27,11 @@ STEADY_STEPS = 3  # in which the drive leads, until it does so again
 STEADY_SHARE = 1.5  # motion by the slope over that of the step, up to which the drive leads
 
 
-def pass_fold(walk: Walk, move: ArcMove, fold: Located, after: int) -> Items:
+def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int = 0) -> Items:
     """Follow a path through a limit point of the drive that lies within a step; return where the drive leads again.
 
     Requested values are delivered every time they are passed: those of the present run, which go one way. It ends
-    where the last of them is passed first.
+    where the last of them is passed first. Without a `fold` the step is the first one behind a corner of the path.
     """
     problem, options, begin, sense = walk.problem, walk.options, move.old, walk.sense
     run, steady, limits, shortest = _run(walk), 0, _limits(walk), SHORTEST_RETRY * move.length
@@ -39,7 +39,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located, after: int) -> Items:
     while (step := next(arc, None)) is not None:
         passed_fold: Located | None = None
         if step.folds:
-            located = (fold, after) if step is move else locate_fold(problem, step, options.span)
+            located = (fold, after) if fold and step is move else locate_fold(problem, step, options.span)
             if located is not None and located[1] != step.new.unstable and step.length > shortest:
                 # it has come to another path behind the fold, over a sharp corner
                 arc = follow_arc(problem, step.old, step.tangent_before, 0.2 * step.length, options)

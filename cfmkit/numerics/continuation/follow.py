@@ -102,6 +102,11 @@ def _items(
             yield PathStop(WhyStopped.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
             return
         walk = moved
+    yield from follow_on(walk)
+
+
+def follow_on(walk: Walk) -> Iterator[Point | PathEvent | PathStop]:
+    """Yield the points and events of a path from a state of its follower on, and its ending at last."""
     outcome = yield from _walk_on(walk)
     if isinstance(outcome, PathStop):
         yield outcome

@@ -78,6 +78,7 @@ class WhyStopped(Enum):
 
     COMPLETE = "all requested values were reached"
     LIMIT_POINT = "the drive cannot go further"
+    BLOCKED = "the drive is blocked"
     JUMPS = "stability is lost and no stable equilibrium is near"
     LOST = "no step converged"
     OUTSIDE = "the path left the range of the drive"

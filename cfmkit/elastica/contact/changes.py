@@ -1,0 +1,323 @@
+"""One piece of a path with contact, whose set of closed contacts stays the same, and where that set changes.
+
+Between two points of the piece gaps and forces are looked at along the cubic through them, so densely that no obstacle
+is passed. Where one becomes negative, the change is solved for: gap and force of that contact are both zero there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.contact.equations import with_closed
+from cfmkit.elastica.contact.terms import gaps, measure
+from cfmkit.elastica.model.contact import NodeOnObstacle
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
+from cfmkit.numerics.continuation.path import PathStop, WhyStopped
+from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
+from cfmkit.numerics.continuation.steps import hermite
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.problem import NetworkProblem
+    from cfmkit.numerics.continuation.path import Options, PathEvent
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
+
+GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
+"""Gap, in mean beam lengths, and force, as a share of the largest and of one, that may be negative by rounding."""
+FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may close and open again
+SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
+FAR = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
+STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
+MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
+BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
+NOT_LOCATED = "where {names} {what} was not found near {{place}}"
+
+
+class ContactChange(NamedTuple):
+    """The begin or end of a contact; unstable directions before and after it."""
+
+    kind: Literal["begins", "ends", "blocks"]
+    number: int  # of the contact
+    at: PathEquilibrium
+    before: int
+    after: int
+
+
+@dataclass(frozen=True, eq=False)
+class PieceOfPath:
+    """The problem with one set of closed contacts, beside the problem of all, whose unknowns points have."""
+
+    whole: NetworkProblem
+    closed: frozenset[int]
+    options: Options
+
+    @cached_property
+    def own(self) -> NetworkProblem:
+        """The problem whose contacts neither begin nor end."""
+        return replace(self.whole, mesh=with_closed(self.whole.mesh, self.closed))
+
+    def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
+        """Return the problem with another set of closed contacts."""
+        return PieceOfPath(self.whole, closed, self.options)
+
+    def say(self, number: int) -> str:
+        """Return what a contact is called."""
+        return describe(self.whole, number)
+
+    def say_all(self, number: int) -> str:
+        """Return what a contact and those that are closed with it are called, where they block the drive together."""
+        others = [self.say(other) for other in sorted(self.closed - {number})]
+        return " with ".join([self.say(number), *others[:2]])
+
+    # -- unknowns ------------------------------------------------------------------------------------------------------
+    @cached_property
+    def _kept(self) -> Any:
+        return np.isin(self.whole.mesh.free, self.own.mesh.free)
+
+    def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
+        """Return an equilibrium without the forces of open contacts."""
+        return at._replace(x=at.x[self._kept], rate=at.rate[self._kept])
+
+    def _spread(self, values: Any) -> Any:
+        found = np.zeros((len(self._kept), *np.shape(values)[1:]))
+        found[self._kept] = values
+        return found
+
+    def grow(self, at: PathEquilibrium) -> PathEquilibrium:
+        """Return an equilibrium with the forces of all contacts."""
+        return at._replace(x=self._spread(at.x), rate=self._spread(at.rate))
+
+    def grow_event(self, event: PathEvent) -> PathEvent:
+        """Return an event whose equilibria have the forces of all contacts."""
+        within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
+        near = None if event.near is None else self.grow(event.near)
+        modes = None if event.modes is None else self._spread(event.modes)
+        return replace(event, near=near, modes=modes, within=within)
+
+    def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
+        """Return True if forces are as large as where a structure locks, between two points that nearly coincide."""
+        forces = (np.abs(at.x) / self.whole.unit)[~self.whole.motions]
+        near = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
+        return bool(near and forces.max(initial=0.0) > LOCKED_FORCE)
+
+    # -- gaps and forces -----------------------------------------------------------------------------------------------
+    def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
+        """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n)."""
+        mesh, way = self.whole.mesh, drives[:, None]
+        z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
+        z[:, mesh.free] = x
+        return np.array(
+            [
+                z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
+                for number, contact in enumerate(mesh.contacts)
+            ]
+        )
+
+    def roundings(self, values: FloatArray) -> FloatArray:
+        """Return by how much a force or a gap may be negative, (contacts,)."""
+        closed = np.isin(np.arange(len(values)), list(self.closed))
+        largest = float(np.abs(values[closed]).max(initial=1.0))
+        return np.where(closed, FORCE_ROUNDING * largest, GAP_ROUNDING)
+
+    def grows_along(self, at: PathEquilibrium, number: int) -> float:
+        """Return how force or gap of a contact changes with the drive at an equilibrium."""
+        mesh = self.whole.mesh
+        contact = mesh.contacts[number]
+        moved = np.array(mesh.base if self.whole.ramp else mesh.rate, float)
+        moved[mesh.free] = at.rate
+        if number in self.closed:
+            return float(moved[contact.unknown])
+        gap = measure(mesh, contact, self.whole.values(at.x, at.drive))
+        return float(gap.gradient @ moved[gap.unknowns])
+
+    # -- changes -------------------------------------------------------------------------------------------------------
+    def find_change_before_end(
+        self, previous: PathEquilibrium | None, stop: PathStop
+    ) -> ContactChange | PathStop | None:
+        """Return the first change between the last point and the end of a piece that ends early; None without any."""
+        if previous is None or stop.end in (WhyStopped.COMPLETE, WhyStopped.FULL) or stop.drive == previous.drive:
+            return None
+        near = self.shrink(previous)
+        last = correct(self.own, near.x + (stop.drive - near.drive) * near.rate, stop.drive)
+        if last is None or largest_motion(self.own, last.x - near.x) > self.options.largest_motion:
+            return None
+        return self.find_change(previous, self.grow(last))
+
+    def find_change(self, first: PathEquilibrium, last: PathEquilibrium) -> ContactChange | PathStop | None:
+        """Return the first change of a contact between two points of the piece; None if there is none."""
+        step = StepBetween(self, first, last)
+        if step.is_far:
+            return None
+        values = step.values
+        rounding = self.roundings(values)
+        dips = (values < -rounding[:, None])[:, 1:]
+        if not dips.any():
+            return None
+        if not dips[:, -1].any():  # only the guess says so: see whether the equilibrium does
+            at = step.solve(float(step.shares[1:][dips.any(axis=0).argmax()]))
+            if at is None:
+                return None
+            return self.find_change_at_end(first, self.grow(at), rounding)
+        found = [self._locate(step, int(number)) for number in np.flatnonzero(dips.any(axis=1))]
+        missing = next((number for number, change in found if change is None), None)
+        known = [change for _, change in found if change is not None]
+        if not known:
+            assert missing is not None
+            what = "ends" if missing in self.closed else "begins"
+            return PathStop(WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=self.say(missing), what=what))
+        return min(known, key=lambda change: step.share_of(change.at))
+
+    def find_change_at_end(
+        self, first: PathEquilibrium, last: PathEquilibrium, rounding: FloatArray
+    ) -> ContactChange | PathStop | None:
+        """Return the first change up to a point that may violate a condition; None if it does not."""
+        values = self.values(last.x[None], np.array([last.drive]))[:, 0]
+        return self.find_change(first, last) if (values < -rounding).any() else None
+
+    def _locate(self, step: StepBetween, number: int) -> tuple[int, ContactChange | None]:
+        """Return where a contact changes within a step: where its gap and its force are both zero."""
+        share = step.crossing(number)
+        if share is None:
+            return number, None
+        guess, drive = step.at(share)
+        kind: Literal["begins", "ends"] = "ends" if number in self.closed else "begins"
+        both = self.with_closed(self.closed | {number})
+        x = guess[both._kept]
+        border = np.zeros(len(x) + 1)
+        border[int(both._kept[: self._slot(number)].sum())] = 1.0
+        state = both.own.equations.solve(x, drive, border, 0.0)
+        if state is not None and np.isfinite(state.rate).all():
+            free = both._spread(state.free)
+            free[self._slot(number)] = 0.0
+            at = step.first._replace(x=free, drive=float(state.way), effort=np.nan, stiffness=np.nan)
+            if step.contains(at, guess):
+                return number, ContactChange(kind, number, at, step.first.unstable, step.first.unstable)
+        at_bracket = step.bisect(number)
+        if at_bracket is None:
+            return number, None
+        return number, ContactChange(kind, number, at_bracket, step.first.unstable, step.first.unstable)
+
+    def _slot(self, number: int) -> int:
+        """Return the number of a contact's force among the free unknowns of the whole problem."""
+        return int(np.searchsorted(self.whole.mesh.free, self.whole.mesh.contacts[number].unknown))
+
+
+@dataclass(frozen=True, eq=False)
+class StepBetween:
+    """What lies between two points of a piece, by the cubic through them, or the chord where slopes are steep."""
+
+    part: PieceOfPath
+    first: PathEquilibrium
+    last: PathEquilibrium
+
+    @cached_property
+    def moved(self) -> float:
+        """Largest motion of the step."""
+        return largest_motion(self.part.whole, self.last.x - self.first.x)
+
+    @cached_property
+    def _is_smooth(self) -> bool:
+        width = abs(self.last.drive - self.first.drive)
+        rates = (largest_motion(self.part.whole, at.rate) for at in (self.first, self.last))
+        return width > 0 and max(rates) * width <= STEEP * self.moved
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
+        items = [contact.item for contact in self.part.whole.mesh.contacts]
+        length = self.part.whole.mesh.scales.length
+        radii = [item.outline.smallest_bulge + item.radius for item in items if isinstance(item, NodeOnObstacle)]
+        wanted = SAMPLES_PER_RADIUS * self.moved * length / min(radii, default=np.inf)
+        return np.linspace(0.0, 1.0, int(np.clip(np.ceil(wanted), FEWEST_SAMPLES, MOST_SAMPLES)) + 1)
+
+    @property
+    def is_far(self) -> bool:
+        """True if every contact is open and its gap is more than the step can close."""
+        if self.part.closed:
+            return False
+        mesh, ends = self.part.whole.mesh, self.part.values(*self.at(np.array([[0.0], [1.0]])))
+        arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
+        return bool((ends > FAR * self.moved * (1.0 + arms[:, None])).all())
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Forces of closed and gaps of open contacts there, (contacts, shares)."""
+        return self.part.values(*self.at(self.shares[:, None]))
+
+    def at(self, share: Any) -> tuple[FloatArray, Any]:
+        """Return the unknowns (n,) and the drive at a share of the step, or (m, n) and (m,) at m of them, (m, 1)."""
+        drive = self.first.drive + share * (self.last.drive - self.first.drive)
+        if self._is_smooth:
+            x = hermite(self.first, self.last, drive)
+        else:
+            x = self.first.x + share * (self.last.x - self.first.x)
+        x = np.where(share == 1.0, self.last.x, x)
+        return x, np.where(share == 1.0, self.last.drive, drive)[..., 0] if np.ndim(share) else drive
+
+    def solve(self, share: float) -> PathEquilibrium | None:
+        """Return the equilibrium of the piece at a share of the step."""
+        x, drive = self.at(share)
+        at = correct(self.part.own, x[self.part._kept], drive)
+        if at is None or largest_motion(self.part.own, at.x - x[self.part._kept]) > MAX_MISS * self.moved + 1e-9:
+            return None
+        return at
+
+    def crossing(self, number: int) -> float | None:
+        """Return the first share at which force or gap of a contact vanishes, by straight lines; None if nowhere."""
+        values = self.values[number]
+        below = np.flatnonzero(values[1:] < 0)
+        if not len(below):
+            return None
+        behind = int(below[0]) + 1
+        before, after = float(values[behind - 1]), float(values[behind])
+        part = 0.0 if before <= 0 else before / (before - after)
+        return float(self.shares[behind - 1] + part * (self.shares[behind] - self.shares[behind - 1]))
+
+    def share_of(self, at: PathEquilibrium) -> float:
+        """Return at which share of the step an equilibrium lies, across its chord."""
+        weights = arc_weights(self.part.whole, self.part.options.span)
+        start = np.append(self.first.x, self.first.drive)
+        chord, way = np.append(self.last.x, self.last.drive) - start, np.append(at.x, at.drive) - start
+        finite = np.isfinite(weights)
+        return float((weights * chord)[finite] @ way[finite] / ((weights * chord)[finite] @ chord[finite]))
+
+    def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
+        """Return True if an equilibrium lies within the step, near a guess."""
+        near = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
+        return near and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
+
+    def bisect(self, number: int) -> PathEquilibrium | None:
+        """Return the equilibrium of the piece at which force or gap vanishes, by its drive alone; None if lost."""
+        from scipy.optimize import brentq
+
+        part = self.part
+
+        def value(share: float) -> float:
+            at = self.solve(share)
+            if at is None:
+                raise ArithmeticError
+            whole = part.grow(at)
+            return float(part.values(whole.x[None], np.array([whole.drive]))[number, 0])
+
+        try:
+            low, high = value(0.0), value(1.0)
+            if low <= 0:
+                return self.first
+            if high > 0:
+                return None
+            share = float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
+        except ArithmeticError:
+            return None
+        at = self.solve(share)
+        return None if at is None else part.grow(at)
+
+
+def describe(problem: NetworkProblem, number: int) -> str:
+    """Return what a contact is called: a stop by its name, a pad by its node and its obstacle."""
+    item = problem.mesh.contacts[number].item
+    return f"{item.node!r} on {item.name!r}" if isinstance(item, NodeOnObstacle) else f"stop {item.name!r}"

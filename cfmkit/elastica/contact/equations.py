@@ -1,0 +1,141 @@
+"""Equations of a network with contacts: those of the network without them, bordered by the forces of contacts.
+
+Where `ContactAt.closed` is None a contact is closed or open as its force and gap say at each of Newton's steps [HIK]:
+an equilibrium near a guess is found whatever its contacts do. The follower sets it, so that it sees one smooth path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.contact.terms import gaps, press
+from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
+from cfmkit.elastica.mechanics.poses import poses
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+
+
+def without_contacts(mesh: Discretisation) -> Discretisation:
+    """Return the arrays of a network in which every contact is open: forces of contacts are held at zero."""
+    return replace(mesh, contacts=(), free=mesh.free[mesh.free < _first_contact(mesh)])
+
+
+def with_closed(mesh: Discretisation, closed: frozenset[int]) -> Discretisation:
+    """Return the arrays of a network in which some contacts are closed, by their numbers, and all others open."""
+    if not closed:
+        return without_contacts(mesh)
+    contacts = tuple(one._replace(closed=number in closed) for number, one in enumerate(mesh.contacts))
+    held = [one.unknown for one in contacts if not one.closed]
+    return replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
+
+
+def _first_contact(mesh: Discretisation) -> int:
+    return min(one.unknown for one in mesh.contacts)
+
+
+class GapBounds:
+    """Lower bounds of the gaps of contacts: a gap changes by no more than its pad moves, or its node turns.
+
+    They are kept from state to state, so that the gap of a contact that is far is not measured in each.
+    """
+
+    def __init__(self, mesh: Discretisation) -> None:
+        """Begin without any."""
+        self.mesh = mesh
+        places = [one.place for one in mesh.contacts]
+        self.places = np.array(places)
+        self.forces = np.array([one.unknown for one in mesh.contacts])
+        self.turning = np.array([one.item.turns for one in mesh.contacts])
+        self.turns = mesh.attachments.unknowns[places, 3]
+        self.judged = np.array([one.closed is None for one in mesh.contacts])
+        self.at = np.zeros((len(places), 2))  # where each gap was measured: place, or rotation
+        self.gap = np.full(len(places), -np.inf)
+
+    def are_open(self, z: FloatArray) -> Any:
+        """Return which contacts without a force are certainly open, (contacts,)."""
+        where = poses(self.mesh.attachments, z, self.places).place
+        if self.turning.any():
+            where = np.where(self.turning[:, None], np.stack([z[self.turns], 0 * z[self.turns]], axis=1), where)
+        idle = self.judged & (z[self.forces] <= 0)
+        far = idle & (np.hypot(*(where - self.at).T) < self.gap)
+        for number in np.flatnonzero(idle & ~far).tolist():
+            gap = float(gaps(self.mesh, self.mesh.contacts[number], z[None])[0])
+            self.at[number], self.gap[number], far[number] = where[number], gap, gap > 0
+        return far
+
+
+@dataclass(frozen=True, eq=False)
+class ContactEquations(NumpyEquations):
+    """Equations of a network with contacts for its free unknowns."""
+
+    plain: NumpyEquations = field(kw_only=True)  # without contacts; its free unknowns are the first of these
+    watched: GapBounds = field(init=False)
+    slots: Any = field(init=False)  # (size,) number of every unknown among the free ones, -1 where it is held
+
+    def __post_init__(self) -> None:
+        """Number the free unknowns."""
+        super().__post_init__()
+        slots = np.full(self.mesh.size, -1)
+        slots[self.mesh.free] = np.arange(len(self.mesh.free))
+        object.__setattr__(self, "slots", slots)
+        object.__setattr__(self, "watched", GapBounds(self.mesh))
+
+    def rebase(self, base: FloatArray) -> ContactEquations:
+        """Return the equations with other values of the unknowns that are held, (size,)."""
+        return ContactEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
+
+    def stiffen(self, mesh: Discretisation) -> ContactEquations:
+        """Return the equations of the same network with another flexibility along its beams."""
+        return ContactEquations(mesh, self.ramp, plain=self.plain.stiffen(without_contacts(mesh)))
+
+    def gradient(self, free: Any, way: Any) -> Any:
+        """Return the gradient by all unknowns, (size,)."""
+        if np.iscomplexobj(free) or np.iscomplexobj(way) or self.ramp:
+            return super().gradient(free, way)
+        return self.gradients(np.asarray(self.values(free, way))[None], np.array([way], float))[0]
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size)."""
+        found = np.array(self.plain.gradients(z, drive))
+        for contact in self.mesh.contacts:
+            for number in np.flatnonzero(z[:, contact.unknown]).tolist():
+                term = press(self.mesh, contact, z[number])
+                found[number, term.unknowns] += term.gradient
+        return found
+
+    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
+        gradient, hessian = self.plain.evaluate(z, drive, share)
+        for contact in self.mesh.contacts:
+            term = press(self.mesh, contact, z)
+            gradient[term.unknowns] += term.gradient
+            hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
+        return gradient, hessian
+
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+        """Return the equations linearised at some unknowns."""
+        mesh, count = self.mesh, self.plain.n
+        at = self.plain.linearise(free[:count], way)
+        residual, change, tangent = np.zeros(self.n), np.zeros(self.n), np.zeros((self.n, self.n))
+        residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
+        z, moved = np.asarray(self.values(free, way)), mesh.base if self.ramp else mesh.rate
+        far = self.watched.are_open(z)
+        for number, contact in enumerate(mesh.contacts):
+            slot = self.slots[contact.unknown]
+            if far[number] or contact.closed is False:
+                if slot >= 0:
+                    residual[slot], tangent[slot, slot] = -free[slot], -1.0
+                continue
+            term = press(mesh, contact, z)
+            slots = self.slots[term.unknowns]
+            own = slots >= 0
+            rows = slots[own]
+            residual[rows] += term.gradient[own]
+            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(own, own)]
+            change[rows] += term.hessian[own] @ moved[term.unknowns]
+        return LinearEquations(residual, tangent, change)

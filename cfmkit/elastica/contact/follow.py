@@ -1,0 +1,205 @@
+"""A path with contact: followed with one set of closed contacts at a time, between located changes of that set.
+
+On each piece the path is smooth and `cfmkit.numerics.continuation` follows it. Where a gap or a force becomes negative
+the change is solved for by its own equations: gap and force of that contact are both zero there. Then a contact begins
+or ends, and the path goes on to the side on which no gap and no force becomes negative: where that is back, the drive
+has a limit point at the change. A contact between whose change and the drive nothing can move blocks the drive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica.contact.changes import FORCE_ROUNDING, ContactChange, PieceOfPath
+from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
+from cfmkit.numerics.continuation.folds import pass_fold
+from cfmkit.numerics.continuation.follow import LOCKED, follow, follow_on
+from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.problem import NetworkProblem
+    from cfmkit.numerics.continuation.path import Options, PathBranch
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
+
+SAME_PLACE = 1e-11  # share of the range within which a change is at a point
+RIGID_RATE = 1e9  # motion or force per drive beyond which the contacts leave no way to move
+MAX_CHANGES_AT_ONE_PLACE = 20
+FIRST_ARC = 0.1  # of the step before, behind a limit point at a change
+SHORTEST_STEP = 1e-6  # share of the range
+BLOCKED = "the drive is blocked by {names} at {{place}}"
+SNAPS = "the drive cannot go on at {{place}}, where {names} {what}: a limit point; follow it by through_folds"
+LOSES = "stability is lost at {{place}}, where {names} {what}"
+
+
+Item = Point | PathEvent | PathStop | ContactChange
+
+
+def follow_in_contact(
+    problem: NetworkProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None = None,
+) -> Iterator[Item]:
+    """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow`.
+
+    Every change comes behind a point that lies at it.
+    """
+    if not problem.mesh.contacts:
+        yield from follow(problem, start, targets, options, branch)
+        return
+    closed = frozenset(
+        number
+        for number, contact in enumerate(problem.mesh.contacts)
+        if problem.values(start.x, start.drive)[contact.unknown] > FORCE_ROUNDING
+    )
+    yield from _until_full(_follow(problem, start, targets, options, branch, closed), options)
+
+
+def _until_full(items: Iterator[Item], options: Options) -> Iterator[Item]:
+    """Yield the items of a path, at most as many points as are allowed."""
+    between = 0
+    for item in items:
+        yield item
+        between += isinstance(item, Point) and item.target < 0
+        if between > options.most_points:
+            assert isinstance(item, Point)
+            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")
+            return
+
+
+def _follow(
+    problem: NetworkProblem, start: PathEquilibrium, targets: FloatArray, options: Options, branch: PathBranch | None,
+    closed: frozenset[int],
+) -> Iterator[Item]:  # fmt: skip
+    part = PieceOfPath(problem, closed, options)
+    items = follow(part.own, part.shrink(start), targets, options, branch)
+    walk, count, place = Walk(part.own, options, targets, start, 0.0, branch=branch), 0, np.inf
+    previous: PathEquilibrium | None = None
+    while True:
+        outcome = yield from _follow_part(part, items, walk, previous)
+        if isinstance(outcome, PathStop):
+            yield outcome
+            return
+        walk, change, sense = outcome
+        near = abs(change.at.drive - place) <= SAME_PLACE * options.span
+        count, place = (count + 1 if near else 0), change.at.drive
+        if count > MAX_CHANGES_AT_ONE_PLACE:
+            yield PathStop(WhyStopped.LOST, place, "contacts begin and end without end at {place}")
+            return
+        after = _enter(part, change, sense)
+        if isinstance(after, PathStop):
+            yield change._replace(kind="blocks") if after.end is WhyStopped.BLOCKED else change
+            yield after
+            return
+        part, at, sense, turned = after
+        yield change._replace(after=at.unstable)
+        names, what = part.say(change.number), change.kind
+        if turned and not options.through_folds:
+            yield PathStop(WhyStopped.LIMIT_POINT, place, SNAPS.format(names=names, what=what))
+            return
+        if at.unstable > change.before and options.branch != "primary" and not options.through_folds:
+            yield PathStop(WhyStopped.JUMPS, place, LOSES.format(names=names, what=what))
+            return
+        if turned:
+            yield PathEvent("limit point", place, change.before, at.unstable, at)
+        if walk.done:
+            yield PathStop(WhyStopped.COMPLETE, place)
+            return
+        items, previous = _go_on(part, walk, at, sense), at
+
+
+def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:
+    """Yield the items of the next piece: by the drive, or by the arc length where it leads away from the next value."""
+    own, options = part.own, walk.options
+    start, step = part.shrink(at), max(walk.step, SHORTEST_STEP * options.span)
+    walk = Walk(own, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
+    if sense == walk.sense:
+        yield from follow_on(walk)
+        return
+    tangent = unit_tangent(own, start, sense * np.append(start.rate, 1.0), options.span)
+    length = float(FIRST_ARC * step / max(abs(tangent[-1]), SHORTEST_STEP))
+    move = next(follow_arc(own, start, tangent, min(length, options.largest_motion), options), None)
+    if move is None:
+        yield PathStop(WhyStopped.LOST, start.drive, "no step converged at {place}")
+        return
+    outcome = yield from pass_fold(walk, move)
+    if isinstance(outcome, Walk):
+        yield from follow_on(outcome)
+    elif outcome is not None:
+        yield outcome
+
+
+def _follow_part(
+    part: PieceOfPath, items: Iterator[Point | PathEvent | PathStop], walk: Walk, previous: PathEquilibrium | None
+) -> Generator[Point | PathEvent | ContactChange, None, PathStop | tuple[Walk, ContactChange, float]]:
+    """Yield the items of a piece up to a change; return the walk there, the change and the sense of travel.
+
+    `previous` is where the piece begins if that was yielded before.
+    """
+    waiting: list[PathEvent] = []
+    for item in items:
+        if isinstance(item, PathEvent):
+            waiting.append(part.grow_event(item))
+            continue
+        if isinstance(item, PathStop):
+            found = part.find_change_before_end(previous, item)
+            if found is None:
+                yield from waiting
+                return item
+            at, step = None, item.drive
+        else:
+            at, step = part.grow(item.at), item.at.drive
+            found = None if previous is None else part.find_change(previous, at)
+        if found is not None:
+            assert previous is not None
+            if isinstance(found, PathStop):
+                return found
+            sense = 1.0 if step >= previous.drive else -1.0
+            place = found.at.drive
+            yield from (event for event in waiting if (place - event.drive) * sense > 0)
+            walk = replace(walk, step=abs(step - previous.drive))
+            tied = SAME_PLACE * walk.options.span
+            beside = abs(place - previous.drive) <= tied
+            if not walk.done and abs(walk.targets[walk.number] - place) <= tied and not beside:
+                yield Point(found.at, walk.number, walk.branch)
+                walk = replace(walk, number=walk.number + 1)
+            elif not beside:
+                yield Point(found.at, -1, walk.branch)
+            return walk, found, sense
+        yield from waiting
+        waiting = []
+        assert isinstance(item, Point)
+        assert at is not None
+        yield item._replace(at=at)
+        if previous is not None and part.is_locked(previous, at):
+            return PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED)
+        if item.target >= 0:
+            walk = replace(walk, number=item.target + 1)
+        walk, previous = replace(walk, branch=item.branch), at
+    return PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}")
+
+
+def _enter(
+    part: PieceOfPath, change: ContactChange, sense: float
+) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
+    """Return the piece behind a change, its start, the sense of the drive there, and whether it has turned."""
+    begins, number = change.kind == "begins", change.number
+    closed = part.closed | {number} if begins else part.closed - {number}
+    beyond = part.with_closed(closed)
+    near = beyond.shrink(change.at)
+    at = beyond.own.solve(near.x, near.drive)
+    names = beyond.say(number)
+    if at is None or not np.abs(at.rate).max(initial=0.0) < RIGID_RATE:
+        if not begins:
+            return PathStop(WhyStopped.JUMPS, near.drive, LOSES.format(names=names, what="ends"))
+        return PathStop(WhyStopped.BLOCKED, near.drive, BLOCKED.format(names=beyond.say_all(number)))
+    whole = beyond.grow(at)
+    turned = bool(beyond.grows_along(whole, number) * sense < 0)
+    return beyond, whole, (-sense if turned else sense), turned

@@ -1,0 +1,229 @@
+"""One-sided contacts of nodes: stops that limit a motion, and rigid obstacles that the pad of a node may touch.
+
+A contact has a gap g >= 0 and presses with a force f >= 0, of which one is zero. A gap is positive on the free side.
+Assumes: no friction; an elastic contact yields by f / stiffness along the normal.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.arrays import ShortRepr
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+
+BESIDE_END = 1e-9  # share of a piece by which the foot of a point may lie beyond its end: rounding
+POINTS_PER_TURN = 120  # of an arc that is drawn
+STRAIGHT_ON = 1e-12  # turn of a polyline below which it has no corner [rad]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A stop that limits the motion of a node along a direction, or its rotation."""
+
+    name: str
+    node: str
+    gap: float  # free way before any load [m or rad]
+    direction: float | None  # [rad]; None: the rotation is limited
+    sense: float = 1.0  # of a rotation: 1 counter-clockwise, -1 clockwise
+    stiffness: float = math.inf  # [N/m or N m/rad]
+
+    @property
+    def turns(self) -> bool:
+        """True if a rotation is limited: the force is a moment."""
+        return self.direction is None
+
+
+class Distance(NamedTuple):
+    """Signed distance of places from an outline, positive on its free side, with its derivatives."""
+
+    value: Any  # (...) [m]
+    normal: Any  # (..., 2) its gradient
+    curvature: Any  # (...) second derivative along the outline [1/m]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ObstacleEdge(ShortRepr):
+    """A smooth line of segments and arcs with the free side to its left: endless, or closed.
+
+    Its first and last segment go on for ever unless it is closed.
+    """
+
+    # start, along, length: of the segments (s, 2), (s, 2), (s,) [m]
+    start: FloatArray
+    along: FloatArray
+    length: FloatArray
+    # centre, radius, first, sweep, bulge: of the arcs (a, 2), (a,) ... [m, rad]; bulge 1 towards the free side, else -1
+    centre: FloatArray
+    radius: FloatArray
+    first: FloatArray
+    sweep: FloatArray
+    bulge: FloatArray
+    closed: bool = False
+
+    @property
+    def smallest_bulge(self) -> float:
+        """Smallest radius of an arc that bulges towards the free side [m]; infinite without one."""
+        return float(self.radius[self.bulge > 0].min(initial=math.inf))
+
+    @property
+    def smallest_hollow(self) -> float:
+        """Smallest radius of an arc that is hollow as seen from the free side [m]; infinite without one."""
+        return float(self.radius[self.bulge < 0].min(initial=math.inf))
+
+    def lines(self, reach: float) -> list[FloatArray]:
+        """Return its parts as points along them, (n, 2) each; endless ones are `reach` [m] long."""
+        found, last = [], len(self.length) - 1
+        for number, (start, along, length) in enumerate(zip(self.start, self.along, self.length, strict=True)):
+            low = -reach if number == 0 and not self.closed else 0.0
+            high = length + reach if number == last and not self.closed else length
+            found.append(np.array([start + low * along, start + high * along]))
+        for centre, radius, first, sweep in zip(self.centre, self.radius, self.first, self.sweep, strict=True):
+            angle = first + sweep * np.linspace(0.0, 1.0, 2 + math.ceil(POINTS_PER_TURN * abs(sweep) / math.tau))
+            found.append(centre + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+        return found
+
+    def distance(self, places: Any) -> Distance:
+        """Return the signed distance of places (..., 2) [m] from the nearest point of the outline.
+
+        Places may be complex: what is nearest is decided by their real parts.
+        """
+        places = np.asarray(places)
+        candidates = [*self._from_segments(places), *self._from_arcs(places)]
+        far = np.array([np.where(near, np.abs(np.real(found.value)), np.inf) for found, near in candidates])
+        pick = far.argmin(axis=0)
+
+        def choose(values: list[Any]) -> Any:
+            stacked = np.array(values)
+            index = pick.reshape(1, *pick.shape, *(1,) * (stacked.ndim - 1 - pick.ndim))
+            return np.take_along_axis(stacked, index, axis=0)[0]
+
+        rows: list[list[Any]] = [list(row) for row in zip(*(found for found, _ in candidates), strict=True)]
+        return Distance(*map(choose, rows))
+
+    def _from_segments(self, places: Any) -> list[tuple[Distance, Any]]:
+        found, last = [], len(self.length) - 1
+        for number, (start, along, length) in enumerate(zip(self.start, self.along, self.length, strict=True)):
+            normal = np.array([-along[1], along[0]])
+            way, slack = np.real((places - start) @ along), BESIDE_END * (1.0 + length)
+            ahead = np.full(way.shape, True) if number == 0 and not self.closed else way >= -slack
+            behind = np.full(way.shape, True) if number == last and not self.closed else way <= length + slack
+            value = (places - start) @ normal
+            flat = np.broadcast_to(normal, places.shape), np.zeros(value.shape)
+            found.append((Distance(value, *flat), ahead & behind))
+        return found
+
+    def _from_arcs(self, places: Any) -> list[tuple[Distance, Any]]:
+        found = []
+        for centre, radius, first, sweep, bulge in zip(
+            self.centre, self.radius, self.first, self.sweep, self.bulge, strict=True
+        ):
+            away = places - centre
+            reach = np.sqrt((away * away).sum(axis=-1))
+            safe = np.where(reach == 0, 1.0, reach)
+            angle = np.arctan2(np.real(away[..., 1]), np.real(away[..., 0]))
+            turned = (np.sign(sweep) * (angle - first)) % math.tau
+            near = (turned <= abs(sweep) + BESIDE_END) | (turned >= math.tau - BESIDE_END)
+            found.append((Distance(bulge * (reach - radius), bulge * away / safe[..., None], bulge / safe), near))
+        return found
+
+
+def line(through: Sequence[float], direction: float) -> ObstacleEdge:
+    """Return a straight line through a point [m], along a direction [rad]; the free side is to its left."""
+    along = np.array([[math.cos(direction), math.sin(direction)]])
+    return _outline([np.asarray(through, float)], along, [0.0], [])
+
+
+def circle(centre: Sequence[float], radius: float, hole: bool = False) -> ObstacleEdge:
+    """Return a disc, free outside, or a hole, free inside [m]."""
+    arc = (np.asarray(centre, float), radius, 0.0, math.tau, -1.0 if hole else 1.0)
+    return _outline([], [], [], [arc], closed=True)
+
+
+def polyline(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> ObstacleEdge:
+    """Return straight sides through points [m] with rounded corners; the free side is to the left.
+
+    Raises
+    ------
+    ValueError
+        If two points are the same, the line turns back on itself, or the fillet is too large for a side.
+    """
+    corners = np.asarray(points, float)
+    ring = np.vstack([corners, corners[:1]]) if closed else corners
+    sides = np.diff(ring, axis=0)
+    length = np.hypot(*sides.T)
+    if (length == 0).any():
+        raise ValueError("two neighbouring points are the same")
+    along = sides / length[:, None]
+    count = len(length)
+    turning = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
+    turn = np.array([_turn(along[a], along[b]) for a, b in turning])
+    if (np.abs(turn) > math.pi - 1e-6).any():
+        raise ValueError("it turns back on itself at a corner")
+    cut = np.zeros((count, 2))  # of every side, by the corner at its begin and at its end
+    for (a, b), angle in zip(turning, turn.tolist(), strict=True):
+        cut[a, 1] = cut[b, 0] = fillet * abs(math.tan(angle / 2)) if abs(angle) > STRAIGHT_ON else 0.0
+    left = length - cut.sum(axis=1)
+    if (left < -1e-12 * length).any():
+        side = int((left / length).argmin())
+        most = fillet * float(length[side] / cut[side].sum())
+        raise ValueError(f"the sides allow a fillet of at most {most * 1e3:.6g} mm")
+    arcs = []
+    for (a, _), angle in zip(turning, turn.tolist(), strict=True):
+        if abs(angle) <= STRAIGHT_ON:
+            continue
+        bend = math.copysign(1.0, angle)  # 1: to the left, so that the free side sees a hollow
+        begin = ring[a + 1] - along[a] * cut[a, 1]
+        centre = begin + bend * fillet * np.array([-along[a][1], along[a][0]])
+        arcs.append((centre, fillet, math.atan2(*(begin - centre)[::-1]), angle, -bend))
+    return _outline(ring[:-1] + along * cut[:, :1], along, np.maximum(left, 0.0), arcs, closed)
+
+
+def arc(centre: Sequence[float], radius: float, start: float, end: float) -> ObstacleEdge:
+    """Return a part of the edge of a disc [m], between two angles [rad], that goes on straight at both ends.
+
+    The free side is outside of the disc.
+    """
+    middle, (low, high) = np.asarray(centre, float), sorted((start, end))
+    first, last = (np.array([math.cos(angle), math.sin(angle)]) for angle in (high, low))
+    along = np.array([[first[1], -first[0]], [last[1], -last[0]]])  # clockwise: the disc is to the right
+    starts = [middle + radius * first, middle + radius * last]
+    return _outline(starts, along, [0.0, 0.0], [(middle, radius, high, low - high, 1.0)])
+
+
+def _outline(start: Any, along: Any, length: Any, arcs: Sequence[Any], closed: bool = False) -> ObstacleEdge:
+    centre = np.array([one[0] for one in arcs], float).reshape(-1, 2)
+    radius, first, sweep, bulge = (np.array([one[k] for one in arcs], float) for k in range(1, 5))
+    starts, ways = np.asarray(start, float).reshape(-1, 2), np.asarray(along, float).reshape(-1, 2)
+    return ObstacleEdge(starts, ways, np.asarray(length, float), centre, radius, first, sweep, bulge, closed)
+
+
+def _turn(one: FloatArray, other: FloatArray) -> float:
+    """Return the angle from one unit vector to another [rad]."""
+    return math.atan2(float(one[0] * other[1] - one[1] * other[0]), float(one @ other))
+
+
+@dataclass(frozen=True)
+class NodeOnObstacle:
+    """The round pad of a node and a rigid obstacle that is fixed to the ground."""
+
+    name: str
+    node: str
+    outline: ObstacleEdge = field(compare=False)
+    radius: float = 0.0  # of the pad [m]
+    stiffness: float = math.inf  # [N/m]
+
+    @property
+    def turns(self) -> bool:
+        """False: the force is no moment."""
+        return False
+
+
+Contact = Stop | NodeOnObstacle

@@ -1,0 +1,293 @@
+"""What a specification says about contact: stops of nodes, and rigid obstacles that the pads of nodes may touch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
+
+from cfmkit.elastica.model.contact import Contact, NodeOnObstacle, ObstacleEdge, Stop, arc, circle, line, polyline
+from cfmkit.specs.spec import Model, PositiveLength, Requirement
+from cfmkit.specs.units import Angle, Length, RotationalStiffness, Stiffness, format_short
+
+Point = tuple[Length, Length]
+FreeAngle = Annotated[Angle, Field(ge=0)]
+FreeWay = Annotated[Length, Field(ge=0)]
+Fault = tuple[tuple[str | int, ...], str]
+Mechanism = Any
+"""The block `mechanism`, which imports this file."""
+OVERLAP = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
+LONGEST_POLYLINE = 200  # corners
+
+
+class StopBase(Model):
+    """What both kinds of stops have in common."""
+
+    kind_tag: ClassVar[str]  # how the kind is told apart in places of faults
+
+    node: str = Field(description="node that is stopped")
+
+    @property
+    def gaps(self) -> tuple[float | None, float | None]:
+        """Free ways against and along the direction, or clockwise and counter-clockwise; None where nothing limits."""
+        gap: Any = self.gap  # type: ignore[attr-defined]
+        return gap if isinstance(gap, tuple) else (None, gap)
+
+    def contacts(self, name: str) -> Iterator[Contact]:
+        """Yield the one-sided contacts of the stop."""
+        stiffness: float | None = self.stiffness  # type: ignore[attr-defined]
+        direction: float | None = getattr(self, "direction", None)
+        for sense, gap in zip((-1.0, 1.0), self.gaps, strict=True):
+            if gap is not None:
+                along = direction if direction is None or sense > 0 else direction + math.pi
+                yield Stop(name, self.node, gap, along, sense, math.inf if stiffness is None else stiffness)
+
+
+class MotionStop(StopBase):
+    """A stop that limits how far a node moves along a direction."""
+
+    kind_tag = "motion"
+
+    direction: Angle = Field(description="along which the motion is limited; from the x axis")
+    gap: FreeWay | tuple[FreeWay, FreeWay] = Field(
+        description="free way before any load: of a motion along the direction, or two: [against, along] it"
+    )
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of the stop; default: it is rigid")
+
+
+class RotationStop(StopBase):
+    """A stop that limits how far a node turns."""
+
+    kind_tag = "rotation"
+
+    rotation: Literal[True] = Field(description="true: the rotation is limited")
+    gap: FreeAngle | tuple[FreeAngle, FreeAngle] = Field(
+        description="free angle before any load: counter-clockwise, or two: [clockwise, counter-clockwise]"
+    )
+    stiffness: Annotated[RotationalStiffness, Field(gt=0)] | None = Field(
+        None, description="of the stop; default: it is rigid"
+    )
+
+
+def _kind_of_stop(given: Any) -> str:
+    """Return which kind of stop is meant: one with a direction, unless a rotation is named."""
+    turns = "rotation" in given if isinstance(given, Mapping) else isinstance(given, RotationStop)
+    return "rotation" if turns else "motion"
+
+
+StopSpec = Annotated[
+    Annotated[MotionStop, Tag("motion")] | Annotated[RotationStop, Tag("rotation")], Discriminator(_kind_of_stop)
+]
+
+
+class ObstacleBase(Model):
+    """What all kinds of obstacles have in common; `outline` is what tells them apart."""
+
+    nodes: dict[str, Annotated[Length, Field(ge=0)]] | None = Field(
+        None,
+        description="nodes that may touch it, with the radius of their round pads: {tip: 2 mm}; default: all free "
+        "ends of beams, with half the thickness there",
+    )
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(
+        None, description="of the obstacle at a pad; default: it is rigid"
+    )
+
+    def outline(self) -> ObstacleEdge:
+        """Return its edge, the free side to the left."""
+        raise NotImplementedError
+
+
+class LineObstacle(ObstacleBase):
+    """A straight wall that goes on for ever."""
+
+    kind: Literal["line"]
+    through: Point = Field(description="a point of the wall")
+    direction: Angle = Field(description="of the wall, from the x axis; the free side is to its left")
+
+    def outline(self) -> ObstacleEdge:
+        """Return its edge."""
+        return line(self.through, self.direction)
+
+
+class DiscObstacle(ObstacleBase):
+    """A round body."""
+
+    kind: Literal["disc"]
+    centre: Point = Field(description="its middle")
+    radius: PositiveLength = Field(description="its radius")
+
+    def outline(self) -> ObstacleEdge:
+        """Return its edge."""
+        return circle(self.centre, self.radius)
+
+
+class HoleObstacle(ObstacleBase):
+    """A round hole: the free side is inside."""
+
+    kind: Literal["hole"]
+    centre: Point = Field(description="its middle")
+    radius: PositiveLength = Field(description="its radius")
+
+    def outline(self) -> ObstacleEdge:
+        """Return its edge."""
+        return circle(self.centre, self.radius, hole=True)
+
+
+class PolylineObstacle(ObstacleBase):
+    """A body with straight sides and rounded corners."""
+
+    kind: Literal["polyline"]
+    points: Annotated[tuple[Point, ...], Field(min_length=2, max_length=LONGEST_POLYLINE)] = Field(
+        description="corners [[x, y], ...]; the free side is to the left of the way along them"
+    )
+    fillet: PositiveLength | None = Field(None, description="radius of all corners; needed where there are any")
+    closed: bool = Field(False, description="whether the last point is joined to the first: a block")
+
+    @model_validator(mode="after")
+    def _has_an_outline(self) -> Self:
+        corners = len(self.points) - (0 if self.closed else 2)
+        if self.closed and len(self.points) < 3:
+            raise ValueError("a closed polyline needs three points")
+        if corners and self.fillet is None:
+            raise ValueError("'fillet', the radius of its corners, is missing")
+        self.outline()
+        return self
+
+    def outline(self) -> ObstacleEdge:
+        """Return its edge."""
+        return polyline(self.points, self.fillet or 0.0, self.closed)
+
+
+_FROM: Any = {"from": (Angle, Field(description="direction from the middle to one end of the arc"))}
+"""No name in Python."""
+_BeginsAnywhere = create_model("_BeginsAnywhere", __base__=ObstacleBase, **_FROM)
+
+
+class ArcObstacle(_BeginsAnywhere):
+    """A part of the edge of a disc that goes on straight at both ends."""
+
+    kind: Literal["arc"]
+    centre: Point = Field(description="middle of the disc")
+    radius: PositiveLength = Field(description="radius of the disc")
+    to: Angle = Field(description="direction from the middle to the other end")
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Directions from the middle to both ends of the arc [rad]."""
+        return getattr(self, "from"), self.to
+
+    @model_validator(mode="after")
+    def _turns(self) -> Self:
+        if not 0 < abs(self.ends[1] - self.ends[0]) <= math.pi:
+            raise ValueError("between 'from' and 'to' there must be more than 0 and at most 180 deg")
+        return self
+
+    def outline(self) -> ObstacleEdge:
+        """Return its edge."""
+        return arc(self.centre, self.radius, *self.ends)
+
+
+ObstacleSpec = Annotated[
+    LineObstacle | DiscObstacle | HoleObstacle | PolylineObstacle | ArcObstacle, Field(discriminator="kind")
+]
+
+
+def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
+    """Return all one-sided contacts of a mechanism: of stops first, then of obstacles."""
+    found = [contact for name, stop in mechanism.stops.items() for contact in stop.contacts(name)]
+    for name, obstacle in mechanism.obstacles.items():
+        outline = obstacle.outline()
+        for node, radius in pads_of(mechanism, obstacle).items():
+            found.append(NodeOnObstacle(name, node, outline, radius, obstacle.stiffness or math.inf))
+    return tuple(found)
+
+
+def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]:
+    """Return the nodes that may touch an obstacle, with the radii of their pads [m]."""
+    return obstacle.nodes if obstacle.nodes is not None else free_ends(mechanism)
+
+
+def free_ends(mechanism: Mechanism) -> dict[str, float]:
+    """Return the nodes at which one beam ends freely, with half its thickness there [m]."""
+    linked = {name for link in mechanism.links for name in (link.master, link.node)}
+    thickness, found = mechanism.of_beams("thickness"), dict[str, float]()
+    for node, spec in mechanism.nodes.items():
+        ends = [(name, end) for name, beam in mechanism.beams.items() for end in ("start", "end")
+                if getattr(beam, end) == node]  # fmt: skip
+        if spec.support == "free" and node not in linked and len(ends) == 1:
+            ((name, end),) = ends
+            given = thickness[name]
+            there = given[0 if end == "start" else -1][1] if isinstance(given, tuple) else given
+            found[node] = 0.5 * there
+    return found
+
+
+def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """Yield what is wrong with the contacts of a mechanism whose names of nodes are right."""
+    size = max(math.dist(one.at, other.at) for one in mechanism.nodes.values() for other in mechanism.nodes.values())
+    for name, obstacle in mechanism.obstacles.items():
+        place = ("obstacles", name, obstacle.kind)
+        pads = pads_of(mechanism, obstacle)
+        if not pads:
+            yield (*place, "nodes"), "no beam ends freely: state the nodes that may touch it, such as {tip: 2 mm}"
+        outline = obstacle.outline()
+        for node, radius in pads.items():
+            if outline.smallest_hollow <= radius:
+                yield (
+                    place,
+                    f"its hollow of {format_short(outline.smallest_hollow, 'length')} is too tight for the pad of "
+                    f"{node!r}, radius {format_short(radius, 'length')}",
+                )
+                continue
+            if radius == 0 and outline.smallest_bulge == 0:
+                yield place, f"a sharp corner needs a pad of {node!r} with a radius"
+            inside = radius - float(outline.distance(mechanism.nodes[node].at).value)
+            if inside > OVERLAP * size and mechanism.closure != "chain":
+                yield place, f"the pad of node {node!r} lies {format_short(inside, 'length')} inside it before any load"
+    if not (mechanism.stops or mechanism.obstacles):
+        return
+    yield from _column_faults(mechanism)
+    for name in mechanism.obstacles:
+        if name in mechanism.stops:
+            yield ("obstacles", name), "a stop has the same name: rename one of them"
+    key = "stops" if mechanism.stops else "obstacles"
+    copies = mechanism.copies
+    if copies is not None and copies.layers > 1:
+        yield (key,), "contact is not supported with stages in series: leave out 'copies.layers'"
+    follows = getattr(mechanism.drive, "follows", False) or any(
+        getattr(load, "follows", False) for load in (*mechanism.loads, *getattr(mechanism.drive, "loads", ()))
+    )
+    if follows:
+        yield (key,), "contact is not supported under loads that turn with their node: leave out 'follows'"
+
+
+def _column_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    seen = {f"{name}_force" for name in mechanism.beams}
+    for place, column in column_names(mechanism):
+        if column in seen:
+            yield place, f"its column {column!r} has the name of another one: rename it"
+        seen.add(column)
+
+
+def column_names(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield the place in the specification and the column of the force of each stop, and of each pad."""
+    for name in mechanism.stops:
+        yield ("stops", name), f"stop_{name}_force"
+    for name, obstacle in mechanism.obstacles.items():
+        for node in pads_of(mechanism, obstacle):
+            yield ("obstacles", name, obstacle.kind), f"{name}_{node}_force"
+
+
+def contact_requirement_faults(mechanism: Mechanism, requirements: Sequence[Requirement]) -> Iterator[Fault]:
+    """Yield requirements on the force of a contact that a mechanism does not have."""
+    names = [*mechanism.stops, *mechanism.obstacles]
+    for number, requirement in enumerate(requirements):
+        plain, bracket, rest = requirement.metric.partition("[")
+        if plain in ("contact_force", "contact_force_ripple") and not (bracket and rest.removesuffix("]") in names):
+            listed = ", ".join(names) or "none"
+            yield (
+                ("requirements", number, "metric"),
+                f"{plain!r} needs the name of a stop or an obstacle in brackets; there are: {listed}",
+            )

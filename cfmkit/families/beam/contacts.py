@@ -1,0 +1,256 @@
+"""Forces of stops and obstacles along the curve of a beam mechanism: columns, scalar results and findings."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Column
+from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
+from cfmkit.elastica.results.beam_states import states
+from cfmkit.families.beam.contact_spec import column_names, pads_of
+from cfmkit.families.beam.curve_along_its_motion import window_of
+from cfmkit.families.beam.largest_in_window import largest
+from cfmkit.families.beam.network_from_spec import thickest_of
+from cfmkit.numerics.quadrature import clenshaw_curtis
+from cfmkit.results import Quantity
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Path
+    from cfmkit.elastica.model.contact import Contact
+    from cfmkit.elastica.results.path import ContactEvent
+    from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.run_control import Run
+
+DEFINITIONS = {
+    "first_contact": ("length", "displacement of the driven node at which the first contact begins"),
+    "contact_force[contact]": (
+        "force", "mean force in the window of the stop or the obstacle that is named, on one copy; of a stop with two "
+        "sides positive where it limits the motion along its direction, of an obstacle the sum of all pads"
+    ),
+    "contact_force_ripple[contact]": ("ratio", "(max - min)/max of that force in the window"),
+}  # fmt: skip
+LARGEST_FORCE = (
+    "largest normal force: of a stop or an obstacle on one copy, or between tip and `analysis.surface` in both "
+    "directions of the motion"
+)
+N_SIDE = 129  # places of every element at which the side of a beam is looked at
+N_MEAN = 17  # places of the rule for a mean between two corners
+PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
+NEAR_GAP = 0.01  # share of the thinnest beam's thickness below which a gap that stays open is reported
+OUT_OF_REACH = 10.0  # largest motions of a pad from an obstacle, from which on it is reported
+MOST_NAMED = 6
+
+
+# -- forces ------------------------------------------------------------------------------------------------------------
+def groups(contacts: tuple[Contact, ...]) -> dict[tuple[str, str], list[int]]:
+    """Return the numbers of the contacts by name and node: of a stop, or of one pad on an obstacle."""
+    found: dict[tuple[str, str], list[int]] = {}
+    for number, contact in enumerate(contacts):
+        found.setdefault((contact.name, contact.node), []).append(number)
+    return found
+
+
+def signed_force(path: Path, numbers: list[int]) -> FloatArray:
+    """Return the force of a stop or a pad at every point of a path, (n,) [N or N m], on one copy."""
+    contacts = path.network.contacts
+    signs = [one.sense if isinstance(one, Stop) else 1.0 for one in (contacts[number] for number in numbers)]
+    if len(numbers) == 1:
+        return path.contact_force(numbers[0])
+    return np.asarray(sum(sign * path.contact_force(number) for sign, number in zip(signs, numbers, strict=True)))
+
+
+def named_force(path: Path, name: str) -> FloatArray:
+    """Return the force of a stop, or of all pads on an obstacle, at every point of a path, (n,)."""
+    found = [numbers for (own, _), numbers in groups(path.network.contacts).items() if own == name]
+    return np.asarray(sum(signed_force(path, numbers) for numbers in found))
+
+
+def contact_columns(solution: Solution) -> dict[str, Column]:
+    """Return the force of each stop and each pad at every point of the curve, and what happens there."""
+    path, keep = solution.path, solution.keep
+    if not path.network.contacts:
+        return {}
+    names = [column for _, column in column_names(solution.spec.mechanism)]
+    columns = {}
+    for column, numbers in zip(names, groups(path.network.contacts).values(), strict=True):
+        turns = path.network.contacts[numbers[0]].turns
+        columns[column] = Column(signed_force(path, numbers)[keep], "torque" if turns else "force")
+    marks = np.full(len(path), "", dtype=object)
+    for event in path.contact_events:
+        point = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
+        marks[point] = f"{marks[point]}; {_mark(path, event)}".removeprefix("; ")
+    return columns | {"event": Column(np.array([str(mark) for mark in marks[keep]], np.str_), "text")}
+
+
+def _mark(path: Path, event: ContactEvent) -> str:
+    contact = path.network.contacts[event.number]
+    name = contact.name if isinstance(contact, Stop) else f"{contact.name} {contact.node}"
+    return f"{name} {event.kind}"
+
+
+# -- scalar results ----------------------------------------------------------------------------------------------------
+def contact_values(solution: Solution, run: Run) -> dict[str, Quantity]:
+    """Return the scalar results on contacts by name; none without contacts."""
+    path, contacts = solution.path, solution.path.network.contacts
+    turns = solution.spec.mechanism.drive.turns
+    first = next((event for event in path.contact_events if event.kind == "begins"), None)
+    found = {"first_contact": Quantity(None, *DEFINITIONS["first_contact"])}
+    if not contacts:
+        return found
+    if first is not None and not turns:
+        there = path.take(path.changes_contact)
+        motion = replace(solution, path=there, keep=np.arange(len(there)), ends=()).motion
+        place = float(motion[int(np.abs(there.drive - first.drive).argmin())])
+        found["first_contact"] = Quantity(place, *DEFINITIONS["first_contact"])
+    elif not turns and any(path.contact_force(number)[0] > 0 for number in range(len(contacts))):
+        found["first_contact"] = Quantity(float(solution.motion[0]), *DEFINITIONS["first_contact"])
+    window = window_of(solution)
+    pushing = [number for number, contact in enumerate(contacts) if not contact.turns]
+    if pushing:
+        top = largest(solution, lambda there: np.array([there.contact_force(number) for number in pushing]), window)
+        found["contact_force_max"] = Quantity(top, "force", LARGEST_FORCE)
+    for name in dict.fromkeys(contacts[number].name for number in pushing):
+        wanted = [f"{plain}[{name}]" for plain in ("contact_force", "contact_force_ripple")]
+        if not run.wants(wanted):
+            continue
+        mean, ripple = _mean(solution, name, window), _ripple(solution, name, window)
+        found[wanted[0]] = Quantity(mean, *DEFINITIONS["contact_force[contact]"], reason="" if mean is not None else
+                                    "the window is not on the curve, or the curve turns back")  # fmt: skip
+        found[wanted[1]] = Quantity(ripple, *DEFINITIONS["contact_force_ripple[contact]"], reason="" if ripple
+                                    is not None else "there is no contact in the window")  # fmt: skip
+    return found
+
+
+def _ripple(solution: Solution, name: str, window: tuple[float, float]) -> float | None:
+    def rows(path: Path) -> FloatArray:
+        force = named_force(path, name)
+        return np.array([force, -force])
+
+    def row(path: Path, number: int) -> FloatArray:
+        return rows(path)[number : number + 1]
+
+    top, bottom = (largest(solution, partial(row, number=number), window) for number in (0, 1))
+    return (top + bottom) / top if top is not None and bottom is not None and top > 0 else None
+
+
+def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float | None:
+    """Return the mean force of a contact over the motion in a window, piece by piece between corners [N]."""
+    law = solution.everywhere
+    if law is None:
+        return None
+    low, high = max(window[0], float(law.places[0])), min(window[1], float(law.places[-1]))
+    if not high > low or high - low < (1 - 1e-9) * (window[1] - window[0]):
+        return None
+    marks = [low, *(place for place in law.corners.tolist() if low < place < high), high]
+    weights = clenshaw_curtis(N_MEAN)
+    shares = 0.5 * (1 - np.cos(np.pi * np.arange(N_MEAN) / (N_MEAN - 1)))
+    total = 0.0
+    for begin, end in itertools.pairwise(marks):
+        force = named_force(law.at(begin + (end - begin) * shares), name)
+        total += (end - begin) * float(weights @ force)
+    return total / (high - low)
+
+
+# -- findings ----------------------------------------------------------------------------------------------------------
+FINDINGS = {
+    "contact_begins": "a stop is reached, or a pad touches an obstacle",
+    "blocked": "a rigid contact leaves the drive no way to go on: the curve ends there",
+    "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
+    "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
+    "side_in_obstacle": "the side of a beam passes through an obstacle: only pads of nodes touch it",
+}
+
+
+def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator[tuple[str, str]]:
+    """Yield the name and the message of each finding on contacts; `say` gives a drive as a reader wants it."""
+    path = solution.path
+    if not path.network.contacts or not len(solution.keep):
+        return
+    sentences = [_sentence(solution, event, say(event.drive)) for event in path.contact_events]
+    resting = [describe(one) for number, one in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0]
+    before = [f"closed before the drive moves: {', '.join(resting)}"] if resting else []
+    told = [*before, *(text for text in sentences if text)]
+    if told:
+        more = f"; and {len(told) - MOST_NAMED} more changes" if len(told) > MOST_NAMED else ""
+        yield "contact_begins", "; ".join(told[:MOST_NAMED]) + more
+    for event in path.contact_events:
+        if event.kind == "blocks":
+            who = describe(path.network.contacts[event.number])
+            yield "blocked", f"the drive is blocked by {who} at {say(event.drive)}"
+    yield from _gap_sentences(solution)
+    yield from _side_sentences(solution, say)
+
+
+def describe(contact: Contact) -> str:
+    """Return what a contact is called."""
+    return f"{contact.node!r} on {contact.name!r}" if isinstance(contact, NodeOnObstacle) else f"stop {contact.name!r}"
+
+
+def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
+    contact, path = solution.path.network.contacts[event.number], solution.path
+    if event.kind == "blocks":
+        return ""
+    if isinstance(contact, NodeOnObstacle):
+        if event.kind == "begins":
+            return f"contact begins at {place} between {contact.node!r} and {contact.name!r}"
+        return f"{contact.node!r} leaves {contact.name!r} at {place}"
+    if event.kind == "ends":
+        return f"stop {contact.name!r} is left at {place}"
+    last = float(path.contact_force(event.number)[solution.keep[-1]])
+    force = format_short(last, "torque" if contact.turns else "force")
+    return f"stop {contact.name!r} is reached at {place}; its {'moment' if contact.turns else 'force'} at the end is " \
+        f"{force}"  # fmt: skip
+
+
+def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
+    path = solution.path
+    touched = {event.number for event in path.contact_events}
+    thin = solution.spec.mechanism.thinnest
+    for number, contact in enumerate(path.network.contacts):
+        if number in touched or contact.turns or path.contact_force(number).any():
+            continue
+        gap = path.contact_gap(number)
+        least, moved = float(gap.min()), float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
+        if 0 < least < NEAR_GAP * thin:
+            where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
+            yield "near_contact", f"{where}: tolerances of that size decide whether they touch"
+        elif isinstance(contact, NodeOnObstacle) and least > OUT_OF_REACH * moved:
+            yield (
+                "obstacle_out_of_reach",
+                f"{contact.node!r} comes no nearer to {contact.name!r} than {format_short(least, 'length')}, and moves "
+                f"by {format_short(moved, 'length')} only",
+            )
+
+
+def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator[tuple[str, str]]:
+    """Say where the side of a beam lies in an obstacle, beside the pads of nodes."""
+    path, mechanism, keep = solution.path, solution.spec.mechanism, solution.keep
+    for name, obstacle in mechanism.obstacles.items():
+        outline = obstacle.outline()
+        pads = pads_of(mechanism, obstacle)
+        for beam, own in path.network.beams.items():
+            found = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
+            places = np.stack([found.x, found.y], axis=-1)
+            depth = 0.5 * thickest_of(own.section) - outline.distance(places).value
+            slack = PENETRATION * thickest_of(own.section)
+            # an elastic obstacle yields at its pads, and the beam with them
+            yields = max((float(-path.contact_gap(k).min()) for k, one in enumerate(path.network.contacts)
+                          if one.name == name and one.node in pads), default=0.0)  # fmt: skip
+            deep = depth > slack + max(yields, 0.0)
+            if deep.any():
+                first = int(deep.any(axis=1).argmax())
+                place = float(found.place[int(depth[first].argmax())])
+                yield (
+                    "side_in_obstacle",
+                    f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "
+                    f"at {place:.0%} of its length: only the pads of {', '.join(map(repr, pads))} touch it",
+                )

@@ -1,0 +1,222 @@
+"""Stops and obstacles in beam specifications: results, columns, findings, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from beam_support import CANTILEVER, CONFIGS, config, solved
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.families.beam.figures import figures
+from cfmkit.results import Status
+
+FLOOR = "work: {kind: line, through: [0 mm, -40 mm], direction: 0 deg, nodes: {tip: 2 mm}}"
+
+
+def stated(contacts, text=CANTILEVER, **changes):
+    """Return a specification with blocks of contacts put in front of its drive."""
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    return cfmkit.loads(text.replace("  drive:", f"{contacts}  drive:", 1))
+
+
+def with_floor(line=FLOOR, root="support: guided, direction: 90 deg"):
+    """Return a cantilever whose root moves down until the tip meets a floor."""
+    text = CANTILEVER.replace("support: clamped", root).replace("node: tip, direction", "node: root, direction")
+    return stated(f"  obstacles:\n    {line}\n", text)
+
+
+def lan(stop):
+    """Return Lan's mechanism with 37 points and a stop on its third node."""
+    text = (CONFIGS / "beam_lan2010.yaml").read_text(encoding="utf-8").replace("points: 181", "points: 37")
+    text = text[: text.index("requirements:")]
+    return stated(f"  stops:\n    end: {stop}\n", text)
+
+
+def test_lans_mechanism_with_a_rigid_stop_has_the_forces_of_a_support_that_is_switched_on():
+    """The reference is the same network with the node held there, solved without contact."""
+    free = cfmkit.analyze(config("beam_lan2010", "analysis.points=37"))
+    moved = free.state.path.motion("n3")[:, 0]
+    most = float(moved[np.abs(moved).argmax()])
+    direction = "0 deg" if most > 0 else "180 deg"
+    spec = lan(f"{{node: n3, direction: {direction}, gap: {0.5 * abs(most) * 1e3!r} mm}}")
+    result = cfmkit.analyze(spec)
+    path, curve = result.state.path, result.curve
+    assert path.contact_events[0].drive * 1e3 == pytest.approx(6.01475345561, rel=1e-7)
+    known = {6.5: (4.57681868684, 1.28776693), 9: (5.03033803189, 7.19888203), 18: (5.5600435822, 21.8572635)}
+    for place, (force, stop) in known.items():
+        row = int(np.abs(curve.displacement - place * 1e-3).argmin())
+        assert curve.force[row] / 2 == pytest.approx(force, rel=1e-7)
+        assert curve.extra["stop_end_force"].values[row] == pytest.approx(stop, rel=1e-7)
+
+
+def test_the_curve_has_a_column_of_each_force_and_a_row_at_each_event():
+    result = cfmkit.analyze(with_floor())
+    force, event = (result.curve.extra[name].values for name in ("work_tip_force", "event"))
+    (row,) = np.flatnonzero(event != "")
+    assert event[row] == "work tip begins"
+    assert result.curve.displacement[row] == pytest.approx(0.038, rel=1e-12)
+    assert len(result.curve) == 22
+    assert (force[: row + 1] == 0).all()
+    assert force[row + 1 :] == pytest.approx(result.curve.force[row + 1 :], rel=1e-12)
+    assert result.values["first_contact"].value == pytest.approx(0.038, rel=1e-12)
+    assert result.values["contact_force_max"].value == pytest.approx(force.max(), rel=1e-12)
+
+
+def test_mean_and_ripple_of_a_contact_force_are_those_of_the_curve_in_the_window():
+    spec = with_floor()
+    spec = spec.replace({"analysis.window": ["50 mm", "100 mm"]})
+    result = cfmkit.analyze(spec)
+    mean, ripple = (
+        cfmkit.evaluate(result)[f"{name}[work]"].value for name in ("contact_force", "contact_force_ripple")
+    )
+    at = np.linspace(0.05, 0.1, 2001)
+    force = result.closed.effort("", at)
+    assert mean == pytest.approx(np.trapezoid(force, at) / 0.05, rel=1e-7)
+    assert ripple == pytest.approx(1 - force.min() / force.max(), rel=1e-9)
+
+
+def test_findings_say_where_contacts_begin_and_what_passes_through():
+    result = cfmkit.analyze(
+        with_floor("work: {kind: disc, centre: [320 mm, -60 mm], radius: 20 mm, nodes: {tip: 1 mm}}")
+    )
+    said = {finding.name: finding.message for finding in result.warnings}
+    assert said["side_in_obstacle"].startswith("the side of beam 'beam' passes through 'work' from 40 mm on")
+    said = {finding.name: finding.message for finding in cfmkit.analyze(with_floor()).warnings}
+    assert said["contact_begins"] == "contact begins at 38 mm between 'tip' and 'work'"
+
+
+def test_a_blocked_drive_is_a_partial_result_that_says_by_what():
+    result = cfmkit.analyze(stated("  stops: {end: {node: tip, direction: -90 deg, gap: 30 mm}}\n"))
+    assert result.status is Status.PARTIAL
+    assert result.message == "the drive is blocked by stop 'end' at 30 mm"
+    assert result.curve.displacement[-1] == pytest.approx(0.03, rel=1e-12)
+    assert [finding.name for finding in result.warnings if finding.name in ("blocked", "ends_early")] == ["blocked"]
+
+
+def test_a_stop_with_two_sides_has_one_signed_column():
+    text = CANTILEVER.replace("support: clamped", "support: guided, direction: 90 deg").replace(
+        "node: tip, direction: -90 deg", "node: root, direction: 90 deg"
+    )
+    stop = "  stops: {s: {node: tip, direction: -90 deg, gap: [20 mm, 5 mm], stiffness: 3 N/mm}}\n"
+    force = cfmkit.analyze(stated(stop, text)).curve.extra["stop_s_force"].values
+    assert force[-1] < 0
+    assert force.max() == 0.0
+
+
+def test_a_rotation_that_is_stopped_has_a_moment():
+    text = CANTILEVER.replace("kind: displacement, node: tip, direction: -90 deg", "kind: moment, node: tip").replace(
+        "travel: 100 mm", "moment: 100 N*mm"
+    )
+    stop = "  stops: {lock: {node: tip, rotation: true, gap: 40 deg, stiffness: 1 N*m/rad}}\n"
+    column = cfmkit.analyze(stated(stop, text)).curve.extra["stop_lock_force"]
+    angle = 0.1 * 0.4 / 0.02  # of the free leaf [rad]
+    yields = (angle - np.radians(40)) / (1 / 1.0 + 0.4 / 0.02)  # the leaf has 0.05 N m/rad
+    assert column.dimension == "torque"
+    assert column.values[-1] == pytest.approx(yields, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "place", "says"),
+    [
+        ("  stops: {s: {node: top, direction: 0 deg, gap: 1 mm}}\n", "stops.s", "there is no node 'top'"),
+        ("  stops: {s: {node: tip, direction: 0 deg, gap: -1 mm}}\n", "stops.s", "must be >= 0"),
+        ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 deg}}\n", "stops.s", "length"),
+        ("  stops: {s: {node: tip, rotation: true, gap: 1 mm}}\n", "stops.s", "angle"),
+        ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 0.2}}\n", "stops.s", "friction"),
+        ("  stops: {s: {node: tip, gap: 1 mm}}\n", "stops.s", "direction"),
+        (
+            "  obstacles: {o: {kind: disc, centre: [400 mm, -10 mm], radius: 12 mm, nodes: {tip: 1 mm}}}\n",
+            "obstacles.o", "the pad of node 'tip' lies 3 mm inside it before any load",
+        ),
+        (
+            "  obstacles: {o: {kind: hole, centre: [400 mm, 0 mm], radius: 2 mm, nodes: {tip: 3 mm}}}\n",
+            "obstacles.o", "its hollow of 2 mm is too tight for the pad of 'tip', radius 3 mm",
+        ),
+        (
+            "  obstacles:\n    o: {kind: polyline, fillet: 10 mm, "
+            "points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]]}\n",
+            "obstacles.o", "the sides allow a fillet of at most 9 mm",
+        ),
+        (
+            "  obstacles: {o: {kind: polyline, points: [[0 mm, -50 mm], [9 mm, -50 mm], [9 mm, -90 mm]]}}\n",
+            "obstacles.o", "'fillet', the radius of its corners, is missing",
+        ),
+        (
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam]}}\n",
+            "obstacles.o", "beams",
+        ),
+        ("  obstacles: {o: {kind: lin, through: [0 mm, -50 mm], direction: 0 deg}}\n", "obstacles.o", "line"),
+        (
+            "  stops: {o: {node: tip, direction: 0 deg, gap: 1 mm}}\n"
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg}}\n",
+            "obstacles.o", "a stop has the same name",
+        ),
+    ],
+)  # fmt: skip
+def test_a_contact_that_cannot_be_is_refused_with_its_place(contacts, place, says):
+    with pytest.raises(SpecError) as caught:
+        stated(contacts)
+    assert place in str(caught.value)
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("analysis:\n  modes: 1", "natural frequencies are not known with stops"),
+        ("design:\n  rescale: {force: 5 N}\nanalysis:", "do not scale with them"),
+        ("analysis:\n  fidelity: solid", "mechanism.stops is not supported"),
+        ('requirements:\n  - {metric: "contact_force[wall]", max: 1 N}\nanalysis:', "there are: s"),
+        ("requirements:\n  - {metric: contact_force, max: 1 N}\nanalysis:", "needs the name of a stop or an obstacle"),
+    ],
+)
+def test_what_is_not_possible_with_contacts_is_refused(more, says):
+    text = CANTILEVER.replace("analysis:", more).replace("2.4 GPa", "2.4 GPa, density: 1000 kg/m^3")
+    with pytest.raises(SpecError, match="(?s)" + says.replace("[", r"\[")):
+        stated("  stops: {s: {node: tip, direction: -90 deg, gap: 9 mm}}\n", text)
+
+
+def test_the_shipped_stop_keeps_the_leaf_below_its_allowable_stress():
+    stopped = solved("beam_stop")
+    free = solved("beam_stop", "mechanism.stops={}")
+    allowable = stopped.allowable_stress
+    assert stopped.curve.extra["max_stress"].values.max() < allowable < free.curve.extra["max_stress"].values.max()
+
+
+def test_obstacles_stops_and_touching_pads_are_drawn():
+    for name, parts in (("beam_gripper", {"obstacle-work-0", "touch-0-71"}), ("beam_stop", {"stop-bumper-0-0"})):
+        figure = figures(solved(name))["shapes"]()
+        drawn = {artist.get_gid() for artist in figure.axes[0].get_children()}
+        assert parts <= drawn
+
+
+def test_a_contact_that_a_constant_load_closes_is_reported_from_the_start():
+    text = CANTILEVER.replace(
+        "kind: displacement, node: tip, direction: -90 deg", "kind: force, node: tip, direction: 0 deg"
+    )
+    text = text.replace("travel: 100 mm", "force: 0.01 N")
+    contacts = (
+        "  stops: {end: {node: tip, direction: -90 deg, gap: 9 mm}}\n  loads: [{kind: point, node: tip, fy: -0.1 N}]\n"
+    )
+    result = cfmkit.analyze(stated(contacts, text))
+    (said,) = (finding.message for finding in result.warnings if finding.name == "contact_begins")
+    assert said == "closed before the drive moves: stop 'end'"
+    assert result.values["first_contact"].value == result.curve.displacement[0]
+    free = 3 * 0.02 * 0.009 / 0.4**3  # what bends the leaf by the gap, to first order [N]
+    assert result.curve.extra["stop_end_force"].values[0] == pytest.approx(0.1 - free, rel=2e-3)
+
+
+def test_a_support_that_is_pushed_against_a_rigid_stop_has_no_start():
+    text = (
+        CANTILEVER.replace(
+            "root: {at: [0 mm, 0 mm], support: clamped}",
+            "root: {at: [0 mm, 0 mm], support: clamped, moved: {across: -20 mm}}",
+        )
+        .replace("node: tip, direction: -90 deg}", "node: tip, direction: 0 deg}")
+        .replace("travel: 100 mm", "travel: 1 mm")
+    )
+    result = cfmkit.analyze(stated("  stops: {end: {node: root, direction: -90 deg, gap: 10 mm}}\n", text))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "the drive is blocked by stop 'end' at 0.5 of the constant loads" in result.message

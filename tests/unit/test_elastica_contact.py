@@ -1,0 +1,332 @@
+"""Stops and obstacles of nodes in beam networks, in units of L and F0 = EI/L^2.
+
+The numbers are of independent shooting (DOP853, mpmath) and closed forms; see docs/contact.md.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    PathStatus,
+    PointLoad,
+    Section,
+    Support,
+    arc,
+    guided,
+    trace,
+)
+from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.model.contact import NodeOnObstacle, Stop, circle, line, polyline
+from cfmkit.elastica.model.contact import arc as arc_line
+from cfmkit.elastica.results.between_points import between_points
+from cfmkit.numerics.quadrature import clenshaw_curtis
+
+DOWN = -np.pi / 2
+SECTION = Section(1.0, 12.0, 1.0, axial=False, shear=False)  # EI = 1
+EXACT = Control(tolerance=1e-9)
+TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
+
+
+def cantilever(*contacts, nodes=2, support=CLAMPED, y=0.0, angle=0.0):
+    """Return a straight cantilever of length 1 with even nodes; the last one is `tip`, the middle one `mid`."""
+    names = ["root", *(f"n{k}" for k in range(1, nodes - 1)), "tip"]
+    if nodes == 3:
+        names[1] = "mid"
+    way = np.array([np.cos(angle), np.sin(angle)])
+    places = [(k * way / (nodes - 1) + (0.0, y)).tolist() for k in range(nodes)]
+    made = {name: Node(*at, support if name == "root" else Support()) for name, at in zip(names, places, strict=True)}
+    beams = {f"b{k}": Beam(names[k], names[k + 1], SECTION) for k in range(nodes - 1)}
+    return Network(made, beams, contacts=contacts)
+
+
+def tip_of(path):
+    """Return where the tip is at the end of a path."""
+    node = path.network.nodes["tip"]
+    return path.motion("tip")[-1, :2] + [node.x, node.y]
+
+
+def conditions(path):
+    """Return the gaps (what an elastic contact yields put back) and forces of all contacts, (contacts, n) each."""
+    force = np.array([path.contact_force(k) for k in range(len(path.network.contacts))])
+    gap = np.array([path.contact_gap(k) for k in range(len(path.network.contacts))])
+    yields = np.array([1.0 / one.stiffness for one in path.network.contacts])[:, None]
+    return gap + yields * force, force
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "force", "tip"),
+    [
+        (np.inf, 3.550103312597306, (0.952410116982856, -0.251364358585010)),
+        (200.0, 3.119493740615104, (0.941218822519390, -0.286036662643615)),
+    ],
+)
+def test_a_stop_at_half_length_carries_what_shooting_says(stiffness, force, tip):
+    path = trace(
+        cantilever(Stop("s", "mid", 0.05, DOWN, stiffness=stiffness), nodes=3),
+        Loading(TIP_LOAD, np.linspace(0, 2, 9)), EXACT,
+    )  # fmt: skip
+    (event,) = path.contact_events
+    assert event.drive == pytest.approx(0.490235784722785, rel=1e-10)
+    assert path.contact_force(0)[-1] == pytest.approx(force, rel=1e-10)
+    assert tip_of(path) == pytest.approx(tip, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "moment", "tip"),
+    [
+        (np.inf, 1.0, (0.738460262604129, 0.525840118220962)),
+        (5.0, 5 / 7, (0.665225899943420, 0.591447507226027)),
+    ],
+)
+def test_a_rotational_stop_has_the_moment_of_the_closed_form(stiffness, moment, tip):
+    path = trace(
+        cantilever(Stop("s", "mid", 0.5, None, stiffness=stiffness), nodes=3),
+        Loading((PointLoad("tip", moment=1.0),), np.linspace(0, 2, 9)), EXACT,
+    )  # fmt: skip
+    assert path.contact_events[0].drive == pytest.approx(1.0, rel=1e-12)
+    assert path.contact_force(0)[-1] == pytest.approx(moment, rel=1e-12)
+    assert tip_of(path) == pytest.approx(tip, rel=1e-12)
+
+
+def test_a_stop_with_two_sides_is_met_there_and_back():
+    net = cantilever(Stop("up", "tip", 0.05, np.pi / 2), Stop("down", "tip", 0.08, DOWN), support=guided(np.pi / 2))
+    drive = Displacement("root", np.pi / 2, np.array([0.1, 0.3, 0.1, -0.1, -0.3, -0.1, 0.1, 0.3]))
+    path = trace(net, drive, EXACT)
+    known = [0.150386839128421, 0.802004737723027, 0.150386839128421, -0.060024697203493, -0.694820851406546]
+    assert path.effort[path.at_requested] == pytest.approx([*known, *known[3:4], *known[:2]], rel=1e-10)
+    changes = [(event.kind, event.number, round(event.drive, 10)) for event in path.contact_events]
+    assert changes == [
+        ("begins", 0, 0.05), ("ends", 0, 0.05), ("begins", 1, -0.08), ("ends", 1, -0.08), ("begins", 0, 0.05)
+    ]  # fmt: skip
+
+
+def test_a_tip_that_meets_the_floor_has_the_forces_of_shooting_both_ways():
+    net = cantilever(
+        NodeOnObstacle("floor", "tip", line((0, 0), 0.0)), support=guided(np.pi / 2), y=0.4, angle=-np.pi / 9
+    )
+    path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.15, 0.2, 0.25, 0.2, 0.15, 0.1, 0.05])), EXACT)
+    known = [0.13898439286123, 0.296609798575910, 0.448837794092424, 0.598397552260931]
+    assert path.effort[path.at_requested] == pytest.approx([*known, *known[2::-1], 0.0], rel=1e-10, abs=1e-12)
+    begin, end = (event.drive for event in path.contact_events)
+    assert begin == pytest.approx(0.4 - np.sin(np.pi / 9), rel=1e-11)
+    assert end == pytest.approx(begin, rel=1e-11)
+
+
+def test_a_tip_in_a_hole_has_the_force_of_shooting():
+    net = cantilever(NodeOnObstacle("bore", "tip", circle((0.7, 0.0), 0.45, hole=True)))
+    path = trace(net, Loading((PointLoad("tip", 0.0, 1.0),), np.linspace(0, 3, 9)), EXACT)
+    assert path.contact_events[0].drive == pytest.approx(1.471370651062744, rel=1e-10)
+    assert path.contact_force(0)[-1] == pytest.approx(2.297191287588976, rel=1e-10)
+    assert tip_of(path) == pytest.approx((0.893338995154815, 0.406349643721422), rel=1e-10)
+
+
+def shoot(moment, force, curvature):
+    """Return x, y, angle and moment at the tip of a leaf of length 1, from the moment at its root [DOP853]."""
+    from scipy.integrate import solve_ivp
+
+    def slopes(_, state):
+        cos, sin = np.cos(state[2]), np.sin(state[2])
+        return [cos, sin, curvature + state[3], force[0] * sin - force[1] * cos]
+
+    return solve_ivp(slopes, (0, 1), [0.0, 0.0, 0.0, moment], "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+
+@pytest.mark.parametrize(
+    ("curvature", "centre", "radius", "load"),
+    [(0.3, (1.0, -0.25), 0.2, (0.4, -2.0)), (-0.2, (0.95, -0.3), 0.1, (0.0, -3.0)), (0.5, (0.9, -0.5), 0.3, (1, -5.0))],
+)
+def test_a_curved_leaf_on_a_disc_solves_the_equations_of_shooting(curvature, centre, radius, load):
+    end = np.sin(curvature) / curvature, (1 - np.cos(curvature)) / curvature
+    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(*end)}
+    pad = NodeOnObstacle("disc", "tip", circle(centre, radius - 0.03), 0.03)
+    net = Network(nodes, {"leaf": Beam("root", "tip", SECTION, arc(curvature))}, contacts=(pad,))
+    path = trace(net, Loading((PointLoad("tip", *load),), np.array([0.5, 1.0])), Control(tolerance=1e-10))
+    force, normal = path.contact_force(0)[-1], (tip_of(path) - centre) / radius
+    whole = np.array(load) + force * normal
+    moment = path.states("leaf").moment[-1, 0]
+    x, y, turn, left = shoot(moment, whole, curvature)
+    assert force > 0.1
+    assert (x, y) == pytest.approx(tip_of(path), abs=1e-9)
+    assert turn == pytest.approx(path.motion("tip")[-1, 2] + curvature, abs=1e-9)
+    assert left == pytest.approx(0.0, abs=1e-9)
+    assert np.hypot(*(tip_of(path) - centre)) == pytest.approx(radius, rel=1e-11)
+
+
+def layout(seed):
+    """Return a random cantilever with up to four contacts, and a drive out and back."""
+    rng = np.random.default_rng(seed)
+    net = cantilever(nodes=int(rng.integers(3, 6)))
+    names, contacts = list(net.nodes)[1:], []
+    for number in range(int(rng.integers(1, 5))):
+        node = names[int(rng.integers(len(names)))]
+        x, stiffness = net.nodes[node].x, (np.inf if rng.integers(2) else 10 ** rng.uniform(1, 4))
+        low, pad = -rng.uniform(0.01, 0.35) * x * x - 0.005, rng.uniform(0.01, 0.1)
+        outline = [
+            None,
+            line((0.0, low - pad), 0.0),
+            circle((x + 0.05 * rng.normal(), low - pad - 0.2), 0.2),
+            polyline([(-1, low - pad), (0.9 * x, low - pad), (0.9 * x, -9.0)], 0.02),
+            arc_line((x - 0.1, low - pad - 0.4), 0.4, 0.9 * np.pi, 0.2 * np.pi),
+        ][int(rng.integers(5))]
+        if outline is None:
+            contacts.append(Stop(f"s{number}", node, -low, DOWN + 0.2 * rng.normal(), stiffness=stiffness))
+        else:
+            contacts.append(NodeOnObstacle(f"o{number}", node, outline, pad, stiffness))
+    up = np.linspace(0, 1, 9)[1:] * rng.uniform(1, 6)
+    load = (PointLoad("tip", 0.2 * rng.normal(), -1.0),)
+    return replace(net, contacts=tuple(contacts)), Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_random_layout_returns_to_its_own_points_and_keeps_every_condition(seed):
+    path = trace(*layout(seed), Control(tolerance=1e-8))
+    assert path.status is PathStatus.COMPLETE
+    gap, force = conditions(path)
+    largest = max(1.0, force.max())
+    assert gap.min() > -1e-9
+    assert force.min() > -1e-9 * largest
+    assert np.minimum(gap, force / largest).max() < 1e-9
+    assert np.abs(path.residual[:, path.mesh.free]).max() < 1e-8 * largest
+    moved = np.array([path.motion(node) for node in path.network.nodes])[:, path.at_requested]
+    assert moved[:, :7] == pytest.approx(moved[:, 14:7:-1], abs=1e-9)
+
+
+def test_the_work_of_the_drive_is_the_energy_of_beams_and_of_an_elastic_stop():
+    net = cantilever(
+        Stop("bumper", "tip", 0.05, np.pi / 2, stiffness=20.0), NodeOnObstacle("disc", "mid", circle((0.5, 0.2), 0.15)),
+        nodes=3, support=guided(np.pi / 2),
+    )  # fmt: skip
+    path = trace(net, Displacement("root", np.pi / 2, np.linspace(0, 0.3, 13)), EXACT)
+    law = between_points(path)
+    assert {event.number for event in path.contact_events} == {0, 1}
+    marks, work = [0.0, *law.corners.tolist(), 0.3], 0.0
+    shares = 0.5 * (1 - np.cos(np.pi * np.arange(17) / 16))
+    for low, high in itertools.pairwise(marks):
+        work += (high - low) * float(clenshaw_curtis(17) @ law.effort("", low + (high - low) * shares))
+    assert work == pytest.approx(path.energy[-1], rel=1e-9)
+
+
+def test_the_curve_between_points_has_a_corner_where_a_contact_begins():
+    net = cantilever(NodeOnObstacle("floor", "tip", line((0, -0.06), 0.0)), support=guided(np.pi / 2))
+    law = between_points(trace(net, Displacement("root", DOWN, np.linspace(0, 0.25, 11)), EXACT))
+    assert law.corners == pytest.approx([0.06], rel=1e-11)
+    for place in (0.02, 0.0599, 0.0601, 0.1):
+        alone = trace(net, Displacement("root", DOWN, np.array([place])), EXACT)
+        assert law.effort("", np.array([place]))[0] == pytest.approx(alone.effort[-1], abs=1e-12)
+
+
+def test_a_small_obstacle_is_not_stepped_over():
+    """The tip moves by 25 times its radius from one requested point to the next."""
+    net = cantilever(NodeOnObstacle("pin", "tip", circle((0.965, -0.3), 0.027)))
+    path = trace(net, Loading(TIP_LOAD, np.array([0.0, 4.0])), EXACT)
+    begin = path.contact_events[0]
+    assert begin.kind == "begins"
+    gap, _ = conditions(path)
+    assert gap.min() > -1e-11
+    free = trace(cantilever(), Loading(TIP_LOAD, np.array([begin.drive])), EXACT)
+    assert np.hypot(*(tip_of(free) - (0.965, -0.3))) == pytest.approx(0.027, abs=1e-9)
+
+
+def test_a_rigid_stop_on_the_driven_node_blocks_the_drive():
+    path = trace(cantilever(Stop("end", "tip", 0.1, DOWN)), Displacement("tip", DOWN, np.array([0.05, 0.2])), EXACT)
+    assert path.status is PathStatus.BLOCKED
+    assert path.message == "the drive is blocked by stop 'end' at 0.1"
+    assert path.drive[-1] == pytest.approx(0.1, rel=1e-12)
+    assert path.stable.all()
+
+
+def test_an_elastic_stop_on_the_driven_node_adds_its_force():
+    net = cantilever(Stop("end", "tip", 0.1, DOWN, stiffness=50.0))
+    path = trace(net, Displacement("tip", DOWN, np.array([0.05, 0.2])), EXACT)
+    free = trace(cantilever(), Displacement("tip", DOWN, np.array([0.05, 0.2])), EXACT)
+    assert path.effort[-1] == pytest.approx(free.effort[-1] + 50.0 * 0.1, rel=1e-10)
+    assert path.contact_force(0)[-1] == pytest.approx(5.0, rel=1e-12)
+
+
+def test_a_contact_that_ends_into_a_snap_is_a_limit_point_and_is_followed_by_the_arc_length():
+    """An oblique stop pushes the tip outwards until it slips off."""
+    net = cantilever(Stop("s", "tip", 0.184, -1.39, stiffness=3200.0), nodes=3)
+    drive = Displacement("tip", DOWN, np.linspace(0.0, 0.4, 9))
+    ended = trace(net, drive, EXACT)
+    assert ended.status is PathStatus.LIMIT_POINT
+    assert "stop 's' ends" in ended.message
+    assert ended.stable.all()
+    whole = trace(net, drive, replace(EXACT, through_folds=True, largest_turn=0.07))
+    kinks = [event for event in whole.events if event.kind == "limit point"]
+    assert kinks[0].drive == pytest.approx(ended.contact_events[-1].drive, rel=1e-9)
+    assert (kinks[0].before, kinks[0].after) == (0, 1)
+    assert whole.unstable[-1] == 1
+    gap, force = conditions(whole)
+    assert gap.min() > -1e-9
+    assert force.min() > -1e-9 * force.max()
+
+
+def test_a_contact_that_is_never_reached_changes_nothing():
+    drive = Displacement("tip", DOWN, np.linspace(0.0, 0.3, 7))
+    far = trace(cantilever(Stop("s", "tip", 5.0, DOWN)), drive, EXACT)
+    assert far.effort == pytest.approx(trace(cantilever(), drive, EXACT).effort, rel=1e-13, abs=1e-13)
+
+
+def test_a_mirrored_mechanism_gives_the_mirrored_curve():
+    def path(sense):
+        disc = NodeOnObstacle("d", "tip", circle((0.97, -0.3 * sense), 0.1), 0.02)
+        return trace(
+            cantilever(disc), Loading((PointLoad("tip", 0.0, -sense),), np.linspace(0, 3, 7)), EXACT
+        )  # fmt: skip
+
+    one, other = path(1.0), path(-1.0)
+    assert one.contact_force(0) == pytest.approx(other.contact_force(0), rel=1e-9, abs=1e-12)
+    assert one.motion("tip")[:, 1] == pytest.approx(-other.motion("tip")[:, 1], rel=1e-9, abs=1e-12)
+
+
+def test_a_constant_load_may_close_a_contact_before_the_drive_moves():
+    net = replace(cantilever(Stop("s", "mid", 0.05, DOWN), nodes=3), loads=(PointLoad("tip", 0.0, -2.0),))
+    path = trace(net, Loading((PointLoad("tip", 1.0),), np.array([0.0, 1e-6])), EXACT)
+    assert path.contact_force(0)[0] == pytest.approx(3.550103312597306, rel=1e-9)
+
+
+def test_the_tangent_with_contacts_is_the_derivative_of_the_residual():
+    net = cantilever(
+        Stop("s", "mid", 0.05, DOWN), NodeOnObstacle("d", "tip", circle((1.0, -0.3), 0.1), 0.05, stiffness=30.0),
+        Stop("r", "tip", 0.2, None, -1.0), nodes=3,
+    )  # fmt: skip
+    own = equations(discretise(net, Loading(TIP_LOAD, np.array([1.0]))))
+    free = 0.1 * np.random.default_rng(0).normal(size=own.n)
+    free[-3:] = 0.3, 0.4, 0.5
+    at, step = own.linearise(free, 0.7), 1e-6
+    sides = [own.linearise(free + step * unit, 0.7).residual - own.linearise(free - step * unit, 0.7).residual
+             for unit in np.eye(own.n)]  # fmt: skip
+    assert np.array(sides).T / (2 * step) == pytest.approx(at.tangent, abs=1e-8)
+    assert at.tangent == pytest.approx(at.tangent.T, abs=1e-13)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_distance_from_a_polyline_has_its_derivatives(closed):
+    points = [(0.0, 0.0), (1.0, 0.0), (1.0, -1.0), (2.0, -1.0), (2.0, -2.0)]
+    outline = polyline([*points, (0.0, -2.0)] if closed else points, 0.2, closed)
+    rng, step = np.random.default_rng(3), 1e-6
+    for place in rng.uniform((-0.5, -1.5), (2.5, 0.5), (60, 2)):
+        found = outline.distance(place)
+        if found.value < 0.02:  # inside, where two sides may be equally near
+            continue
+        slope = [
+            (outline.distance(place + step * unit).value - outline.distance(place - step * unit).value) / (2 * step)
+            for unit in np.eye(2)
+        ]
+        if abs(np.hypot(*slope) - 1) < 1e-6:  # not where two parts are equally near
+            assert found.normal == pytest.approx(slope, abs=1e-8)
+        foot = place - found.value * found.normal
+        assert abs(outline.distance(foot).value) < 1e-12
