@@ -13,8 +13,8 @@ from cfmkit.documents.document import (
     Document,
     GridColumn,
     Note,
+    PageTable,
     Span,
-    Table,
     Written,
 )
 from cfmkit.errors import ExitCode, visible
@@ -52,17 +52,17 @@ def document_of(
         exit_code=code,
         title=message(entries),
         summary=f"{reused} reused" if reused else "",
-        tables=(Table("", columns, tuple(_row(one) for one in entries)), *_warnings(entries)),
+        tables=(PageTable("", columns, tuple(_row(one) for one in entries)), *_warnings(entries)),
         notes=(*_missed(entries), *(_changes(compared) if compared else ())),
         files=files,
     )
 
 
-def _warnings(entries: Sequence[Entry]) -> Iterator[Table]:
+def _warnings(entries: Sequence[Entry]) -> Iterator[PageTable]:
     """Yield the warnings of all specifications, which a short page only counts."""
     rows = tuple((visible(one.spec), item["name"], item["message"]) for one in entries for item in one.warnings)
     if rows:
-        yield Table("warnings", (GridColumn(wraps=False), GridColumn(wraps=False), GridColumn()), rows, 0)
+        yield PageTable("warnings", (GridColumn(wraps=False), GridColumn(wraps=False), GridColumn()), rows, 0)
 
 
 def _missed(entries: Sequence[Entry]) -> Iterator[Note]:

@@ -186,7 +186,7 @@ def _quoted(word: str) -> str:
     return f"$'{visible(escaped)}'"
 
 
-class Row(NamedTuple):
+class ValueRow(NamedTuple):
     """One value of a result, with the bound that it has to keep if there is one."""
 
     label: str
@@ -202,7 +202,7 @@ class Row(NamedTuple):
         return self.ok is not None
 
 
-class Table(NamedTuple):
+class PageTable(NamedTuple):
     """Records under a heading."""
 
     heading: str
@@ -248,9 +248,9 @@ class Document:
     title: str = ""  # of what it is
     summary: str = ""  # its main value and window, behind the title
     verdict: str = ""  # in a few words
-    headline: tuple[Row, ...] = ()  # requirements first, then what matters most
-    metrics: tuple[Row, ...] = ()  # all values
-    tables: tuple[Table, ...] = ()
+    headline: tuple[ValueRow, ...] = ()  # requirements first, then what matters most
+    metrics: tuple[ValueRow, ...] = ()  # all values
+    tables: tuple[PageTable, ...] = ()
     notes: tuple[Note, ...] = ()
     warnings: tuple[WarningEntry, ...] = ()
     figures: Mapping[str, Callable[[], Figure]] = attribute(default_factory=dict)

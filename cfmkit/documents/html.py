@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.documents.document import Document, Table
+    from cfmkit.documents.document import Document, PageTable
 
 NAME = "report.html"
 
@@ -31,7 +31,7 @@ def page(
     subject: str = "",
     command: str = "",
     texts: Sequence[tuple[str, str]] = (),
-    metrics: Table | None = None,
+    metrics: PageTable | None = None,
     **more: Any,
 ) -> bytes:
     """Return the page of a document; the same document gives the same bytes.
@@ -48,7 +48,7 @@ def page(
         How it was started, for whoever wants to repeat it.
     texts : sequence of (str, str)
         Texts that are folded under a heading.
-    metrics : Table, optional
+    metrics : PageTable, optional
         Every metric, folded.
     **more
         What the template knows besides: `film`, `points`, `script`, `references`, `bibtex`, `versions`.

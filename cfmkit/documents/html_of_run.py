@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.documents import html
-from cfmkit.documents.document import GridColumn, Table
+from cfmkit.documents.document import GridColumn, PageTable
 from cfmkit.documents.html import NAME, escaped_json, part, references_of
 from cfmkit.documents.run_document import document_of
 from cfmkit.families import family
@@ -64,7 +64,7 @@ def page(
     )
 
 
-def _metrics(report: Report) -> Table | None:
+def _metrics(report: Report) -> PageTable | None:
     """Return one row for each metric, with a column for each branch; those without a value say why."""
     if not report.metrics:
         return None
@@ -78,7 +78,7 @@ def _metrics(report: Report) -> Table | None:
         values = [_value(worst), *("" if one is None else _value(one) for one in each)]
         rows.append((name, *values, worst.definition))
     heads = ("metric", "worst" if several else "value", *several, "what it is")
-    return Table("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
+    return PageTable("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
 
 
 def _value(quantity: Quantity) -> str:

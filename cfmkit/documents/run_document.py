@@ -10,7 +10,7 @@ from cfmkit.documents.document import (
     SHORT,
     Document,
     Note,
-    Row,
+    ValueRow,
     WarningEntry,
     Written,
     command_line,
@@ -218,7 +218,7 @@ def _summary(report: Report) -> str:
 # --- values -----------------------------------------------------------------------------------------------------------
 
 
-def headline_of(report: Report) -> tuple[Row, ...]:
+def headline_of(report: Report) -> tuple[ValueRow, ...]:
     """Return requirements with their verdicts, then what matters most of the family; nothing without a curve."""
     if not report.result.status.usable:
         return ()
@@ -228,7 +228,7 @@ def headline_of(report: Report) -> tuple[Row, ...]:
     return (*required, *_facts(report))
 
 
-def metrics_of(report: Report) -> tuple[Row, ...]:
+def metrics_of(report: Report) -> tuple[ValueRow, ...]:
     """Return every metric that has a value, by branch where branches differ."""
     if not report.result.status.usable:
         return ()
@@ -236,7 +236,7 @@ def metrics_of(report: Report) -> tuple[Row, ...]:
     names += [name for name in report.metrics if "[" in name and split_name(name)[0] not in report.metrics]
     window = left_of(window_of(report.result), report.result)
     return tuple(
-        Row(
+        ValueRow(
             words(name),
             branches(report, name, report.metrics) + _remark(report, name),
             window=_over(report, name, window),
@@ -246,7 +246,7 @@ def metrics_of(report: Report) -> tuple[Row, ...]:
     )
 
 
-def _facts(report: Report) -> Iterator[Row]:
+def _facts(report: Report) -> Iterator[ValueRow]:
     """Yield what is not required and matters most: stress and size, then what the family leads with."""
     spec = report.result.spec
     known = {split_name(outcome.metric)[0] for outcome in report.requirements}
@@ -264,10 +264,10 @@ def _facts(report: Report) -> Iterator[Row]:
         if name not in known and _has_value(report, name):
             text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
             about = report.metrics[name].definition
-            yield Row(LABELS.get(name, words(name)), text + _remark(report, name), about=about)
+            yield ValueRow(LABELS.get(name, words(name)), text + _remark(report, name), about=about)
 
 
-def _stress(report: Report, known: set[str]) -> Row | None:
+def _stress(report: Report, known: set[str]) -> ValueRow | None:
     """Return the largest stress beside what is allowed, with the safety factor where no requirement says it."""
     if not _has_value(report, "stress_max") or "stress_max" in known:
         return None
@@ -278,17 +278,17 @@ def _stress(report: Report, known: set[str]) -> Row | None:
         factor = report.metrics["safety_factor"].value or 0.0
         text += f", safety {factor:.3g}" + _overrated(report)
         text += " (little margin)" if 1.0 <= factor < LITTLE_MARGIN else ""
-    return Row("stress", text, about=report.metrics["stress_max"].definition)
+    return ValueRow("stress", text, about=report.metrics["stress_max"].definition)
 
 
-def _size(report: Report) -> Row | None:
+def _size(report: Report) -> ValueRow | None:
     """Return the box that the mechanism stays in, and of how many parts it is."""
     space = family(report.result.spec.family).envelope(report.result)
     if space is None:
         return None
     sides = " x ".join(f"{1e3 * side:.3g}" for side in space.sides if side is not None)
     parts = f", {space.parts} parts" if space.parts > 1 else ""
-    return Row("size", f"{sides} mm{parts}", about="the box that everything stays in over the travel")
+    return ValueRow("size", f"{sides} mm{parts}", about="the box that everything stays in over the travel")
 
 
 def _has_value(report: Report, name: str) -> bool:
@@ -359,7 +359,7 @@ def _over(report: Report, name: str, window: Window | None) -> str:
     return span(window.lo, window.hi, curve.motion_dimension) if split_name(name)[0] in windowed else ""
 
 
-def _required(report: Report, requirement: Requirement, outcome: Outcome) -> Row:
+def _required(report: Report, requirement: Requirement, outcome: Outcome) -> ValueRow:
     base, branch = split_name(outcome.metric)
     label = LABELS[base] + (f" on {branch}" if branch else "") if base in LABELS else words(outcome.metric)
     over = Window(*outcome.over) if outcome.over else None
@@ -368,13 +368,13 @@ def _required(report: Report, requirement: Requirement, outcome: Outcome) -> Row
     about = outcome.sentence
     if outcome.value is None:
         reason = outcome.sentence.partition("no value (")[2].rpartition("), ")[0]
-        return Row(label, f"no value: {reason}", bound, False, about=about)
+        return ValueRow(label, f"no value: {reason}", bound, False, about=about)
     if outcome.ok:
         digits = 3 if outcome.metric in OF_MANY_PARTS else 4
-        return Row(label, format_short(outcome.value, outcome.dimension, digits), bound, True, apart, about)
+        return ValueRow(label, format_short(outcome.value, outcome.dimension, digits), bound, True, apart, about)
     # the sentence rounds so that the value stays on its side of the bound
     missed = outcome.sentence.rpartition(", ")[0].removeprefix(words(outcome.metric)).strip()
-    return Row(label, missed.partition(" over ")[0], bound, False, apart, about)
+    return ValueRow(label, missed.partition(" over ")[0], bound, False, apart, about)
 
 
 def _is_title(report: Report, window: Window) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING
 
-from cfmkit.documents.document import BAD, Document, GridColumn, Note, Row, Table, Written, spaced
+from cfmkit.documents.document import BAD, Document, GridColumn, Note, PageTable, ValueRow, Written, spaced
 from cfmkit.documents.run_document import warning_of
 from cfmkit.studies.sensitivity.output import by_interval, exit_code, message, warnings, yield_ok
 
@@ -76,15 +76,15 @@ def _notes(found: Findings) -> Iterator[Note]:
         yield Note("first", found.evaluator.first_failure)
 
 
-def _yields(found: Findings) -> Iterator[Row]:
+def _yields(found: Findings) -> Iterator[ValueRow]:
     if found.all_met is None:
         return
     wanted = found.setup.block.min_yield
     bound = "" if wanted is None else f">= {100 * wanted:.4g} %" + (" (in the interval)" if by_interval(found) else "")
-    yield Row("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
+    yield ValueRow("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
     for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
         limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
-        yield Row(spaced(outcome.metric), f"{share_of(one)}  {limits}")
+        yield ValueRow(spaced(outcome.metric), f"{share_of(one)}  {limits}")
 
 
 def share_of(one: Share) -> str:
@@ -97,12 +97,12 @@ def share_of(one: Share) -> str:
     return f"{value} (95 %: {low} to {high} %)"
 
 
-def _rankings(found: Findings) -> Iterator[Table]:
+def _rankings(found: Findings) -> Iterator[PageTable]:
     for metric, each in _by_metric(found).items():
         indices = [name for name in INDICES[found.setup.method] if any(name in lines for lines in each.values())]
         heads = (GridColumn(spaced(metric)), *(GridColumn(spaced(name), wraps=False) for name in indices))
         rows = tuple((parameter, *(_index(lines.get(name)) for name in indices)) for parameter, lines in each.items())
-        yield Table("", heads, rows, MAX_PARAMETERS)
+        yield PageTable("", heads, rows, MAX_PARAMETERS)
 
 
 def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:

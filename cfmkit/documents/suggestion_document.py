@@ -11,8 +11,8 @@ from cfmkit.documents.document import (
     Document,
     GridColumn,
     Note,
+    PageTable,
     Span,
-    Table,
     WarningEntry,
     Written,
     command_line,
@@ -64,7 +64,7 @@ def _next(found: Sequence[Mapping[str, Any]], files: Written) -> str:
     return command_line("cfmkit", "export", str(Path(files.folder) / found[0]["folder"] / "design.yaml"))
 
 
-def _tables(record: Mapping[str, Any]) -> Iterator[Table]:
+def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
     more = _shares(record)
     heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
     proposals, unjudged = record["proposals"], record["unjudged"]
@@ -77,15 +77,15 @@ def _tables(record: Mapping[str, Any]) -> Iterator[Table]:
             for number, one in enumerate(listed, first)
         )
         if rows:
-            yield Table(heading, heads, rows)
+            yield PageTable(heading, heads, rows)
     pair = (GridColumn("", False), GridColumn())
     near = tuple((one["family"], f"{one['variant']}: {one['misses'][0]}") for one in record["near_misses"])
     if near:
-        yield Table("near misses: one unmet requirement", pair, near)
+        yield PageTable("near misses: one unmet requirement", pair, near)
     named = {one["family"] for one in (*proposals, *unjudged)}
     silent = tuple(_silent(one) for one in record["families"] if one["family"] not in named)
     if silent:
-        yield Table("no proposals from these families", pair, silent)
+        yield PageTable("no proposals from these families", pair, silent)
 
 
 def _remarks(found: Sequence[Mapping[str, Any]]) -> Iterator[Note]:

@@ -9,8 +9,8 @@ from cfmkit.documents.document import (
     Document,
     GridColumn,
     Note,
-    Row,
-    Table,
+    PageTable,
+    ValueRow,
     WarningEntry,
     Written,
     shortened_to_clause,
@@ -66,7 +66,7 @@ def document_of(
         verdict=_verdict(summary, code),
         headline=(
             *(
-                Row(spaced(one["metric"]), f"met at {one['met']} of {one['of']}", within(one), bool(one["ok"]))
+                ValueRow(spaced(one["metric"]), f"met at {one['met']} of {one['of']}", within(one), bool(one["ok"]))
                 for one in summary["requirements"]
             ),
             *_best(summary, dimensions),
@@ -97,17 +97,17 @@ def _settings(summary: Mapping[str, Any]) -> Iterator[Note]:
         yield Note("best", " ".join(f"--set {setting}" for setting in settings), whole=True)
 
 
-def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[Row]:
+def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[ValueRow]:
     best = summary["best"]
     if not best:
         return
     metric = summary["metrics"][best["by"]]
     value = _quantity(metric["value"], metric["unit"], dimensions.get(best["by"], ""))
     tie = f" ({best['ties']} tie)" if best["ties"] > 1 else ""
-    yield Row(f"{best['sense']} {spaced(best['by'])}", f"{value}, point {best['point']}{tie}")
+    yield ValueRow(f"{best['sense']} {spaced(best['by'])}", f"{value}, point {best['point']}{tie}")
 
 
-def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[Table]:
+def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
     """Yield the range of every result, beside its value at the best point; what does not change comes last."""
     leading: list[tuple[str, ...]] = []
     rows: list[tuple[str, ...]] = []
@@ -127,10 +127,10 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
         (leading if name in (*first, *asked) else others).append(row)
     if leading or rows:
         columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in ("from", "to", "best point")))
-        yield Table("", columns, (*leading, *rows), MAX_RANGES)
+        yield PageTable("", columns, (*leading, *rows), MAX_RANGES)
     if constant:
         columns = (GridColumn("no influence on"), GridColumn("value", wraps=False))
-        yield Table("Results without influence", columns, tuple(row[:2] for row in constant), 0)
+        yield PageTable("Results without influence", columns, tuple(row[:2] for row in constant), 0)
 
 
 def _quantity(value: float | str, unit: str, dimension: str) -> str:

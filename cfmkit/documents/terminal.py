@@ -23,11 +23,11 @@ from cfmkit.documents.document import (
     CellGrid,
     GridColumn,
     JsonText,
+    PageTable,
     Paragraph,
-    Row,
     Span,
-    Table,
     TextLine,
+    ValueRow,
     Verbatim,
     WarningEntry,
     Written,
@@ -119,7 +119,7 @@ def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine
     yield from (*tables, *notes, *warnings, *follow)
 
 
-def _most_of_headline(rows: Sequence[Row]) -> int:
+def _most_of_headline(rows: Sequence[ValueRow]) -> int:
     """Return how many lines are kept for the headline where warnings would need them."""
     required = sum(row.required for row in rows)
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
@@ -163,14 +163,14 @@ def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> l
     return lines
 
 
-def _headline(rows: Sequence[Row], width: int, most: int) -> Iterator[TextLine]:
+def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextLine]:
     """Yield requirements beside what else matters; below each other where the page is narrow."""
     required, facts = [row for row in rows if row.required], [row for row in rows if not row.required]
     most = max(most, 1)
     if len(required) > most:  # those that are missed first
         required.sort(key=lambda row: row.ok is True)
         more = len(required) - most + 1
-        required, facts = required[: most - 1], [Row("", f"and {more} more requirements (-v)"), *facts]
+        required, facts = required[: most - 1], [ValueRow("", f"and {more} more requirements (-v)"), *facts]
     if not required:
         half = min(most, -(-len(facts) // 2))
         required, facts = facts[:half], facts[half:]
@@ -197,7 +197,7 @@ def _headline(rows: Sequence[Row], width: int, most: int) -> Iterator[TextLine]:
         yield whole_line(*texts, *([Span(pad), *right[at]] if at < len(right) else []))
 
 
-def _cells(rows: Sequence[Row], width: int) -> list[tuple[Span, ...]]:
+def _cells(rows: Sequence[ValueRow], width: int) -> list[tuple[Span, ...]]:
     """Return rows as spans: label, value with its window, bound and verdict, in columns."""
     texts = [_value(row) for row in rows]
     label = max([WORDS, *(len(row.label) + 2 for row in rows)])
@@ -216,7 +216,7 @@ def _cells(rows: Sequence[Row], width: int) -> list[tuple[Span, ...]]:
     return lines
 
 
-def _value(row: Row) -> str:
+def _value(row: ValueRow) -> str:
     return f"{row.value} over {row.window}" if row.window else row.value
 
 
@@ -224,7 +224,7 @@ def _wide(lines: Iterable[Sequence[Span]]) -> int:
     return max([0, *(sum(len(one.text) for one in spans) for spans in lines)])
 
 
-def _table_lines(table: Table, width: int) -> list[TextLine | CellGrid]:
+def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     """Return a table as lines: as many rows as a short page has of it, each as wide as the page."""
     rows = table.rows if table.most is None else table.rows[: table.most]
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
@@ -265,7 +265,7 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
     return [whole_line(_word("files", GOOD), text, Span(more, FAINT))]
 
 
-def _grid(table: Table, rows: Sequence[Sequence[str | Span]]) -> CellGrid:
+def _grid(table: PageTable, rows: Sequence[Sequence[str | Span]]) -> CellGrid:
     return CellGrid(table.columns, rows, gap=2, indented=True)
 
 

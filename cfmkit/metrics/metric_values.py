@@ -26,7 +26,7 @@ from cfmkit.metrics.metric_definitions import (
 )
 from cfmkit.metrics.usable_interval_of_all_branches import Cycle, cycle
 from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
-from cfmkit.specs.units import Share, between
+from cfmkit.specs.units import TravelShare, between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -219,7 +219,7 @@ def window_of(result: Result, over: Ends | None = None) -> Window | None:
     # a family need not have this block, and no family is named here
     ends = over if over is not None else getattr(getattr(result.spec, "analysis", None), "window", None)
     travel = travel_of(result)
-    if ends is None or (travel is None and any(isinstance(end, Share) for end in ends)):
+    if ends is None or (travel is None and any(isinstance(end, TravelShare) for end in ends)):
         return None
     return Window(*between(ends, travel or (0.0, 0.0)))
 

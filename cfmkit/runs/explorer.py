@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.specs.yamlio import Document
+    from cfmkit.specs.yamlio import YamlDocument
 
 
 LEFT_OUT = ("cfmkit", "family", "name", "description", "design", "sweep", "sensitivity")
@@ -78,7 +78,7 @@ class Explorer:
     """A specification to be explored."""
 
     source: str  # the file
-    document: Document  # what it says
+    document: YamlDocument  # what it says
     folder: Path = field(init=False)  # that of the file; what the page saves is written there, and nowhere else
 
     def __post_init__(self) -> None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.errors import Problem
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.specs.yamlio import Document
+    from cfmkit.specs.yamlio import YamlDocument
     from cfmkit.store import Manifest
     from cfmkit.studies.journal import Journal
     from cfmkit.tables import Table
@@ -174,7 +174,7 @@ def spec_of(wanted: RunRequest) -> Spec:
     return read(wanted)[1]
 
 
-def read(wanted: RunRequest) -> tuple[Document, Spec]:
+def read(wanted: RunRequest) -> tuple[YamlDocument, Spec]:
     """Return the document that is meant, with what is changed in it, and the checked specification."""
     document = _document(wanted)
     try:
@@ -184,7 +184,7 @@ def read(wanted: RunRequest) -> tuple[Document, Spec]:
 
 
 @contextmanager
-def placing(document: Document, options: Collection[str] = ()) -> Iterator[None]:
+def placing(document: YamlDocument, options: Collection[str] = ()) -> Iterator[None]:
     """Add the place in the file to errors raised inside the block: a model knows only the path.
 
     `options` are paths that options of the command have set: what is wrong there has no place in the file.
@@ -195,13 +195,13 @@ def placing(document: Document, options: Collection[str] = ()) -> Iterator[None]
         raise SpecError([_placed(document, one, options) for one in error.problems]) from None
 
 
-def _placed(document: Document, one: Problem, options: Collection[str]) -> Problem:
+def _placed(document: YamlDocument, one: Problem, options: Collection[str]) -> Problem:
     if one.source or any(f"{one.path}.".startswith(f"{path}.") for path in options):
         return one
     return document.problem(one.path, one.message)
 
 
-def _document(wanted: RunRequest) -> Document:
+def _document(wanted: RunRequest) -> YamlDocument:
     if wanted.fidelity is not None and not wanted.fidelity.strip():
         raise UsageError("--fidelity is empty; `cfmkit show FAMILY` lists the models")
     return read_spec(wanted.spec, _changes(wanted), getattr(wanted, "of_many", False))
@@ -212,7 +212,7 @@ def _changes(wanted: RunRequest) -> tuple[str, ...]:
     return (*wanted.changes, *([] if wanted.fidelity is None else [f"analysis.fidelity={wanted.fidelity}"]))
 
 
-def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
+def _computed(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:
     with placing(document):
         found = verb.compute(spec, run)
     if found.result.status is Status.INVALID:
@@ -220,7 +220,7 @@ def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
     return found
 
 
-def _options_judged(found: Report, given: Spec, document: Document) -> Report:
+def _options_judged(found: Report, given: Spec, document: YamlDocument) -> Report:
     """Return a report that warns of values of ``--set`` that a design has replaced."""
     made = found.design.spec if found.design else None
     if made is None:

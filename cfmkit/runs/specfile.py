@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Family
     from cfmkit.specs.spec import Requirement, Spec
-    from cfmkit.specs.yamlio import Document
+    from cfmkit.specs.yamlio import YamlDocument
 
 STDIN = "-"
 
 
-def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> Document:
+def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> YamlDocument:
     """Return what a file says, changed by options such as ``a.b=1 mm``; nothing is checked yet.
 
     Parameters
@@ -47,7 +47,7 @@ def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> 
     return changed(read_document(content(name), name, Path(name).absolute().parent), changes, of_many)
 
 
-def changed(document: Document, changes: Iterable[str], of_many: bool = False) -> Document:
+def changed(document: YamlDocument, changes: Iterable[str], of_many: bool = False) -> YamlDocument:
     """Return a document with options applied in their order.
 
     An option for another family is skipped where there are many specifications, and refused where there is only one.
@@ -97,7 +97,7 @@ _FAMILY = re.compile("[A-Za-z][A-Za-z0-9_-]*")
 """What may stand before the colon of an option for one family; a path with a colon has dots or quotes before it."""
 
 
-def _family_of(document: Document) -> str | None:
+def _family_of(document: YamlDocument) -> str | None:
     named = document.tree.get("family") if isinstance(document.tree, dict) else None
     return named if isinstance(named, str) else None
 
@@ -140,7 +140,7 @@ def content(name: str) -> bytes:
         raise UsageError(f"{visible(name)} cannot be read: {reason_of(error)}") from None
 
 
-def bind(document: Document) -> Spec:
+def bind(document: YamlDocument) -> Spec:
     """Return the checked specification of the family that it names.
 
     Raises
@@ -173,7 +173,7 @@ def _known(named: str | None) -> Sequence[str]:
     return (named,) if named in families.clashing() else families.names()
 
 
-def _family_record(document: Document) -> Family:
+def _family_record(document: YamlDocument) -> Family:
     """Return the family that a document names; one that cannot be used is a problem at that place."""
     from cfmkit import families
 
@@ -184,7 +184,7 @@ def _family_record(document: Document) -> Family:
 
 
 def _requirement_faults(
-    document: Document, family: Family, requirements: Iterable[tuple[int, Requirement]]
+    document: YamlDocument, family: Family, requirements: Iterable[tuple[int, Requirement]]
 ) -> Iterator[Problem]:
     """Yield what is wrong with metric names, bounds and windows, each with its place in the file."""
     from cfmkit.metrics import known_metrics, requirement_problems, values_of_family
@@ -196,7 +196,7 @@ def _requirement_faults(
             yield placed(document, f"requirements.{index}.{key}", problem.message)
 
 
-def _sweep_faults(document: Document, spec: Spec) -> Iterator[Problem]:
+def _sweep_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with paths and values of the block `sweep`, each with its place in the file."""
     if spec.sweep is None:
         return
@@ -207,7 +207,7 @@ def _sweep_faults(document: Document, spec: Spec) -> Iterator[Problem]:
         yield document.problem(("sweep", "vary", wish.path), message)
 
 
-def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
+def _sensitivity_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with parameters and groups of the block `sensitivity`, each with its place in the file."""
     if spec.sensitivity is None:
         return
@@ -217,7 +217,7 @@ def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
         yield document.problem(path, message)
 
 
-def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
+def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with the tolerances of the block `design`, each with its place in the file."""
     from cfmkit.specs.spec import DesignKeys
     from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
@@ -236,7 +236,7 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
         yield document.problem(("requirements", index, "metric"), f"{one.metric!r} {lacking}")
 
 
-def placed(document: Document, path: str, message: str) -> Problem:
+def placed(document: YamlDocument, path: str, message: str) -> Problem:
     """Return a problem with the place of a path in the file, or the option that set it."""
     line, column = document.place(path)
     return Problem(document.source if line else "--set", line, column, path, message)

@@ -15,7 +15,7 @@ from cfmkit.metrics.branches_cut_to_window import TOLERANCE
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.metrics.requirements import Bounds
-from cfmkit.specs.units import Share, between
+from cfmkit.specs.units import TravelShare, between
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ class SolvedVariants:
 def _between(ends: Ends, start: FloatArray, stop: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Return a window of all in places, (m,) each; None where it has no width for one of them."""
     places = [
-        start + float(end) * (stop - start) if isinstance(end, Share) else np.full(len(start), float(end))
+        start + float(end) * (stop - start) if isinstance(end, TravelShare) else np.full(len(start), float(end))
         for end in ends
     ]
     low, high = np.minimum(*places), np.maximum(*places)

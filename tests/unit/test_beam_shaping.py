@@ -28,7 +28,7 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     strict_share,
     tolerated,
 )
-from cfmkit.families.beam.shaping.sqp_program import Compared, Flattest, Shaping, Widest
+from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
 from cfmkit.families.run_control import Run
@@ -70,7 +70,7 @@ ALL = TaskLimits(
 
 
 @pytest.mark.parametrize("fidelity", ["inextensible", "reissner"])
-@pytest.mark.parametrize("goal", [Flattest(), Widest(13.6e-3, 0.025), Compared()])
+@pytest.mark.parametrize("goal", [Flattest(), Widest(13.6e-3, 0.025), ForceRatio()])
 def test_derivatives_of_objective_and_all_limits_are_those_of_differences(goal: Any, fidelity: str) -> None:
     """Derivatives of the limits by the start of the window are left out on purpose: it is held here."""
     spec = load("configs/beam_design_lan.yaml", [f"analysis.fidelity={fidelity}"])
@@ -317,7 +317,7 @@ def test_lines_cross_but_not_in_the_joint_where_they_end() -> None:
 def test_the_objective_of_the_paper_falls_without_the_force_getting_flatter() -> None:
     """[Lan, eq. 1] is F(a)/F(b) - 1: nothing keeps it from going below zero, where the force falls from b to a."""
     task = lan("paper", (8.8e-3, 4e-3))
-    program = Shaping(Variables(task, 2), 6.8e-3, Compared())
+    program = Shaping(Variables(task, 2), 6.8e-3, ForceRatio())
     assert program.values(program.begin(table_3(task)))[0] == pytest.approx(0.30214615, abs=2e-5)
     # a search from their result itself may end in a local optimum: from shapes that are bent 1 % less, or more
     shapes = np.arange(len(table_3(task))) >= len(task.coordinates)

@@ -15,8 +15,8 @@ from cfmkit.documents.document import (
     JsonText,
     Note,
     Paragraph,
-    Row,
     Span,
+    ValueRow,
     Verbatim,
     WarningEntry,
     Written,
@@ -100,8 +100,8 @@ def many(count, **more):
         summary="20.1 N over 10 mm (2.3 to 12.3 mm)",
         verdict=f"all {count} requirements met",
         headline=(
-            *(Row(f"metric {k}", "1.234 %", "<= 5 %", True) for k in range(count)),
-            *(Row(f"fact {k}", "12.34 mm (1.2 to 12.3 mm)") for k in range(9)),
+            *(ValueRow(f"metric {k}", "1.234 %", "<= 5 %", True) for k in range(count)),
+            *(ValueRow(f"fact {k}", "12.34 mm (1.2 to 12.3 mm)") for k in range(9)),
         ),
         notes=(Note("yield", "about 14 % of parts would meet the requirements: " + 30 * "word " + "end"),),
         warnings=tuple(

@@ -14,7 +14,7 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import analysed, designed
-from cfmkit.specs.units import Share as TravelShare
+from cfmkit.specs.units import TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
 from cfmkit.studies.parts.outcomes import analyze_parts

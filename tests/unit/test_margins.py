@@ -18,7 +18,7 @@ from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
 from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import model
 from cfmkit.families.vcfm.model import solve
-from cfmkit.specs.units import Share
+from cfmkit.specs.units import TravelShare
 from cfmkit.studies.parts import redesign
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.redesign import with_design_margins
@@ -56,8 +56,8 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     larger, smaller = np.array([5e-5]), np.array([-5e-5])
     assert part.are_good(np.empty(0), np.array([larger, smaller])).tolist() in ([False, True], [True, False])
     assert all(part(np.empty(0), one) is not None for one in (larger, smaller))
-    end = Share(1.0)
-    shares = tuple(one.model_copy(update={"over": (Share(0.02), end)}) for one in design.requirements[:2])
+    end = TravelShare(1.0)
+    shares = tuple(one.model_copy(update={"over": (TravelShare(0.02), end)}) for one in design.requirements[:2])
     part = replace(part, parts=replace(part.parts, spec=design.replace({"requirements": shares})))
     assert stated_places(part.parts.spec) == ()
     assert part.are_good(np.empty(0), np.array([larger, smaller])).all()

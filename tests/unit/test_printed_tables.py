@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cfmkit.documents.document import CellGrid, Document, GridColumn, Table
+from cfmkit.documents.document import CellGrid, Document, GridColumn, PageTable
 from cfmkit.documents.terminal import page as page_of
 from cfmkit.documents.terminal import printed
 
@@ -13,7 +13,7 @@ from cfmkit.documents.terminal import printed
 def test_no_number_is_cut_on_a_narrow_page(width):
     numbers = ["3.14159265358979", "2.71828182845905", "1.41421356237310", "1.61803398874989"]
     heads = (GridColumn("name", True), *(GridColumn(one, False) for one in "abcd"))
-    table = Document(title="t", tables=(Table("", heads, (("a row", *numbers),)),))
+    table = Document(title="t", tables=(PageTable("", heads, (("a row", *numbers),)),))
     for page in (
         printed([CellGrid(heads, [["a row", *numbers]])], width),
         printed(page_of(table, width), width),

@@ -26,7 +26,7 @@ from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
-from cfmkit.specs.units import Share
+from cfmkit.specs.units import TravelShare
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
@@ -79,7 +79,7 @@ def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_know
     one = made(ProposalJob("vcfm", coiled, asked, 0))
     assert one.passes, one.missed or one.message
     (life,) = (requirement for requirement in one.spec.requirements if requirement.metric == "fatigue_life")
-    assert list(life.over) == [Share(0.0), Share(1.0)]  # the whole press
+    assert list(life.over) == [TravelShare(0.0), TravelShare(1.0)]  # the whole press
     assert one.numbers["life"] is None
     assert one.unjudged == ("life not judged: no S-N data for the wire of its springs",)
     assert not one.good

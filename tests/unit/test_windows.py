@@ -9,7 +9,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import InputError, SpecError
 from cfmkit.results import WINDOW_OUTSIDE
-from cfmkit.specs.units import Place, Share, between
+from cfmkit.specs.units import Place, TravelShare, between
 
 # (specification, travel, a metric): one of every family and kind of motion
 FAMILIES = {
@@ -126,13 +126,13 @@ def test_a_share_is_written_as_it_was_given_and_read_back():
 
 
 def test_a_share_is_never_a_place_of_the_same_number():
-    assert Share(0.1) != Place(0.1)
-    assert Place(0.1) != Share(0.1)
-    assert Share(0.1) != 0.1
-    assert len({Share(0.1): 1, Place(0.1): 2}) == 2
+    assert TravelShare(0.1) != Place(0.1)
+    assert Place(0.1) != TravelShare(0.1)
+    assert TravelShare(0.1) != 0.1
+    assert len({TravelShare(0.1): 1, Place(0.1): 2}) == 2
 
 
 def test_the_travel_may_go_down_and_a_window_without_width_is_refused():
-    assert between((Share(0.1), Share(1.0)), (0.0, -0.02)) == (-0.02, -0.002)
+    assert between((TravelShare(0.1), TravelShare(1.0)), (0.0, -0.02)) == (-0.02, -0.002)
     with pytest.raises(InputError, match="150 mm and 100 % has no width"):
-        between((Place(0.15), Share(1.0)), (0.0, 0.15))
+        between((Place(0.15), TravelShare(1.0)), (0.0, 0.15))

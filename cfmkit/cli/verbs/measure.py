@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
-from cfmkit.documents.document import Document, GridColumn, Note, Table, Written
+from cfmkit.documents.document import Document, GridColumn, Note, PageTable, Written
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _document(
     )
 
 
-def _numbers(report: MeasureReport, heading: str) -> Table:
+def _numbers(report: MeasureReport, heading: str) -> PageTable:
     """Return the table of what matters most: per branch, raw and filtered."""
     from cfmkit.metrics.metric_definitions import words
 
@@ -143,7 +143,7 @@ def _numbers(report: MeasureReport, heading: str) -> Table:
     for name in _shown(report):
         raw, smooth = report.numbers.raw[name], report.numbers.filtered.get(name)
         rows.append((words(name), _short(raw), _short(smooth) if smooth else ""))
-    return Table(heading, tuple(GridColumn(head, wraps=not at) for at, head in enumerate(heads)), tuple(rows))
+    return PageTable(heading, tuple(GridColumn(head, wraps=not at) for at, head in enumerate(heads)), tuple(rows))
 
 
 def _shown(report: MeasureReport) -> list[str]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
-    from cfmkit.specs.yamlio import Document as SpecDocument
+    from cfmkit.specs.yamlio import YamlDocument
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
     from cfmkit.studies.sweep_request_and_files import SweepRequest
@@ -160,7 +160,7 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     return summary.exit_code()
 
 
-def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: SpecDocument) -> Iterator[str]:
+def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: YamlDocument) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
 
     if code is ExitCode.INVALID:
@@ -173,7 +173,7 @@ def _complaints(records: Records, code: ExitCode, options: SweepOptions, documen
         yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
 
 
-def _refusal(records: Records, document: SpecDocument) -> tuple[str, ...]:
+def _refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:
     """Return why the first point is invalid: the table has the message, and the file knows its place."""
     from cfmkit.runs.run import placing
 

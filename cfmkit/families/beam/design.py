@@ -25,7 +25,7 @@ from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.network_from_spec import thickest
 from cfmkit.families.beam.scalar_results import force_at_end, ranges
 from cfmkit.results import Design, Status
-from cfmkit.specs.units import Place, Share, format_short
+from cfmkit.specs.units import Place, TravelShare, format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ def _lengths(block: Any, names: tuple[str, ...], factor: float) -> Any:
 def _point(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
         return tuple(_point(one, factor) for one in value)
-    if isinstance(value, Share):  # of the travel, which is scaled itself
+    if isinstance(value, TravelShare):  # of the travel, which is scaled itself
         return value
     return Place(value * factor, value.dimension) if isinstance(value, Place) else value * factor
 

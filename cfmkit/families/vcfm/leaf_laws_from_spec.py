@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Parts:
+class LeafLaws:
     """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`laws_in_rows`)."""
 
     leaf: LeafLaw  # law of one half-beam of the snap-through structure
@@ -89,17 +89,17 @@ def closed_length(springs: BoughtSprings) -> float:
     return springs.body_length or (0.0 if springs.coil is None else springs.coil.body_length)
 
 
-def parts(spec: VcfmSpec) -> Parts:
+def parts(spec: VcfmSpec) -> LeafLaws:
     """Return the leaves of a specification with the laws that its fidelity asks for; those of `exact` are analytic."""
     mechanism = spec.mechanism
     bistable, leaf = mechanism.bistable, leaf_law(mechanism.bistable, mechanism.material)
     if mechanism.springs is not None:
-        return Parts(leaf, coils(mechanism.springs), bistable.half_beams)
+        return LeafLaws(leaf, coils(mechanism.springs), bistable.half_beams)
     positive = mechanism.flexures
     spring, truss = leaf_spring(positive, mechanism.material), (bistable.kind.truss, positive.kind.truss)
     if spec.analysis.fidelity == "truss" and truss[0] is not None and truss[1] is not None:
-        return Parts(truss[0](leaf.strip), truss[1](spring.strip, share_of(positive)), bistable.half_beams)
-    return Parts(leaf, spring, bistable.half_beams)
+        return LeafLaws(truss[0](leaf.strip), truss[1](spring.strip, share_of(positive)), bistable.half_beams)
+    return LeafLaws(leaf, spring, bistable.half_beams)
 
 
 def leaf_law(bistable: Bistable, made_of: MaterialSpec) -> LeafLaw:

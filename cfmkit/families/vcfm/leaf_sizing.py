@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, buckled_stress, critical_force, overrated
 from cfmkit.specs.units import format_short
-from cfmkit.specs.units.windows import Share
+from cfmkit.specs.units.windows import TravelShare
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,7 +45,7 @@ RESCALES = 4
 ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""
 CLOSE = 1e-6
-"""Share of the width that is left when sizes are found."""
+"""TravelShare of the width that is left when sizes are found."""
 PASSES, NEAR = 12, 1e-5
 """Of the exact model for a sheet, and how far its force may then be off: five passes are usual."""
 MOST_LEAVES = 1000
@@ -162,7 +162,7 @@ def completed(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], a
     if analysis.window is None:
         changes["analysis.window"] = inside
     if analysis.travel is None:
-        ends = [float(end) for end in analysis.window or () if not isinstance(end, Share)]
+        ends = [float(end) for end in analysis.window or () if not isinstance(end, TravelShare)]
         changes["analysis.travel"] = max([inside[1], *ends])
     if "requirements" not in spec.model_fields_set:
         allowed = f"{100.0 * flat:.6g} %"

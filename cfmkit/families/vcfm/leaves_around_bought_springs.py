@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import Parts, coils, room_of_coils
+from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, coils, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
     MIDDLE,
     NEAR,
@@ -278,7 +278,7 @@ def _in_use(spec: VcfmSpec, found: LeavesAroundSprings, offer: Offer) -> Iterato
     from cfmkit.families.vcfm.model import LawSampler, rest_of
 
     springs, end = found.springs, max(float(found.linear[1]), spec.analysis.travel or 0.0)
-    sampler = LawSampler(Parts(VBeam(found.leaf), coils(springs), found.half_beams))
+    sampler = LawSampler(LeafLaws(VBeam(found.leaf), coils(springs), found.half_beams))
     stated = "analysis" in spec.model_fields_set and "preloads" in spec.analysis.model_fields_set
     for preload in {*(spec.analysis.preloads if stated else (0.0,)), found.target.preload_stroke}:
         rest = rest_of(sampler, preload, np.linspace(0.0, end, 101)) or 0.0

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.curves_in_rows import PartSampler, Push
-    from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
+    from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
@@ -106,7 +106,7 @@ def travel_grid(spec: VcfmSpec) -> FloatArray:
     return np.asarray(spec.travel * (np.arange(spec.analysis.points) / (spec.analysis.points - 1.0)))
 
 
-def solve(spec: VcfmSpec, made: Parts, sampler: PartSampler) -> Solution:
+def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
     """Return the curves of one mechanism at all preloads by a model of leaves and spring.
 
     A preload at which the spring cannot be followed, or is closed, has no curve; a message says so.
@@ -309,7 +309,7 @@ def _curve(push: Push) -> Curve:
 class LawSampler:
     """Samples of closed forms: of one mechanism, or of one for each row (`laws_in_rows`)."""
 
-    parts: Parts
+    parts: LeafLaws
 
     problem = ""
     accuracy = ROUND_OFF

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.curves_in_rows import Characteristics, PartSampler, Rows
-    from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
+    from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.leaves.kinds import LeafKind
     from cfmkit.families.vcfm.spec import VcfmSpec
 
@@ -78,7 +78,7 @@ class Solution(ShortRepr):
     """Solved mechanisms that differ in numbers only: their specifications, their laws and all of their curves."""
 
     specs: tuple[VcfmSpec, ...]
-    parts: Parts  # of one mechanism with plain numbers, of several with columns (m, 1)
+    parts: LeafLaws  # of one mechanism with plain numbers, of several with columns (m, 1)
     curves: Rows
     preloads: int  # curves of each mechanism
 

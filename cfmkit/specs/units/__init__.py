@@ -56,7 +56,16 @@ from cfmkit.specs.units.quantities import (
 from cfmkit.specs.units.strict_decimal_number import read_number
 from cfmkit.specs.units.table import DIMENSIONS, UNITS, Dimension, border_factor, border_unit, from_border, to_border
 from cfmkit.specs.units.unit_size import unit_table
-from cfmkit.specs.units.windows import SHARE, Ends, Share, WindowEnd, between, dimension_of_end, ends_increase, place_of
+from cfmkit.specs.units.windows import (
+    SHARE,
+    Ends,
+    TravelShare,
+    WindowEnd,
+    between,
+    dimension_of_end,
+    ends_increase,
+    place_of,
+)
 
 __all__ = [
     "DIMENSIONS",
@@ -91,11 +100,11 @@ __all__ = [
     "RotationalDamping",
     "RotationalStiffness",
     "SecondMoment",
-    "Share",
     "Stiffness",
     "Stress",
     "Time",
     "Torque",
+    "TravelShare",
     "UnitField",
     "Velocity",
     "Volume",

@@ -16,12 +16,12 @@ SHARE = "ratio"
 """Dimension of an end of a window that is given as a share of the travel."""
 
 
-class Share(Place):
+class TravelShare(Place):
     """A part of the travel, from 0 at its start to 1 at its end; never equal to a place of the same number."""
 
     __slots__ = ()
 
-    def __new__(cls, value: float) -> Share:
+    def __new__(cls, value: float) -> TravelShare:
         """Return `value` as a share."""
         share = float.__new__(cls, value)
         share.dimension = SHARE
@@ -29,7 +29,7 @@ class Share(Place):
 
     def __eq__(self, other: object) -> bool:
         """Return whether the other is the same share."""
-        return isinstance(other, Share) and float(self) == float(other)
+        return isinstance(other, TravelShare) and float(self) == float(other)
 
     def __ne__(self, other: object) -> bool:
         """Return whether the other is anything else; that of floats would compare the numbers."""
@@ -39,13 +39,13 @@ class Share(Place):
         """Tell a share from a place of the same number."""
         return hash((SHARE, float(self)))
 
-    def __reduce__(self) -> tuple[type[Share], tuple[float]]:  # type: ignore[override]
+    def __reduce__(self) -> tuple[type[TravelShare], tuple[float]]:  # type: ignore[override]
         """Return what copying and pickling need."""
         return type(self), (float(self),)
 
     def __repr__(self) -> str:
-        """Return ``Share(0.01)``."""
-        return f"Share({float(self)!r})"
+        """Return ``TravelShare(0.01)``."""
+        return f"TravelShare({float(self)!r})"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class _WindowEnd(UnitField):
         return number, dimension
 
     def write(self, value: float) -> str:
-        return format_quantity(value, SHARE, "%") if isinstance(value, Share) else write_place(value)
+        return format_quantity(value, SHARE, "%") if isinstance(value, TravelShare) else write_place(value)
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         """Build the validator and the serialiser."""
@@ -76,7 +76,7 @@ class _WindowEnd(UnitField):
 
 def place_of(value: float, dimension: str) -> Place:
     """Return a number that knows what it is: a length, an angle, or with the dimension ``ratio`` a share."""
-    return Share(value) if dimension == SHARE else Place(value, dimension)
+    return TravelShare(value) if dimension == SHARE else Place(value, dimension)
 
 
 WindowEnd = Annotated[float, _WindowEnd((*PLACES, SHARE))]
@@ -111,11 +111,11 @@ def between(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
 
     Examples
     --------
-    >>> between((Share(0.25), Share(1.0)), (0.0, 0.2)), between((0.002, Share(1.0)), (0.0, -0.2))
+    >>> between((TravelShare(0.25), TravelShare(1.0)), (0.0, 0.2)), between((0.002, TravelShare(1.0)), (0.0, -0.2))
     ((0.05, 0.2), (-0.2, 0.002))
     """
     start, stop = travel
-    places = [start + float(end) * (stop - start) if isinstance(end, Share) else float(end) for end in ends]
+    places = [start + float(end) * (stop - start) if isinstance(end, TravelShare) else float(end) for end in ends]
     if places[0] == places[1]:
         reported = " and ".join(_WindowEnd((*PLACES, SHARE)).write(end) for end in ends)
         raise InputError(f"a window from {reported} has no width on this travel")

@@ -5,8 +5,8 @@ specification or a `cfmkit.errors.SpecError` that lists everything wrong at once
 `dump` writes one that reads back equal.
 """
 
-from cfmkit.specs.yamlio.document import Document, read_document
+from cfmkit.specs.yamlio.document import YamlDocument, read_document
 from cfmkit.specs.yamlio.dump import dump
 from cfmkit.specs.yamlio.explain_validation_errors import did_you_mean, spec_error
 
-__all__ = ["Document", "did_you_mean", "dump", "read_document", "spec_error"]
+__all__ = ["YamlDocument", "did_you_mean", "dump", "read_document", "spec_error"]

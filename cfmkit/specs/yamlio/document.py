@@ -33,7 +33,7 @@ MOST_PROBLEMS = 100
 
 
 @dataclass(frozen=True)
-class Document:
+class YamlDocument:
     """What a file and the options after it say, before any type is known."""
 
     tree: Any  # nested dicts, tuples, text, numbers, bools and None
@@ -53,7 +53,7 @@ class Document:
         """Return (line, column) of the value at a path, or of the nearest block above it; (0, 0) in an option."""
         return self._place(self._path(path), self._reading.values)[:2]
 
-    def set(self, option: str) -> Document:
+    def set(self, option: str) -> YamlDocument:
         """Return the document changed by an option such as ``a.b=1 mm``.
 
         Faults in the value become problems of the new document.
@@ -123,7 +123,7 @@ class Document:
             return Problem(option, 0, 0, "" if option == f"--set {reported}" else reported, message)
         return Problem(self.source, line, column, reported, message)
 
-    def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> Document:
+    def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> YamlDocument:
         new = [Problem(option.label, 0, 0, dotted(path), message) for path, message in faults]
         spoilt = (*self._spoilt, typed(option.path, self.tree))
         return dataclasses.replace(self, problems=(*self.problems, *new), _spoilt=spoilt)
@@ -142,7 +142,7 @@ class Document:
         return typed(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
 
 
-def read_document(data: bytes | str, source: str, folder: FilePath | None = None) -> Document:
+def read_document(data: bytes | str, source: str, folder: FilePath | None = None) -> YamlDocument:
     """Return what a text says; nothing is raised, faults become the document's problems.
 
     Parameters
@@ -162,7 +162,7 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
         Problem(source, fault.line, fault.column, dotted(fault.path), fault.message) for fault in reading.faults
     )
     spoilt = tuple(fault.path for fault in reading.faults if fault.path and fault.spoils)
-    return Document(reading.tree, source, folder, problems, reading, spoilt)
+    return YamlDocument(reading.tree, source, folder, problems, reading, spoilt)
 
 
 def _no_block(reading: Reading) -> Fault:

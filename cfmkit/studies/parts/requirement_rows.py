@@ -19,7 +19,7 @@ from cfmkit.families.rows import Variants
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
-from cfmkit.specs.units import Share
+from cfmkit.specs.units import TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.variants_in_rows import SolvedVariants
@@ -263,7 +263,7 @@ def stated_places(spec: Spec) -> tuple[float, ...]:
     """
     usual = getattr(getattr(spec, "analysis", None), "window", None)
     windows = [one.over or usual for one in spec.part_requirements]
-    return tuple(float(end) for window in windows if window for end in window if not isinstance(end, Share))
+    return tuple(float(end) for window in windows if window for end in window if not isinstance(end, TravelShare))
 
 
 def places_of(nominal: Result) -> FloatArray:

@@ -13,7 +13,7 @@ from cfmkit.families import family
 from cfmkit.metrics import check, values_of_family
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
-from cfmkit.specs.units import Share, border_unit, format_short, to_border
+from cfmkit.specs.units import TravelShare, border_unit, format_short, to_border
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.design_with_margins_and_verification import delivered
 from cfmkit.studies.parts.parts import Parts
@@ -215,7 +215,7 @@ def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, .
 def _label(name: str, over: Ends | None, motion: str) -> str:
     if over is None:
         return name
-    if any(isinstance(end, Share) for end in over):
+    if any(isinstance(end, TravelShare) for end in over):
         low, high = (format_short(end, getattr(end, "dimension", motion), 6) for end in over)
         return f"{name} over {low} ... {high}"
     low, high = (f"{float(to_border(end, motion)):.6g}" for end in over)

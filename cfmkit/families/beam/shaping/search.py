@@ -23,7 +23,7 @@ from cfmkit.designing.objective_and_constraints import worst
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.sqp_program import WEIGHT, Compared, Flattest, Shaping, Widest, window_force
+from cfmkit.families.beam.shaping.sqp_program import WEIGHT, Flattest, ForceRatio, Shaping, Widest, window_force
 from cfmkit.families.beam.shaping.variables import Variables, candidates
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
@@ -330,7 +330,7 @@ def met(
 def _flattened(task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf) -> Found:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
     variables, x = Variables(task, found.order).raised(found.x, order)
-    goal = Compared() if task.objective == "paper" else Flattest()
+    goal = ForceRatio() if task.objective == "paper" else Flattest()
     program = Shaping(variables, found.start, goal, near=_NEAR_ROWS)
     z = program.begin(x)
     if z is None:
@@ -347,7 +347,7 @@ def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> Found:
     start = goal.window_start(optimum.z[program.variables.count :][: len(goal.bounds)], program.start)
     objective = optimum.objective
     view = program.view(x, start)
-    if not isinstance(goal, Compared) and view is not None:
+    if not isinstance(goal, ForceRatio) and view is not None:
         objective = _half_band(window_force(view))
     return Found(
         x,

@@ -244,7 +244,7 @@ def _derivative(at: FloatArray, values: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ForceRatio:
     """The objective of the paper, F(a)/F(b) - 1, literally; no variables of its own."""
 
     bounds = np.zeros((0, 2))
