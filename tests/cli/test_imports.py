@@ -71,7 +71,7 @@ def test_a_command_does_not_import_what_it_does_not_need(tmp_path, arguments, fo
 @pytest.mark.parametrize(
     ("spec", "rooms"),
     [
-        ("cam", ("cam.design", "cam.many_designs")),
+        ("cam", ("cam.design", "cam.cams_in_rows")),
         ("vcfm_ding2022", ("vcfm.design", "vcfm.model")),
         (
             "slider_crank_li2019",

@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, arc_lengths
 from cfmkit.families.cam.manufacturing_scatter import DrawnError, _track, force_band
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.families.cam.solution import Sides
+from cfmkit.families.cam.solution_of_measured_cam import Sides
 from cfmkit.families.cam.spec import Manufacturing
 from cfmkit.families.run_control import Run
 

@@ -41,6 +41,9 @@ class Plan:
     def point(self, index):
         return tuple(self.values[index].tolist())
 
+    def block(self, start, stop):
+        return tuple(self.values[start:stop].T)
+
 
 def varied(spec, draw, count):
     """Return some numbers of a specification at random, up to three of them: path -> values around its own."""

@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.part import Scene
-    from cfmkit.families.cam.solution import Built, Solution
+    from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.solution_of_measured_cam import Built
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
 

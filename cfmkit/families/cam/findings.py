@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.solution import Built, Solution
+    from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.solution_of_measured_cam import Built
     from cfmkit.families.cam.spec import CamSpec, Mechanism
     from cfmkit.results import Finding
 

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
-from cfmkit.families.cam.solution import ForceBand, Sides
+from cfmkit.families.cam.solution import ForceBand
+from cfmkit.families.cam.solution_of_measured_cam import Sides
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

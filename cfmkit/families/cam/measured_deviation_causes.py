@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.solution import Built, Sides, Solution
+from cfmkit.families.cam.solution import Solution
+from cfmkit.families.cam.solution_of_measured_cam import Built, Sides
 from cfmkit.results import Quantity, quantities
 
 if TYPE_CHECKING:

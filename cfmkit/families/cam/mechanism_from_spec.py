@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.families.cam.assembly import CLOSE, Assembly
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut
-from cfmkit.families.cam.geometry.path import RollerPath, reach
+from cfmkit.families.cam.geometry.path import CAMS_KEPT, RollerPath, reached_path
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
@@ -29,14 +29,9 @@ from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.path import Method
     from cfmkit.families.cam.geometry.slope_law import Real
     from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
     from cfmkit.results import Finding
-
-
-CAMS_KEPT = 8
-"""Cams that are remembered: whoever builds other parts around one asks for the same again."""
 
 
 def resolve(spec: CamSpec) -> CamSpec:
@@ -182,20 +177,13 @@ def assemble(spec: CamSpec) -> Assembly:
     stroke, radius = float(mechanism.profile.stroke or 0.0), float(mechanism.profile.roller_radius or 0.0)
     missing = max(-mechanism.profile.offset, 0.0)
     check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
-    path, end, reached = _reached(law, stroke, spec.analysis.path_method)
+    path, end, reached = reached_path(law, stroke, spec.analysis.path_method)
     shortfall = _shortfall(law, stroke, end, reached)
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
     track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
     loads = loads_of(spec, mechanism.springs.total, mechanism.springs_rest)
     return Assembly(spec, profile, track, loads, reached, shortfall)
-
-
-@lru_cache(maxsize=CAMS_KEPT)
-def _reached(law: SlopeLaw, stroke: float, method: Method) -> tuple[RollerPath, float, float]:
-    """Return the path of a roller up to a stroke [m], its end, and how far that goes [m]."""
-    path, end = reach(law, stroke, method)
-    return path, end, float(path.travel(end))
 
 
 def assemble_sides(spec: CamSpec) -> tuple[Assembly, Assembly]:

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.assembly import Assembly
-    from cfmkit.families.cam.solution import Built, Solution
+    from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.solution_of_measured_cam import Built
     from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Forces
 

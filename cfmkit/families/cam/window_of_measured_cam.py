@@ -12,7 +12,7 @@ from cfmkit.specs.units import between
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.families.cam.solution import Built
+    from cfmkit.families.cam.solution_of_measured_cam import Built
 
 
 def travel_window(built: Built) -> tuple[float, float]:

@@ -16,6 +16,7 @@ Reference
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 Method = Literal["quadrature", "ode"]
+
+CAMS_KEPT = 8
+"""Cams that are remembered: whoever builds other parts around one asks for the same again."""
 
 
 class RollerPath:
@@ -194,6 +198,13 @@ def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[
         path, high = _farther(path, travel)
     end = _position(path, travel, (x0, high), x0 + 0.97 * (ideal - x0))
     return (path if method == "quadrature" else RollerPath(law, end, method)), end
+
+
+@lru_cache(maxsize=CAMS_KEPT)
+def reached_path(law: SlopeLaw, travel: float, method: Method) -> tuple[RollerPath, float, float]:
+    """Return `reach`, and how far the slider comes to its end [m]."""
+    path, end = reach(law, travel, method)
+    return path, end, float(path.travel(end))
 
 
 def _farther(path: RollerPath, travel: float) -> tuple[RollerPath, float]:
