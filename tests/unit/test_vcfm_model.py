@@ -361,6 +361,9 @@ class Plan:
     def point(self, index):
         return tuple(self.values[index].tolist())
 
+    def block(self, start, stop):
+        return tuple(np.asarray(self.values)[start:stop].T)
+
 
 @pytest.mark.parametrize("stem", ["bought_springs", "ding2022", "pla_adjustable", "u_shape"])
 def test_a_row_of_a_study_is_a_run_of_its_own(stem):
