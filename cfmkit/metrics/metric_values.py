@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.arrays import LazySequence
 from cfmkit.errors import UsageError
 from cfmkit.metrics.branch_views import MeasuringFrame, span_text
 from cfmkit.metrics.branches_cut_to_window import Undefined, Window, covers, traces
@@ -341,7 +342,7 @@ def windows_judged(result: Result) -> Result:
         Finding(OLD_KEY, f"'{old}' is the old name of '{new}', and read by this version only: write {written}")
         for old, new, written in result.spec.old_keys()
     )
-    return replace(result, warnings=(*result.warnings, *found)) if found else result
+    return replace(result, warnings=LazySequence(lambda: (*result.warnings, *found))) if found else result
 
 
 def _reported(gap: UncoveredWindow, result: Result) -> str:

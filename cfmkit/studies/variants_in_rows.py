@@ -123,7 +123,7 @@ class SolvedVariants:
             limits = Bounds.of(one, self._definitions[plain].dimension)
             chosen = [item for name, item in self._by_branch(plain, one.over).items() if branch in (None, name)]
             met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in chosen]) if chosen else False
-        return ResultRows(values, met, warned={} if self.study.lean else self._findings())
+        return ResultRows(values, met, warned=self._findings() if self.study.findings else {})
 
     def _by_branch(self, plain: str, over: Ends | None) -> ByBranch:
         found = self.values(plain, over)

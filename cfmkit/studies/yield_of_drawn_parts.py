@@ -125,7 +125,7 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
         What progress calls them.
     """
     metrics, spec = _noted(made.spec, nominal), made.spec
-    study = Study(spec, made.paths, metrics, seed=run.seed, lean=True, made=True)
+    study = Study(spec, made.paths, metrics, seed=run.seed, findings=False, made=True)
     work = Work(study, plan_of(made.parameters, values))
     journal = run.notes if isinstance(run.notes, Journal) else None
     records = computed(work, run.executor, journal, _Told(run, what, len(values)))

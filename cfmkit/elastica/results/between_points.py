@@ -236,8 +236,10 @@ class BetweenPoints(ShortRepr):
                 return float(sense * (sense * places).min())
         return None
 
-    def largest_stress(self, branch: str, low: float, high: float, /) -> float:
-        """Return the largest stress in a window [Pa]."""
+    def largest_stress(self, branch: str, low: float, high: float, /) -> float | None:
+        """Return the largest stress in a window [Pa]; None of a path with corners."""
+        if len(self.corners):
+            return None
         scale, ends = self._scale, np.array([low, high])
         there = self.at(ends)
         solved = there.beam_stresses(self.axial)[0].max(axis=0)

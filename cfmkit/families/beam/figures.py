@@ -10,7 +10,6 @@ import numpy as np
 
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
-from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.scalar_results import natural
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
@@ -82,7 +81,7 @@ def curve(result: Result) -> Figure:
     solution: Solution = result.state
     regions, levels = [], []
     limit, start = (result.values[name].value for name in ("stress_limit_displacement", "range_start"))
-    along = AlongMotion(solution)
+    along = solution.along
     end, farthest = along.sense * along.end, float(along.motion.max())
     if limit is not None and along.sense * limit < farthest:
         low, high = sorted((limit, along.sense * farthest))
