@@ -250,11 +250,11 @@ def check(
         If a requirement is not well put: see `validate_requirements`.
     """
     kind = kind_of(result)
-    own = (
-        Definition(name, one.dimension, one.definition, scope="value", windowed=False)
-        for name, one in result.values.items()
-    )
-    known = [*known_metrics(kind, tuple(extra_definitions)), *own]
+    extra = tuple(extra_definitions)
+    named = {one.name for one in extra}  # of these the value need not be computed to know its dimension
+    own = ((name, result.values[name]) for name in result.values if name not in named)
+    values = (Definition(name, one.dimension, one.definition, scope="value", windowed=False) for name, one in own)
+    known = [*known_metrics(kind, extra), *values]
     problems = tuple(requirement_problems(requirements, known, kind))
     if problems:
         raise SpecError(problems)

@@ -23,12 +23,12 @@ from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
-from cfmkit.elastica.results.stress_between_points import insert_knots, solve_extremes, solve_passes
+from cfmkit.elastica.results.stress_between_points import insert_knots, largest_inside, solve_extremes, solve_passes
 from cfmkit.numerics.cubic_interpolation import crossing, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.equations import MarchState, NumpyEquations
+    from cfmkit.elastica.mechanics.equations import MarchState, NumpyEquations, SolvedStates
     from cfmkit.elastica.results.path import EquilibriumPath
     from cfmkit.elastica.results.stress_between_points import Knots
 
@@ -240,17 +240,23 @@ class BetweenPoints(ShortRepr):
         """Return the largest stress in a window [Pa]; None of a path with corners."""
         if len(self.corners):
             return None
-        scale, ends = self._scale, np.array([low, high])
+        ends = np.array([low, high])
         there = self.at(ends)
         solved = there.beam_stresses(self.axial)[0].max(axis=0)
         if not there.accurate.all():
             solved = np.where(there.accurate, solved, self.stress(branch, ends))
-        tops = [
-            values[(places >= low) & (places <= high)]
-            for stretch, beams in self._extremes
-            for places, values in ((scale * stretch.drive(t), own) for t, own in beams)
-        ]
-        return float(np.max(np.concatenate([*tops, solved])))
+        inner = largest_inside(self._drive, self._point_stresses, self._solved_stress_at, ends / self._scale)
+        return float(max(inner, *solved))
+
+    def _point_stresses(self, points: Any) -> FloatArray:
+        """Return the stress of each beam at some of the points in their order, (b, n) [Pa]."""
+        known = self.path.known_beam_stresses(self.axial)
+        if known is None:
+            return self.path.take(self._numbers[points]).beam_stresses(self.axial)[0]
+        return known[:, self._order][:, points]
+
+    def _solved_stress_at(self, drive: FloatArray) -> tuple[FloatArray, Any]:
+        return self._solved_stress(SmoothStretch(None, None), drive)
 
     def at(self, places: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
@@ -266,37 +272,32 @@ class BetweenPoints(ShortRepr):
             here = np.abs(wanted - corner.drive) <= KNOWN * (drive[-1] - drive[0])
             y[here], loads[here], known = corner.y, corner.drive, known | here
         found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
-        for number in np.flatnonzero(~known).tolist():
-            spot = self._spot(y[number], float(wanted[number]), float(loads[number]))
-            if spot is None or spot.unstable not in self._counts(near[number], left[number]):
-                continue
-            moved = float(self._poses((spot.free - y[number])[None])[0])
-            if moved <= max(LEAST, STRAY * float(changes[number])):
-                y[number], loads[number], found[number] = spot.free, spot.way, True
+        asked = np.flatnonzero(~known)
+        if len(asked):
+            spots, ways = self._spots(y[asked], wanted[asked], loads[asked])
+            alike = (spots.unstable[:, None] == self._counts(near[asked], left[asked])).any(axis=1)
+            moved = self._poses(spots.free - y[asked])
+            good = spots.converged & alike & (moved <= np.maximum(LEAST, STRAY * changes[asked]))
+            chosen = asked[good]
+            y[chosen], loads[chosen], found[chosen] = spots.free[good], ways[good], True
         return self.path.with_states(self._numbers[near], y, loads, found)
 
-    def _spot(self, y: FloatArray, wanted: float, _near: float) -> MarchState | None:
-        """Return the equilibrium at a dimensionless place; `_near`: the drive at the nearest point."""
-        return self._solve(y, wanted)
+    def _spots(self, y: FloatArray, wanted: FloatArray, _near: FloatArray) -> tuple[SolvedStates, FloatArray]:
+        """Return the equilibria at dimensionless places and their drives; `_near`: the drive at the nearest points."""
+        return self._equations.solve_each(y, wanted), wanted
 
     @cached_property
     def _equations(self) -> NumpyEquations:
         return equations(self.path.mesh)
-
-    def _solve(
-        self, y: FloatArray, drive: float, row: FloatArray | None = None, goal: float = 0.0
-    ) -> MarchState | None:
-        """Return the equilibrium at a drive near some unknowns, or where row . (unknowns, drive) is a goal."""
-        return self._equations.solve(y, drive, row, goal)
 
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of a motion in each of some changes of the unknowns, (n,)."""
         mesh = self.path.mesh
         return np.asarray(np.abs(changes[:, mesh.free < mesh.n_motions]).max(axis=1, initial=0.0))
 
-    def _counts(self, near: int, _left: int) -> tuple[int, ...]:
-        """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
-        return (int(self._unstable[near]),)
+    def _counts(self, near: Any, _left: Any) -> Any:
+        """Return how many unstable directions equilibria may have, (n, k); `_left`: the points before them."""
+        return self._unstable[near][:, None]
 
     @cached_property
     def _numbers(self) -> Any:
@@ -371,13 +372,14 @@ class BetweenPoints(ShortRepr):
         x, y = drive[own], self._y[own]
         for share in NEARER:
             near = place + share * (drive[point] - place)
-            spot = self._spot(values_at(x, y, np.array([near]))[0], near, near)
-            if spot is None or spot.unstable not in self._counts(point, point):
+            spots, _ = self._spots(values_at(x, y, np.array([near])), np.array([near]), np.array([near]))
+            beside = np.array([point])
+            if not spots.converged[0] or spots.unstable[0] not in self._counts(beside, beside):
                 if share == NEARER[0]:
                     return None
                 break  # of a bifurcation just behind the rest, the place is known less closely
             at = int(np.searchsorted(x, near))
-            x, y = np.insert(x, at, near), np.insert(y, at, spot.free, axis=0)
+            x, y = np.insert(x, at, near), np.insert(y, at, spots.free[0], axis=0)
         return np.asarray(values_at(x, y, np.array([place]))[0])
 
     def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
@@ -411,14 +413,19 @@ class BetweenLoads(BetweenPoints):
     def _effort_on(self, path: EquilibriumPath) -> FloatArray:
         return path.drive
 
-    def _spot(self, y: FloatArray, wanted: float, near: float) -> MarchState | None:
-        goal = wanted - self.rest / self.unit_of_motion
-        first = self._solve(y, near, self.row, goal)
-        # the solver watches poses and forces: once more, so that the load is as exact as they are
-        return None if first is None else self._solve(first.free, first.way, self.row, goal)
+    def _spots(self, y: FloatArray, wanted: FloatArray, near: FloatArray) -> tuple[SolvedStates, FloatArray]:
+        goals = wanted - self.rest / self.unit_of_motion
+        each = [self._spot(*guess) for guess in zip(y, near, goals, strict=True)]
+        ways = np.array([np.nan if spot is None else spot.way for spot in each])
+        return self._equations.collect(each), ways
 
-    def _counts(self, near: int, left: int) -> tuple[int, ...]:
-        return int(self._unstable[left]), int(self._unstable[left + 1])  # a largest load is between two of each kind
+    def _spot(self, y: FloatArray, near: float, goal: float) -> MarchState | None:
+        first = self._equations.solve(y, near, self.row, goal)
+        # the solver watches poses and forces: once more, so that the load is as exact as they are
+        return None if first is None else self._equations.solve(first.free, first.way, self.row, goal)
+
+    def _counts(self, near: Any, left: Any) -> Any:
+        return np.stack([self._unstable[left], self._unstable[left + 1]], axis=1)  # a largest load: two of each kind
 
     @cached_property
     def _drive(self) -> FloatArray:

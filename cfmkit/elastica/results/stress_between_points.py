@@ -25,6 +25,9 @@ ROUNDS = 3
 NEARLY = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
+N_FEW = 24  # points that are looked at first
+STENCIL = 4  # points on either side that a cubic, or the next one, may go through
+
 
 def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots, ...]:
     """Return places and stresses of each beam, with extremes that may be the largest of all.
@@ -44,6 +47,49 @@ def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots
             break
         found = _add_solved(solve, found, found, more)
     return tuple(found)
+
+
+def largest_inside(
+    x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: tuple[float, float] | FloatArray
+) -> float:
+    """Return the largest stress of all beams at and between points of a smooth path inside of a window [Pa].
+
+    The stress is computed at few points first; then at all of those near which it may be the largest.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Places of the points, increasing.
+    stresses : callable
+        From numbers of points to the stress of each of b beams there, (b, m) [Pa].
+    solve : callable
+        As of `solve_extremes`.
+    window : (float, float)
+        Minus infinity is returned if no point and no extreme between two is inside.
+    """
+    low, high = window
+    first = max(int(np.searchsorted(x, low)) - STENCIL, 0)
+    last = min(int(np.searchsorted(x, high, side="right")) + STENCIL, len(x)) - 1
+    few = np.unique(np.append(np.arange(first, last, max(1, (last - first) // N_FEW)), last))
+    at_few = stresses(few)
+    rows = np.full((len(at_few), len(x)), np.nan)
+    rows[:, few] = at_few
+    inside = (x >= low) & (x <= high)
+    top = rows[:, inside & ~np.isnan(rows[0])].max(initial=0.0)
+    guess = np.full(len(x), -np.inf)
+    guess[first : last + 1] = values_at(x[few], at_few.T, x[first : last + 1]).max(axis=1)
+    near = np.flatnonzero(guess >= NEARLY * top)
+    wanted = np.zeros(len(x), dtype=bool)
+    for step in range(-STENCIL, STENCIL + 1):
+        wanted[np.clip(near + step, first, last)] = True
+    missing = np.flatnonzero(wanted & np.isnan(rows[0]))
+    if len(missing):
+        rows[:, missing] = stresses(missing)
+    largest = rows[:, inside & ~np.isnan(rows[0])].max(initial=-np.inf)
+    for own in np.split(np.flatnonzero(wanted), np.flatnonzero(np.diff(np.flatnonzero(wanted)) > 1) + 1):
+        for places, values in solve_extremes(x[own], rows[:, own], solve):
+            largest = max(largest, values[(places >= low) & (places <= high)].max(initial=-np.inf))
+    return float(largest)
 
 
 def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed: float) -> tuple[Knots, ...]:
