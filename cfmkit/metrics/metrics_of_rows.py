@@ -7,7 +7,7 @@ which an extreme may stand, the same ends that are solved for. Curves may have d
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,6 +88,8 @@ class StressRows:
     read: Callable[[], Sequence[RowSamples]]  # at the points of each load case, that of the curve first [Pa]
     at: Callable[[FloatArray, Any], FloatArray]  # of all load cases at places of some rows, (k, m), (k,) -> (k, m) [Pa]
     allowable: FloatArray  # (d,) NaN if there is none [Pa]
+    # between two places of each row, (d,), (d,) -> (d,) [Pa]; None: to be looked for from the points on
+    largest: Callable[[FloatArray, FloatArray], FloatArray] | None = None
 
     @cached_property
     def samples(self) -> Sequence[RowSamples]:
@@ -110,6 +112,10 @@ class CurveRows(ShortRepr):
     stress: StressRows | None = None
     kind: Kind = "force"
     pose: FloatArray | None = None  # (d,) where bands are taken; default: the middle of the window
+    # (d, q) places next to which an extreme may stand that the points miss, NaN behind the last of a row; default: all
+    # dense ones
+    peaks: FloatArray | None = None
+    traced: bool = False  # whether every place takes an equilibrium of its own
     _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
@@ -174,8 +180,23 @@ class RowsInWindow:
         return bool(self.curves.dense.shape[1] < FEW)
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
-        known = self.inside.joined(*self._dense)
-        return known.extremes(self.curves.all_at, self._uneven)
+        peaks = self.curves.peaks
+        if peaks is None:
+            return self.inside.joined(*self._dense).extremes(self.curves.all_at, self._uneven)
+        low, high = (end[:, None] for end in self.ends)
+        between, tops, bottoms = (peaks > low) & (peaks < high), *np.full((2, len(low)), np.nan)
+        places = np.where(between, peaks, self.inside.motion[:, :1])
+        known = self.inside.joined(places, np.where(between, self.curves.all_at(places), self.inside.values[:, :1]))
+        uneven = between.any(axis=1) & (np.isfinite(peaks).sum(axis=1) < FEW)
+        for kind in (False, True):  # of one curve alone the number of rounds is that of its kind
+            rows = np.flatnonzero(uneven == kind)
+            if len(rows):
+                own = RowSamples(known.motion[rows], known.values[rows], known.count[rows])
+                tops[rows], bottoms[rows] = own.extremes(partial(self._effort_of, rows), kind)
+        return tops, bottoms
+
+    def _effort_of(self, rows: NDArray[np.intp], places: FloatArray) -> FloatArray:
+        return self.curves.effort(places, rows)
 
     @cached_property
     def many(self) -> ManyWindows:
@@ -195,7 +216,9 @@ class RowsInWindow:
                 return np.where(np.isfinite(allowable), share, -np.inf)
 
         ends, error = self.ends, curves.error
-        return ManyBranches(curves.dense, curves.dense_effort, *ends, curves.effort, excess, curves.pose, error)
+        return ManyBranches(
+            curves.dense, curves.dense_effort, *ends, curves.effort, excess, curves.pose, error, curves.traced
+        )
 
     # --- metrics, (d,) each -----------------------------------------------------------------------------------------
 
@@ -214,6 +237,8 @@ class RowsInWindow:
         stress, (low, high) = self.curves.stress, self._cut
         if stress is None:
             return np.full(len(low), np.nan)
+        if stress.largest is not None:
+            return stress.largest(low, high)
         slack, ends = TOLERANCE * (high - low), np.stack([low, high], axis=1)
         points, *beside = stress.samples
         at_point = (np.abs(points.motion[:, :, None] - ends[:, None]) <= slack[:, None, None]).any(axis=1)

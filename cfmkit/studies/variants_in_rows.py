@@ -155,6 +155,8 @@ def are_solved_together(study: Study, plan: Plan) -> bool:
     try:
         specs = [study.variant(plan.point(index)) for index in sorted({0, len(plan) // 2, len(plan) - 1})]
         found = [(members, SolvedVariants(study, [specs[k] for k in members], part)) for members, part in solve(specs)]
+        if study.curves and any(part.solved.traced for _, part in found):
+            return False
         return sum(len(members) for members, _ in found) == len(specs) and all(part.known for _, part in found)
     except CfmError:
         return False

@@ -110,7 +110,8 @@ class BetweenPoints(ShortRepr):
         return read_only(self._motion[self._order])
 
     @cached_property
-    def _efforts(self) -> FloatArray:
+    def point_efforts(self) -> FloatArray:
+        """The effort at every point, by increasing places [N or N m]."""
         return read_only(self.unit * self._effort_on(self.path)[self._order])
 
     def _effort_on(self, path: EquilibriumPath) -> FloatArray:
@@ -142,7 +143,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def knots(self) -> Several[FloatArray]:
         """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
-        x, effort = self._points, self._efforts
+        x, effort = self._points, self.point_efforts
         if len(self.corners):
             beside = np.setdiff1d(self.beside_corners, x)
             x, effort = insert_knots(x, effort, beside, self.effort("", beside))
@@ -165,7 +166,7 @@ class BetweenPoints(ShortRepr):
             return self._extremes
         numbers, found = self._stretch_numbers, []
         for number, (stretch, knots) in enumerate(self._extremes):
-            points = stretch.smooth(self._drive[numbers == number])
+            points = stretch.smooth(self.own_drive[numbers == number])
             solve = partial(self._solved_stress, stretch)
             found.append((stretch, solve_passes(knots, points, solve, self.allowed)))
         return tuple(found)
@@ -173,7 +174,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _stretch_numbers(self) -> Any:
         """Number of the stretch between corners that each point is on."""
-        return np.searchsorted([corner.drive for corner in self._corners.values()], self._drive)
+        return np.searchsorted([corner.drive for corner in self._corners.values()], self.own_drive)
 
     @cached_property
     def _extremes(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
@@ -189,7 +190,7 @@ class BetweenPoints(ShortRepr):
             low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
             stretch, own = SmoothStretch(low, high), numbers == number
             ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
-            x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
+            x, rows = stretch.with_ends(self.own_drive[own], at_points[:, own].T, *ends)
             solve = partial(self._solved_stress, stretch)
             found.append((stretch, solve_extremes(stretch.smooth(x), rows.T, solve)))
         return tuple(found)
@@ -206,7 +207,7 @@ class BetweenPoints(ShortRepr):
         if solved is None:
             there = self.at(flat)
             effort = self._effort_on(there)
-            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self._points, self._efforts))
+            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self._points, self.point_efforts))
             self._solved[flat.tobytes()] = solved
         return np.array(solved.reshape(np.shape(places)))
 
@@ -245,7 +246,7 @@ class BetweenPoints(ShortRepr):
         solved = there.beam_stresses(self.axial)[0].max(axis=0)
         if not there.accurate.all():
             solved = np.where(there.accurate, solved, self.stress(branch, ends))
-        inner = largest_inside(self._drive, self._point_stresses, self._solved_stress_at, ends / self._scale)
+        inner = largest_inside(self.own_drive, self._point_stresses, self.solve_stress, ends / self._scale)
         return float(max(inner, *solved))
 
     def _point_stresses(self, points: Any) -> FloatArray:
@@ -255,23 +256,24 @@ class BetweenPoints(ShortRepr):
             return self.path.take(self._numbers[points]).beam_stresses(self.axial)[0]
         return known[:, self._order][:, points]
 
-    def _solved_stress_at(self, drive: FloatArray) -> tuple[FloatArray, Any]:
+    def solve_stress(self, drive: FloatArray) -> tuple[FloatArray, Any]:
+        """Return the stress of each beam at dimensionless places of a path without corners, and where it was solved."""
         return self._solved_stress(SmoothStretch(None, None), drive)
 
     def at(self, places: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
-        drive = self._drive
+        drive = self.own_drive
         wanted = np.clip(places / self._scale, drive[0], drive[-1])
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
         near = self._nearest(wanted, left)
         y = self._guesses(wanted, near)
         loads = self._loads[near]
         known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
-        y[known] = self._y[near[known]]
+        y[known] = self.own_unknowns[near[known]]
         for corner in self._corners.values():
             here = np.abs(wanted - corner.drive) <= KNOWN * (drive[-1] - drive[0])
             y[here], loads[here], known = corner.y, corner.drive, known | here
-        found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
+        found, changes = known.copy(), self._poses(self.own_unknowns[left + 1] - self.own_unknowns[left])
         asked = np.flatnonzero(~known)
         if len(asked):
             spots, ways = self._spots(y[asked], wanted[asked], loads[asked])
@@ -308,11 +310,13 @@ class BetweenPoints(ShortRepr):
         return np.asarray(self.path.at.drive[self._order])
 
     @cached_property
-    def _drive(self) -> FloatArray:
+    def own_drive(self) -> FloatArray:
+        """Dimensionless places of the points, increasing."""
         return self._loads
 
     @cached_property
-    def _y(self) -> FloatArray:
+    def own_unknowns(self) -> FloatArray:
+        """Free unknowns at every point, by increasing places, (n, free)."""
         return np.asarray(self.path.free[self._order])
 
     @cached_property
@@ -322,7 +326,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _stretch(self) -> Any:
         """The number of the smooth stretch that each point is on: they are parted by bifurcations, (n,)."""
-        parted = np.zeros(len(self._drive), dtype=bool)
+        parted = np.zeros(len(self.own_drive), dtype=bool)
         branch = self.path.branch[self._order]
         parted[1:] = (branch[1:] != branch[:-1]) | (self._unstable[1:] != self._unstable[:-1])
         return np.cumsum(parted)
@@ -335,7 +339,7 @@ class BetweenPoints(ShortRepr):
 
     def _nearest(self, wanted: FloatArray, left: Any) -> Any:
         """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
-        drive, events = self._drive, self._events
+        drive, events = self.own_drive, self._events
         near = left + (wanted - drive[left] > drive[left + 1] - wanted)
         for number in np.flatnonzero(self._stretch[left] != self._stretch[left + 1]).tolist():
             here = events[(events >= drive[left[number]]) & (events <= drive[left[number] + 1])]
@@ -346,7 +350,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _corners(self) -> dict[int, Corner]:
         """The corners of the path by the number of the stretch behind each, increasing."""
-        branch, stretches, drive = self.path.branch[self._order], self._stretch, self._drive
+        branch, stretches, drive = self.path.branch[self._order], self._stretch, self.own_drive
         names, found = list(dict.fromkeys(self.path.branch.tolist())), {}
         rounding = AT_POINT * (drive[-1] - drive[0])
         for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
@@ -358,7 +362,7 @@ class BetweenPoints(ShortRepr):
             below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
             at = next((k for k in (right - 1, right) if abs(drive[k] - here[0]) <= rounding), None)
             place = float(here[0] if at is None else drive[at])
-            y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self._y[at])
+            y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self.own_unknowns[at])
             if y is not None:
                 found[int(stretches[right])] = Corner(place, y, below, above)
         return found
@@ -368,8 +372,8 @@ class BetweenPoints(ShortRepr):
 
         It is singular: ever nearer ones are solved for, and the polynomial taken on from there.
         """
-        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self._drive
-        x, y = drive[own], self._y[own]
+        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self.own_drive
+        x, y = drive[own], self.own_unknowns[own]
         for share in NEARER:
             near = place + share * (drive[point] - place)
             spots, _ = self._spots(values_at(x, y, np.array([near])), np.array([near]), np.array([near]))
@@ -384,12 +388,12 @@ class BetweenPoints(ShortRepr):
 
     def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
         """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
-        found = np.empty((len(wanted), self._y.shape[1]))
+        found = np.empty((len(wanted), self.own_unknowns.shape[1]))
         for number in distinct(self._stretch[near]).tolist():
             own, here = self._stretch == number, self._stretch[near] == number
             stretch = SmoothStretch(self._corners.get(number), self._corners.get(number + 1))
             ends = (None if corner is None else corner.y for corner in (stretch.low, stretch.high))
-            x, y = stretch.with_ends(self._drive[own], self._y[own], *ends)
+            x, y = stretch.with_ends(self.own_drive[own], self.own_unknowns[own], *ends)
             found[here] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[here]))
         return found
 
@@ -428,7 +432,8 @@ class BetweenLoads(BetweenPoints):
         return np.stack([self._unstable[left], self._unstable[left + 1]], axis=1)  # a largest load: two of each kind
 
     @cached_property
-    def _drive(self) -> FloatArray:
+    def own_drive(self) -> FloatArray:
+        """Dimensionless motions at the points, increasing."""
         return self._points / self.unit_of_motion
 
     @cached_property

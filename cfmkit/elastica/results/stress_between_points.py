@@ -14,6 +14,8 @@ from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, value
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
 
     Knots = tuple[FloatArray, FloatArray]  # places, increasing, and stresses of one beam
@@ -26,6 +28,7 @@ NEARLY = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
 N_FEW = 24  # points that are looked at first
+CLOSE = 0.95  # share of the largest stress at these from which on the largest of all may be near
 STENCIL = 4  # points on either side that a cubic, or the next one, may go through
 
 
@@ -49,9 +52,7 @@ def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots
     return tuple(found)
 
 
-def largest_inside(
-    x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: tuple[float, float] | FloatArray
-) -> float:
+def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: FloatArray) -> float:
     """Return the largest stress of all beams at and between points of a smooth path inside of a window [Pa].
 
     The stress is computed at few points first; then at all of those near which it may be the largest.
@@ -64,31 +65,60 @@ def largest_inside(
         From numbers of points to the stress of each of b beams there, (b, m) [Pa].
     solve : callable
         As of `solve_extremes`.
-    window : (float, float)
+    window : (2,) array
         Minus infinity is returned if no point and no extreme between two is inside.
     """
-    low, high = window
+    few = few_points(x, *window)
+    known = stresses(few)
+    more = near_largest(x, few, known, *window)
+    if len(more):
+        few = np.concatenate([few, more])
+        known = np.concatenate([known, stresses(more)], axis=1)
+        order = np.argsort(few, kind="stable")
+        few, known = few[order], known[:, order]
+    return largest_between(x, few, known, solve, window)
+
+
+def few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
+    """Return the numbers of points of a path that are looked at first, in a window and next to it."""
     first = max(int(np.searchsorted(x, low)) - STENCIL, 0)
     last = min(int(np.searchsorted(x, high, side="right")) + STENCIL, len(x)) - 1
-    few = np.unique(np.append(np.arange(first, last, max(1, (last - first) // N_FEW)), last))
-    at_few = stresses(few)
-    rows = np.full((len(at_few), len(x)), np.nan)
-    rows[:, few] = at_few
-    inside = (x >= low) & (x <= high)
-    top = rows[:, inside & ~np.isnan(rows[0])].max(initial=0.0)
-    guess = np.full(len(x), -np.inf)
-    guess[first : last + 1] = values_at(x[few], at_few.T, x[first : last + 1]).max(axis=1)
-    near = np.flatnonzero(guess >= NEARLY * top)
+    return np.append(np.arange(first, last, max(1, (last - first) // N_FEW)), last)
+
+
+def near_largest(
+    x: FloatArray, few: NDArray[np.intp], stresses: FloatArray, low: float, high: float
+) -> NDArray[np.intp]:
+    """Return which other points are near the largest stress, from the stresses (b, m) at few of them."""
+    first, last = int(few[0]), int(few[-1])
+    inside = (x[few] >= low) & (x[few] <= high)
+    top = stresses[:, inside].max(initial=0.0)
+    guess = values_at(x[few], stresses.T, x[first : last + 1]).max(axis=1)
+    near = first + np.flatnonzero(guess >= CLOSE * top)
     wanted = np.zeros(len(x), dtype=bool)
     for step in range(-STENCIL, STENCIL + 1):
         wanted[np.clip(near + step, first, last)] = True
-    missing = np.flatnonzero(wanted & np.isnan(rows[0]))
-    if len(missing):
-        rows[:, missing] = stresses(missing)
-    largest = rows[:, inside & ~np.isnan(rows[0])].max(initial=-np.inf)
-    for own in np.split(np.flatnonzero(wanted), np.flatnonzero(np.diff(np.flatnonzero(wanted)) > 1) + 1):
-        for places, values in solve_extremes(x[own], rows[:, own], solve):
-            largest = max(largest, values[(places >= low) & (places <= high)].max(initial=-np.inf))
+    wanted[few] = False
+    return np.flatnonzero(wanted)
+
+
+def largest_between(
+    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, solve: Solve, window: FloatArray
+) -> float:
+    """Return the largest stress at points in a window, and between neighbours among them, which is solved for [Pa]."""
+    low, high = window
+    inside = (x[points] >= low) & (x[points] <= high)
+    largest = stresses[:, inside].max(initial=-np.inf)
+    for own in np.split(np.arange(len(points)), np.flatnonzero(np.diff(points) > 1) + 1):
+        rows = np.flatnonzero(stresses[:, own].max(axis=1) >= CLOSE * largest)
+        if len(rows) and len(own) > STENCIL:
+
+            def solve_rows(places: FloatArray, rows: Any = rows) -> tuple[FloatArray, Any]:
+                found, accurate = solve(places)
+                return found[rows], accurate
+
+            for places, values in solve_extremes(x[points[own]], stresses[np.ix_(rows, own)], solve_rows):
+                largest = max(largest, values[(places >= low) & (places <= high)].max(initial=-np.inf))
     return float(largest)
 
 

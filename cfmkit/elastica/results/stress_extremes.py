@@ -102,7 +102,7 @@ def extremes_of_designs(
         found, widths = forces_of_designs(networks, meshes, own, row[some], fractions)
         arcs = found.place.reshape(len(own.z), elements, len(fractions))
         parts.append(_tops(sections_of_width(widths, found), arcs, signs, to_series))
-    return _highest([elements_of(at.mesh, beam) for beam in networks[0].beams], parts)[0]
+    return np.asarray(_highest([elements_of(at.mesh, beam) for beam in networks[0].beams], parts)[0])
 
 
 def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any, Any]:

@@ -206,10 +206,11 @@ def _curve(solution: Solution) -> Curve:
 def _curve_of(solution: Solution, columns: LazyColumns, stable: Any) -> Curve:
     """Return a curve with columns that are computed when they are read."""
     extra = LazyMapping(columns, lambda name: columns[name]())
-    return Curve(solution.motion, solution.effort, "load", stable, extra, _kind(solution))  # type: ignore[arg-type]
+    return Curve(solution.motion, solution.effort, "load", stable, extra, kind_of(solution))  # type: ignore[arg-type]
 
 
-def _kind(solution: Solution) -> Kind:
+def kind_of(solution: Solution) -> Kind:
+    """Return what the effort of a curve is."""
     return "torque" if solution.spec.mechanism.drive.turns else "force"
 
 
