@@ -105,7 +105,7 @@ class BetweenPoints(ShortRepr):
         return self.knots[0]
 
     @cached_property
-    def _points(self) -> FloatArray:
+    def own_points(self) -> FloatArray:
         """Places of the points of the path, increasing [m or rad]."""
         return read_only(self._motion[self._order])
 
@@ -122,7 +122,7 @@ class BetweenPoints(ShortRepr):
     def peaks(self) -> FloatArray:
         """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
         beside = {*self.beside_corners[:, [0, 2]].ravel().tolist()}
-        return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
+        return read_only(sorted({*self.knots[0].tolist()} - {*self.own_points.tolist()} - beside))
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -132,7 +132,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def beside_corners(self) -> FloatArray:
         """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
-        found, points = np.empty((len(self.corners), 3)), self._points
+        found, points = np.empty((len(self.corners), 3)), self.own_points
         for number, corner in enumerate(self.corners):
             before, behind = points[points < corner][-1:], points[points > corner][:1]
             room = 0.5 * float(np.abs(np.concatenate([before, behind]) - corner).min())
@@ -143,7 +143,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def knots(self) -> Several[FloatArray]:
         """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
-        x, effort = self._points, self.point_efforts
+        x, effort = self.own_points, self.point_efforts
         if len(self.corners):
             beside = np.setdiff1d(self.beside_corners, x)
             x, effort = insert_knots(x, effort, beside, self.effort("", beside))
@@ -155,6 +155,10 @@ class BetweenPoints(ShortRepr):
                 break
             x, effort = insert_knots(x, effort, more, self.effort("", more))
         return Several((read_only(x), read_only(effort)))
+
+    def take_knots(self, x: FloatArray, effort: FloatArray) -> None:
+        """Take the knots that `PathsOfDesigns` has solved for."""
+        vars(self)["knots"] = Several((read_only(x), read_only(effort)))
 
     @cached_property
     def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
@@ -207,7 +211,7 @@ class BetweenPoints(ShortRepr):
         if solved is None:
             there = self.at(flat)
             effort = self._effort_on(there)
-            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self._points, self.point_efforts))
+            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self.own_points, self.point_efforts))
             self._solved[flat.tobytes()] = solved
         return np.array(solved.reshape(np.shape(places)))
 
@@ -434,7 +438,7 @@ class BetweenLoads(BetweenPoints):
     @cached_property
     def own_drive(self) -> FloatArray:
         """Dimensionless motions at the points, increasing."""
-        return self._points / self.unit_of_motion
+        return self.own_points / self.unit_of_motion
 
     @cached_property
     def _stretch(self) -> Any:

@@ -9,16 +9,24 @@ Assumes: paths without corners under a drive by a motion, on discretisations of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.results.between_points import KNOWN, LEAST, STRAY
-from cfmkit.elastica.results.stress_between_points import few_points, largest_between, near_largest
+from cfmkit.elastica.results.between_points import KNOWN, LEAST, ROUNDS, STRAY
+from cfmkit.elastica.results.stress_between_points import (
+    few_points,
+    insert_knots,
+    largest_of_runs,
+    near_largest,
+    runs_of_points,
+    solve_all_extremes,
+)
 from cfmkit.elastica.results.stress_extremes import largest_stresses_of_designs
+from cfmkit.numerics.cubic_interpolation import inner_extremes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,6 +44,22 @@ class PathsOfDesigns:
     """Effort and stress of d paths at every place."""
 
     laws: Sequence[BetweenPoints]
+
+    def solve_knots(self) -> None:
+        """Let the extremes of all paths between their points be known: as each would solve for them by itself."""
+        every = [(law.own_points, law.point_efforts) for law in self.laws]
+        for _ in range(ROUNDS):
+            more = [inner_extremes(*knots) for knots in every]
+            rows = np.flatnonzero([len(places) for places in more])
+            if not len(rows):
+                break
+            most = max(map(len, more))
+            places = np.array([np.append(more[k], np.full(most - len(more[k]), every[k][0][0])) for k in rows.tolist()])
+            efforts = self.effort(places, rows)
+            for k, solved in zip(rows.tolist(), efforts, strict=True):
+                every[k] = insert_knots(*every[k], more[k], solved[: len(more[k])])
+        for law, (x, effort) in zip(self.laws, every, strict=True):
+            law.take_knots(x, effort)
 
     @cached_property
     def _counts(self) -> Rows:
@@ -135,11 +159,25 @@ class PathsOfDesigns:
         both = [self._joined(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
         at_ends = self._stresses(np.repeat(every, 2), free.reshape(2 * len(every), -1), ends.ravel())
         tops = np.where(found, at_ends.max(axis=0).reshape(-1, 2), -np.inf).max(axis=1)
+        runs = [runs_of_points(self._own(k), *both[k], ends[k]) for k in every]
+        row = [k for k in every for _ in runs[k]]
+        knots = iter(solve_all_extremes([run for own in runs for run in own], partial(self._stresses_at, row)))
         for k in every:
-            points, stresses = both[k]
-            top = largest_between(self._own(k), points, stresses, self.laws[k].solve_stress, ends[k])
+            top = largest_of_runs(self._own(k), *both[k], ends[k], [next(knots) for _ in runs[k]])
             tops[k] = max(tops[k], top)
         return np.asarray(tops)
+
+    def _stresses_at(self, rows: Sequence[int], places: Sequence[FloatArray]) -> list[tuple[FloatArray, Any]]:
+        """Return the stress of each beam (b, m) at some dimensionless places of designs, and where it was solved."""
+        count = np.array([len(own) for own in places])
+        here = np.arange(count.max()) < count[:, None]
+        padded = np.zeros(here.shape)
+        padded[here] = np.concatenate(places)
+        padded = np.where(here, padded, self._drive[list(rows), :1])  # which is known
+        free, found, _ = self._solved(np.array(rows), padded)
+        stresses = self._stresses(np.repeat(rows, count), free[here], padded[here])
+        ends = np.cumsum(count)[:-1]
+        return list(zip(np.split(stresses, ends, axis=1), np.split(found[here], ends), strict=True))
 
     def _own(self, number: int) -> FloatArray:
         return np.asarray(self._drive[number, : self._counts[number]])

@@ -12,7 +12,7 @@ import numpy as np
 from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -32,7 +32,7 @@ CLOSE = 0.95  # share of the largest stress at these from which on the largest o
 STENCIL = 4  # points on either side that a cubic, or the next one, may go through
 
 
-def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots, ...]:
+def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve, bound: float = 0.0) -> tuple[Knots, ...]:
     """Return places and stresses of each beam, with extremes that may be the largest of all.
 
     Parameters
@@ -41,15 +41,32 @@ def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots
         Places of points, increasing, and the stress of each of b beams there [Pa].
     solve : callable
         From places (m,) to stresses (b, m) and whether they were found, (m,).
+    bound : float
+        Beams that are stressed less at all points are left as they are [Pa].
     """
-    largest = rows.max(axis=0)
-    found = [(t, row) for row in rows]
+    return solve_all_extremes([(t, rows, bound)], lambda places: [solve(places[0])])[0]
+
+
+def solve_all_extremes(
+    curves: Sequence[tuple[FloatArray, FloatArray, float]],
+    solve: Callable[[list[FloatArray]], list[tuple[FloatArray, Any]]],
+) -> list[tuple[Knots, ...]]:
+    """Return the same of several curves; `solve` takes places of each of them, by chance none, in one call."""
+    found = [[(t, row) for row in rows] for t, rows, _ in curves]
+    largest = [rows.max(axis=0) for _, rows, _ in curves]
     for _ in range(ROUNDS):
-        more = [_find_tops(knots, t, largest) for knots in found]
-        if not any(map(len, more)):
+        more = [
+            [_find_tops(own, t, top) if own[1].max() >= bound else np.empty(0) for own in knots]
+            for knots, (t, _, bound), top in zip(found, curves, largest, strict=True)
+        ]
+        if not any(len(places) for each in more for places in each):
             break
-        found = _add_solved(solve, found, found, more)
-    return tuple(found)
+        solved = solve([np.concatenate(each) for each in more])
+        found = [
+            _add_solved(knots, knots, each, *answer) if any(map(len, each)) else knots
+            for knots, each, answer in zip(found, more, solved, strict=True)
+        ]
+    return [tuple(knots) for knots in found]
 
 
 def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: FloatArray) -> float:
@@ -106,20 +123,31 @@ def largest_between(
     x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, solve: Solve, window: FloatArray
 ) -> float:
     """Return the largest stress at points in a window, and between neighbours among them, which is solved for [Pa]."""
-    low, high = window
-    inside = (x[points] >= low) & (x[points] <= high)
-    largest = stresses[:, inside].max(initial=-np.inf)
-    for own in np.split(np.arange(len(points)), np.flatnonzero(np.diff(points) > 1) + 1):
-        rows = np.flatnonzero(stresses[:, own].max(axis=1) >= CLOSE * largest)
-        if len(rows) and len(own) > STENCIL:
+    runs = runs_of_points(x, points, stresses, window)
+    return largest_of_runs(
+        x, points, stresses, window, [solve_extremes(t, rows, solve, bound) for t, rows, bound in runs]
+    )
 
-            def solve_rows(places: FloatArray, rows: Any = rows) -> tuple[FloatArray, Any]:
-                found, accurate = solve(places)
-                return found[rows], accurate
 
-            for places, values in solve_extremes(x[points[own]], stresses[np.ix_(rows, own)], solve_rows):
-                largest = max(largest, values[(places >= low) & (places <= high)].max(initial=-np.inf))
-    return float(largest)
+def runs_of_points(
+    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, window: FloatArray
+) -> list[tuple[FloatArray, FloatArray, float]]:
+    """Return places and stresses (b, n) of neighbouring points between which the largest may be, and a bound to it."""
+    inside = (x[points] >= window[0]) & (x[points] <= window[1])
+    bound = CLOSE * stresses[:, inside].max(initial=-np.inf)
+    parts = np.split(np.arange(len(points)), np.flatnonzero(np.diff(points) > 1) + 1)
+    runs = [(x[points[own]], stresses[:, own], bound) for own in parts if len(own) > 3]
+    return [run for run in runs if run[1].max() >= bound]
+
+
+def largest_of_runs(
+    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, window: FloatArray, runs: Sequence[Sequence[Knots]]
+) -> float:
+    """Return the largest stress inside of a window, of points and of runs whose extremes are known [Pa]."""
+    at_points = [(x[points], row) for row in stresses]
+    every = [*at_points, *(knots for run in runs for knots in run)]
+    tops = (y[(t >= window[0]) & (t <= window[1])].max(initial=-np.inf) for t, y in every)
+    return float(max(tops))
 
 
 def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed: float) -> tuple[Knots, ...]:
@@ -132,7 +160,7 @@ def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed:
         more = [_find_passes(own, allowed, t) for own in found]
         if not any(map(len, more)):
             break
-        found = _add_solved(solve, found, list(knots), more)
+        found = _add_solved(found, list(knots), more, *solve(np.concatenate(more)))
     return tuple(found)
 
 
@@ -150,13 +178,9 @@ def _find_passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
 
 
 def _add_solved(
-    solve: Solve,
-    cubics: list[Knots],
-    knots: list[Knots],
-    more: list[FloatArray],
+    cubics: list[Knots], knots: list[Knots], more: list[FloatArray], stresses: FloatArray, accurate: Any
 ) -> list[Knots]:
-    """Return the knots of each beam with more places: stresses there are solved, or on its cubic where that fails."""
-    stresses, accurate = solve(np.concatenate(more))
+    """Return the knots of each beam with more places: stresses as solved, or on its cubic where that failed."""
     found: list[Knots] = []
     end = 0
     for own, cubic, places, row in zip(knots, cubics, more, stresses, strict=True):

@@ -61,6 +61,7 @@ class SolvedBeams:
     def branches(self) -> Mapping[str, CurveRows]:
         """The curve of each mechanism."""
         each, paths = self.each, PathsOfDesigns(self._laws)
+        paths.solve_knots()
         pose = np.array([_or_nan(one.spec.analysis.reference) for one in each])
         allowable = np.array([_or_nan(one.assembly.allowable_stress) for one in each])
         curves = CurveRows(
