@@ -156,10 +156,6 @@ class BetweenPoints(ShortRepr):
             x, effort = insert_knots(x, effort, more, self.effort("", more))
         return Several((read_only(x), read_only(effort)))
 
-    def take_knots(self, x: FloatArray, effort: FloatArray) -> None:
-        """Take the knots that `PathsOfDesigns` has solved for."""
-        vars(self)["knots"] = Several((read_only(x), read_only(effort)))
-
     @cached_property
     def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
         """Of each stretch between corners, and there of each beam, smooth variables and stresses.

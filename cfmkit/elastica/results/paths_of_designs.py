@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import Several, read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.results.between_points import KNOWN, LEAST, ROUNDS, STRAY
@@ -59,7 +60,7 @@ class PathsOfDesigns:
             for k, solved in zip(rows.tolist(), efforts, strict=True):
                 every[k] = insert_knots(*every[k], more[k], solved[: len(more[k])])
         for law, (x, effort) in zip(self.laws, every, strict=True):
-            law.take_knots(x, effort)
+            vars(law)["knots"] = Several((read_only(x), read_only(effort)))
 
     @cached_property
     def _counts(self) -> Rows:

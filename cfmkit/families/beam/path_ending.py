@@ -128,5 +128,5 @@ def _along_the_drive(spec: BeamSpec) -> Iterator[str]:
     for name, beam in mechanism.beams.items():
         way = np.subtract(mechanism.nodes[beam.end].at, mechanism.nodes[beam.start].at)
         across = abs(way @ (-np.sin(direction), np.cos(direction)))
-        if beam.shape.kind == "straight" and across <= _PARALLEL * np.hypot(*way):
+        if beam.shape.is_straight and across <= _PARALLEL * np.hypot(*way):
             yield name
