@@ -27,7 +27,7 @@ from cfmkit.elastica.results.stress_between_points import (
     solve_all_extremes,
 )
 from cfmkit.elastica.results.stress_extremes import largest_stresses_of_designs
-from cfmkit.numerics.cubic_interpolation import inner_extremes
+from cfmkit.numerics.cubic_interpolation import inner_extremes_of_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +50,7 @@ class PathsOfDesigns:
         """Let the extremes of all paths between their points be known: as each would solve for them by itself."""
         every = [(law.own_points, law.point_efforts) for law in self.laws]
         for _ in range(ROUNDS):
-            more = [inner_extremes(*knots) for knots in every]
+            more = inner_extremes_of_rows(every)
             rows = np.flatnonzero([len(places) for places in more])
             if not len(rows):
                 break

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
+from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes_of_rows, values_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,9 +55,14 @@ def solve_all_extremes(
     found = [[(t, row) for row in rows] for t, rows, _ in curves]
     largest = [rows.max(axis=0) for _, rows, _ in curves]
     for _ in range(ROUNDS):
+        stressed = [
+            [own if own[1].max() >= bound else (own[0][:0], own[1][:0]) for own in knots]
+            for knots, (_, _, bound) in zip(found, curves, strict=True)
+        ]
+        places = iter(inner_extremes_of_rows([own for knots in stressed for own in knots]))
         more = [
-            [_find_tops(own, t, top) if own[1].max() >= bound else np.empty(0) for own in knots]
-            for knots, (t, _, bound), top in zip(found, curves, largest, strict=True)
+            [_keep_tops(own, next(places), t, top) for own in knots]
+            for knots, (t, _, _), top in zip(found, curves, largest, strict=True)
         ]
         if not any(len(places) for each in more for places in each):
             break
@@ -164,10 +169,9 @@ def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed:
     return tuple(found)
 
 
-def _find_tops(knots: Knots, t: FloatArray, largest: FloatArray) -> FloatArray:
-    """Return where the stress of a beam has an extreme that may be the largest of all."""
+def _keep_tops(knots: Knots, top: FloatArray, t: FloatArray, largest: FloatArray) -> FloatArray:
+    """Return those of the extremes of the stress of a beam that may be the largest of all."""
     own, values = knots
-    top = inner_extremes(own, values)
     beside = np.searchsorted(own, top)
     return top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
 
