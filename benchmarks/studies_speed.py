@@ -128,6 +128,7 @@ def main() -> None:
     print(f"numpy {np.__version__}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
     overhead()
     two_processes()
+    made_parts()
     for name in MILLIONS:
         million(name)
 
