@@ -147,19 +147,25 @@ class SolvedVariants:
         return {**found, OLD_KEY: old} if old.any() else found
 
 
-def are_solved_together(study: Study, plan: Plan) -> bool:
-    """Return whether points of a study are rows of one solution: its first, its middle and its last one are."""
+SMALLEST, SMALLEST_TRACED = 64, 8
+"""Points in a block at least, of closed forms and of traced models: a traced one takes milliseconds."""
+
+
+def are_solved_together(study: Study, plan: Plan) -> int:
+    """Return of how many points a block of rows is at least; 0 if the first, middle and last point are no rows."""
     solve = family(study.spec.family).rows
     if solve is None or study.design or not len(plan):
-        return False
+        return 0
     try:
         specs = [study.variant(plan.point(index)) for index in sorted({0, len(plan) // 2, len(plan) - 1})]
         found = [(members, SolvedVariants(study, [specs[k] for k in members], part)) for members, part in solve(specs)]
-        if study.curves and any(part.solved.traced for _, part in found):
-            return False
-        return sum(len(members) for members, _ in found) == len(specs) and all(part.known for _, part in found)
+        traced = any(part.solved.traced for _, part in found)
+        together = sum(len(members) for members, _ in found) == len(specs) and all(part.known for _, part in found)
     except CfmError:
-        return False
+        return 0
+    if not together or (study.curves and traced):
+        return 0
+    return SMALLEST_TRACED if traced else SMALLEST
 
 
 def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:

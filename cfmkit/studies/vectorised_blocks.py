@@ -13,7 +13,7 @@ from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.specs.units import Share
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
-from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+from cfmkit.studies.variants_in_rows import SMALLEST, are_solved_together, evaluate_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,13 +34,13 @@ NOT_JUDGED = "not_judged"
 """In place of warnings where a block model does not know them: an empty cell would say that there are none."""
 
 
-def vectorised(study: Study, plan: Plan) -> bool:
-    """Return whether points are solved together: as rows, or by the family's block model."""
+def vectorised(study: Study, plan: Plan) -> int:
+    """Return of how many points a block is at least, as rows or by the family's block model; 0: one by one."""
     if family(study.spec.family).rows is not None:
         return are_solved_together(study, plan)
     if family(study.spec.family).analyze_block is None or study.design or not len(plan):
-        return False
-    return _answer(study, plan, 0, 1) is not None
+        return 0
+    return SMALLEST if _answer(study, plan, 0, 1) is not None else 0
 
 
 def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:
