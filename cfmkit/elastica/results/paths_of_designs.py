@@ -159,7 +159,10 @@ class PathsOfDesigns:
         dense = self._at_points(more)
         both = [self._joined(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
         at_ends = self._stresses(np.repeat(every, 2), free.reshape(2 * len(every), -1), ends.ravel())
-        tops = np.where(found, at_ends.max(axis=0).reshape(-1, 2), -np.inf).max(axis=1)
+        stress_at_ends = at_ends.max(axis=0).reshape(-1, 2)
+        for k, m in np.argwhere(~found).tolist():
+            stress_at_ends[k, m] = self.laws[k].stress("", np.array([(low, high)[m][k]]))[0]
+        tops = stress_at_ends.max(axis=1)
         runs = [runs_of_points(self._own(k), *both[k], ends[k]) for k in every]
         row = [k for k in every for _ in runs[k]]
         knots = iter(solve_all_extremes([run for own in runs for run in own], partial(self._stresses_at, row)))
