@@ -278,7 +278,7 @@ class EquilibriumPath(ShortRepr):
         return self._beam_stresses[axial]
 
     def known_beam_stresses(self, axial: bool) -> FloatArray | None:
-        """Return the first of `beam_stresses`; None if nobody has asked for them yet."""
+        """Return the first of `beam_stresses`; None if they are not known yet."""
         found = self._beam_stresses.get(axial)
         return None if found is None else found[0]
 

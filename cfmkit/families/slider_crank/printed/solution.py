@@ -168,7 +168,7 @@ class Solution(ShortRepr):
     side: int = 0  # to which it was to bend, as `Chain.press` takes it
     accuracy: float = 1e-7  # of the path, relative
     mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
-    spec: SliderCrankSpec | None = None  # None in a search, where nobody asks for findings
+    spec: SliderCrankSpec | None = None  # None in a search, which has no findings
 
     @cached_property
     def _at(self) -> Any:
