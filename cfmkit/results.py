@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 WINDOW_OUTSIDE = "window_outside"
 """Name of the finding that nothing was measured over a window."""
 
-OLD_KEY = "old_key"
-"""Name of the finding that the specification uses a key by its old name."""
-
 PART_NOT_DRAWN = "part_not_drawn"
 """Name of the finding that a design has no part that can be cut as it is."""
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 PASSING = re.compile(r"\b\d+(\.\d+)? (ms|s|min)\b|\d+ points/s|cfm-out\S*|/\S+/")
 """What changes between two runs of one version: times taken, folders."""
-OF_THE_RUN = {"manifest.json", "exit.txt", ".cfmkit-journal.jsonl"}
+OF_THE_RUN = {"manifest.json", "exit.txt", ".cfmkit-journal.sqlite", ".cfmkit-journal.jsonl"}
 """Of the run: times, versions and arguments; records in the order in which processes finished."""
 
 
@@ -47,8 +47,6 @@ def jobs(configs: Path, only: str) -> Iterator[tuple[str, list[str]]]:
     """Yield (name, arguments) of every run."""
     for path in sorted([*configs.glob("*.yaml"), *configs.glob("studies/*.yaml")]):
         if only not in path.name:
-            continue
-        if path.name == "figure.yaml":  # no specification: a figure of several runs
             continue
         blocks = set(re.findall(r"^([a-z_]+):", path.read_text(encoding="utf-8"), flags=re.MULTILINE))
         verbs = [verb for verb in ("design", "sweep", "sensitivity") if verb in blocks]

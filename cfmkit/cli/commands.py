@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from cfmkit.cli import verbs
 from cfmkit.cli.verbs import names
+from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -151,7 +152,7 @@ def _place(field: dataclasses.Field[Any]) -> int:
     return int(field.name in {item.name for item in dataclasses.fields(Common)})
 
 
-ALONE = ("--figure", "--show-completion", "--install-completion")
+ALONE = ("--figure",)
 """Options whose value may be left out; typer has none of that kind, so an empty value is written for it."""
 
 
@@ -178,15 +179,15 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     try:
         call = _plain(typer.main.get_command(app)).main(_spelled(arguments), "cfmkit", standalone_mode=False)
     except SystemExit:
-        # The reader of the help text has left.
+        # The reader of the help text has left, or typer has answered a shell.
         return None
+    if call == 1:  # of a shell that typer does not know
+        raise UsageError("there is a completion for bash, zsh, fish and PowerShell; run this in one of them")
     return call if isinstance(call, Call) else None
 
 
 def program(callback: Callable[..., Any], text: str, epilog: str) -> typer.Typer:
     """Return the program: the group of all verbs, with what stands before them as `callback`."""
-    # makes typer's shells known; it does so itself only where its own options, which take no shell, are added
-    typer.completion.get_completion_inspect_parameters()
-    app = typer.Typer(cls=Verbs, **_STYLE)
+    app = typer.Typer(cls=Verbs, **{**_STYLE, "add_completion": True})
     app.callback(invoke_without_command=True, help=text, epilog=epilog)(callback)
     return app

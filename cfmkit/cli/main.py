@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit._version import __version__
-from cfmkit.cli import shell_completion, streams
+from cfmkit.cli import streams
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
@@ -101,9 +101,6 @@ def _run(given: list[str]) -> ExitCode:
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
-    if (wanted := os.environ.get("_CFMKIT_COMPLETE", "")).startswith("source_"):  # as typer spells --show-completion
-        del os.environ["_CFMKIT_COMPLETE"]
-        given = ["--show-completion", wanted.removeprefix("source_")]
     call = parse(program(_before_the_verb, TEXT, EPILOG), given)
     if call is None:
         streams.put("")
@@ -193,22 +190,9 @@ def _again(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], 
     timer.start()
 
 
-def _of_shell(verb: str, text: str) -> Any:
-    """Return the declaration of an option that takes a shell, or finds out in which it runs."""
-    return typer.Option(
-        f"--{verb}-completion",
-        metavar="[SHELL]",
-        help=f"{text}: {', '.join(shell_completion.SHELLS)}; default: the shell this runs in.",
-        callback=getattr(shell_completion, verb),
-        autocompletion=shell_completion.shells,
-    )
-
-
 def _before_the_verb(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
-    show_completion: Annotated[str | None, _of_shell("show", "Print the script that completes commands")] = None,
-    install_completion: Annotated[str | None, _of_shell("install", "Make a shell complete commands")] = None,
 ) -> Any:
     if version:
         streams.put(f"cfmkit {__version__}\n")

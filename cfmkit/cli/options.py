@@ -177,9 +177,7 @@ class FigureChoice(Common):
 class OneSpec(Changing):
     """Options of verbs that read one specification and write a folder."""
 
-    spec: Annotated[
-        str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", shell_completion.specs)
-    ]
+    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism; - reads standard input.")]
     out: Out = None
     no_lock: NoLock = False
 

@@ -86,7 +86,7 @@ def noting(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
         try:
             yield journal
         except Stopped as stop:
-            if journal.held:
+            if len(journal):
                 stop.goes_on(fresh)
             else:
                 stop.starts_over()
@@ -140,8 +140,6 @@ def desk(out: str, terminal: Terminal, fresh: bool = False) -> Iterator[Desk]:
     from cfmkit.store import RunFolder
 
     with RunFolder(out) as folder, noting(folder, fresh) as journal, watching(terminal) as progress:
-        if journal.damaged:
-            terminal.complain([f"journal  {journal.damaged} damaged records are computed again"])
         yield Desk(folder, journal, progress)
 
 

@@ -29,14 +29,11 @@ KEY_DIGITS = 32
 class Notes(Protocol):
     """Notes of a long run on what it has finished, for the run after it: `cfmkit.studies.journal.Journal`."""
 
-    def find(self, key: str, /) -> int:
-        """Return where the record of a key (32 hexadecimal digits) lies; -1 if there is none."""
+    def find(self, key: str, /) -> Any:
+        """Return the record of a key (32 hexadecimal digits) from an earlier run; None if there is none."""
 
-    def read(self, place: int, key: str, /) -> Any:
-        """Return the record of a key that lies at a place."""
-
-    def add(self, key: str, record: Any, /) -> int:
-        """Keep a record of plain numbers, words, lists and mappings; return where it lies."""
+    def add(self, key: str, record: Any, /) -> None:
+        """Keep a record of plain numbers, words, lists and mappings."""
 
 
 class Means(Protocol):
@@ -139,8 +136,7 @@ def done(stage: Stage, means: Means, clock: Clock, tell: Callable[[Mapping[int, 
         Takes the records so far, at the beginning and after each job.
     """
     keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:KEY_DIGITS] for job in stage.jobs}
-    places = {job: means.notes.find(key) for job, key in keys.items()}
-    records = {job: means.notes.read(place, keys[job]) for job, place in places.items() if place >= 0}
+    records = {job: record for job, key in keys.items() if (record := means.notes.find(key)) is not None}
     reused, lost = len(records), list[str]()
     tell(records)
     left = [job for job in stage.jobs if job not in records]

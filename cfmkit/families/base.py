@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
-from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
+from cfmkit.results import OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.rows import SolvedRows
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
@@ -155,7 +155,6 @@ SHARED = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
     PART_NOT_DRAWN: "the designed part cannot be cut as it is: no drawing is written",
     THIN_WALL: "the part as drawn has walls that are thinner than its process can make",
-    OLD_KEY: "a key has been renamed; this version still reads the old name",
     OVERWRITTEN: "the design replaces a stated value with its own",
 }
 """Findings that are made of any family's result or design."""

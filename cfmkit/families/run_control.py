@@ -34,14 +34,11 @@ def _one_by_one(
 class _Forgotten:
     """Keeps nothing: the default for library use."""
 
-    def find(self, _key: str, /) -> int:
-        return -1
+    def find(self, _key: str, /) -> None:
+        return None
 
-    def read(self, place: int, key: str, /) -> Any:
-        raise KeyError(key)
-
-    def add(self, _key: str, _record: Any, /) -> int:
-        return -1
+    def add(self, _key: str, _record: Any, /) -> None:
+        pass
 
 
 def silent(_fraction: float, _text: str) -> None:

@@ -7,8 +7,11 @@ trying; the caller designs them, analyses each with its exact model and keeps th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
+
+from cfmkit.stock.material_and_part_spec import MaterialSpec
+from cfmkit.stock.processes import METAL
 
 if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
@@ -17,6 +20,10 @@ MaterialBlock = Mapping[str, Any]
 
 RESERVED = 0.8
 """Share of the strength that is used where made parts have to be good: sources scatter moduli by 10 % and more."""
+
+ASSUMED_STRAINS = {"plastic": (0.015, 0.04), "metal": (0.003, 0.006)}
+"""Strains that designs use of a material whose strength is not stated: about those of PLA and aluminium at yield, then
+what published mechanisms of printed plastic are bent to. The stress of what comes of it is not judged."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,26 @@ class Wish:
     def strength_used(self) -> float:
         """The share of the allowable stress that designs may use: made parts are thicker and stiffer than drawn."""
         return self.reserve * (1.0 if self.good_parts is None else RESERVED)
+
+    @property
+    def with_strengths(self) -> tuple[Wish, ...]:
+        """The wish with a strength for every material, assumed where none is known: laws size parts by their stress."""
+        levels = zip(*map(_with_strengths, self.materials), strict=True)
+        made = [replace(self, materials=blocks) for blocks in levels] or [self]
+        return tuple(made if made[0] != made[-1] else made[:1])
+
+    def stated_material(self, block: MaterialBlock) -> MaterialBlock:
+        """Return the material of a candidate as the wish states it: without a strength that was only assumed."""
+        return next((stated for stated in self.materials if block in _with_strengths(stated)), block)
+
+
+def _with_strengths(block: MaterialBlock) -> tuple[MaterialBlock, MaterialBlock]:
+    """Return a material with the strengths that designs may use: its own twice, or two that are assumed."""
+    material = MaterialSpec.model_validate(dict(block))
+    if material.yield_strength is not None:
+        return block, block
+    low, high = ASSUMED_STRAINS["metal" if material.modulus > METAL else "plastic"]
+    return {**block, "yield_strength": low * material.modulus}, {**block, "yield_strength": high * material.modulus}
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from cfmkit.metrics.metric_definitions import (
     unknown_metric,
 )
 from cfmkit.metrics.usable_interval_of_all_branches import Cycle, cycle
-from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE, Finding, Quantity, Status
+from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import Share, between
 
 if TYPE_CHECKING:
@@ -336,12 +336,8 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
 
 
 def windows_judged(result: Result) -> Result:
-    """Return a result that warns of windows that its nominal curve does not cover, and of keys by old names."""
+    """Return a result that warns of windows that its nominal curve does not cover."""
     found = tuple(Finding(WINDOW_OUTSIDE, _reported(gap, result)) for gap in gaps(result))
-    found += tuple(
-        Finding(OLD_KEY, f"'{old}' is the old name of '{new}', and read by this version only: write {written}")
-        for old, new, written in result.spec.old_keys()
-    )
     return replace(result, warnings=LazySequence(lambda: (*result.warnings, *found))) if found else result
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, room_above, size_mm, styled
+from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, size_mm, styled
 from cfmkit.plots.tick_numbers import WholeNumbers, brief
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
@@ -107,9 +107,7 @@ def write_heading(figure: Figure, heading: Heading) -> None:
     if titles:
         _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL + 0.5, "weight": "bold"})
     if heading.note:  # what is wrong is said in any case
-        _write_line(
-            figure, (6.4 if titles else 1.8) + room_above(), (heading.note, ""), {"size": SMALL, "color": TROUBLE}
-        )
+        _write_line(figure, (6.4 if titles else 1.8), (heading.note, ""), {"size": SMALL, "color": TROUBLE})
 
 
 def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: dict[str, Any]) -> None:

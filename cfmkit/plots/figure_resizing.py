@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -56,8 +56,6 @@ class FigureLayout:
     size: tuple[float, float] = (0.0, 0.0)  # of the figure [mm]
     asked: list[Box] = dataclasses.field(default_factory=list)  # boxes of the axes, in the order of the drawing [mm]
     boxes: Sequence[Box] = ()  # what it gets instead
-    host: Any = None  # where it draws, if not in a figure of its own
-    above: float = 0.0  # room at the top that it is to leave free, for the letter of a panel [mm]
     stacked: bool = False  # whether boxes that stood side by side stand below each other: each has its own scales, then
 
     def sized(self, width: float, height: float) -> tuple[float, float]:
@@ -87,14 +85,6 @@ class FigureLayout:
             x, y = across.at(left, factor), up.at(low, taller)
             boxes.append((x, y, across.at(left + wide, factor) - x, up.at(low + high, taller) - y))
         return FigureLayout((width, up.at(self.size[1], taller) - cut), [], boxes)
-
-    def taller(self, height: float) -> FigureLayout:
-        """Return a layout with its boxes stretched upwards to the height of a panel [mm]; margins stay."""
-        up = _Stretch.of([(low, low + high) for _, low, _, high in self.boxes], self.size[1])
-        factor = up.factor(height)
-        ends = [(up.at(low, factor), up.at(low + high, factor)) for _, low, _, high in self.boxes]
-        boxes = [(box[0], low, box[2], top - low) for box, (low, top) in zip(self.boxes, ends, strict=True)]
-        return FigureLayout((self.size[0], up.at(self.size[1], factor)), [], boxes)
 
     def narrowed(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
         """Return the layout for another width [mm]: stretched, or with boxes below each other where they do not fit."""
@@ -215,15 +205,14 @@ def _keep_on_paper(ax: Axes) -> None:
         return
     ax.yaxis.get_tightbbox()  # puts the label where it will be drawn
     scale = 72.0 / label.figure.dpi
-    edge = EDGE + label.figure.bbox.x0 * scale  # of a panel, which may begin inside the paper
-    outside = edge - label.get_window_extent().x0 * scale
+    outside = EDGE - label.get_window_extent().x0 * scale
     if outside <= 0.0:
         return
     ax.yaxis.labelpad -= min(outside, ax.yaxis.labelpad)
     ax.yaxis.get_tightbbox()
     box = label.get_window_extent()
-    if box.x0 * scale < edge:  # in smaller letters, then
-        label.set_fontsize(float(label.get_fontsize()) * max((box.x1 * scale - edge) / (box.width * scale), 0.7))
+    if box.x0 * scale < EDGE:  # in smaller letters, then
+        label.set_fontsize(float(label.get_fontsize()) * max((box.x1 * scale - EDGE) / (box.width * scale), 0.7))
 
 
 def _keep_note_on_paper(text: Text, figure: Figure) -> None:
@@ -238,7 +227,7 @@ def _keep_note_on_paper(text: Text, figure: Figure) -> None:
 
 def _keep_name_below_on_paper(ax: Axes) -> None:
     """Move the name of a horizontal axis sideways where it would leave the paper, smaller where it is wider."""
-    label, paper = ax.xaxis.label, ax.figure.bbox  # of a panel, its part of the paper
+    label, paper = ax.xaxis.label, ax.figure.bbox
     edge = EDGE / 72.0 * ax.figure.dpi
     if not label.get_text():
         return

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, write_heading
-from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, room_above, size_mm, styled
+from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, size_mm, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +44,7 @@ def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] 
 def _key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
     """Write the key below the heading, or at the top where there is none."""
     width, height = size_mm(figure)
-    down = (6.0 if has_titles() else 1.0) + room_above()
+    down = 6.0 if has_titles() else 1.0
     return figure.legend(
         handles=list(entries),
         loc="upper left",

@@ -144,9 +144,6 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     """Return an empty figure of a print size in millimetres, on the Agg canvas; in a layout, the one that it has."""
     layout = current()
     if layout is not None:
-        if layout.host is not None:
-            found: Figure = layout.host
-            return found
         width_mm, height_mm = layout.sized(width_mm, height_mm)
     figure = Figure(figsize=(width_mm * MM, height_mm * MM))
     FigureCanvasAgg(figure)
@@ -154,7 +151,7 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
 
 
 def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
-    """Return width and height of a figure, or of a part of one [mm of print]."""
+    """Return width and height of a figure [mm of print]."""
     dots = figure.dpi * MM
     return float(figure.bbox.width) / dots, float(figure.bbox.height) / dots
 
@@ -162,12 +159,6 @@ def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
 def has_titles() -> bool:
     """Return whether headings are to be written."""
     return _TITLES.get()
-
-
-def room_above() -> float:
-    """Return the room at the top of the figure that belongs to the letter of a panel [mm]."""
-    layout = current()
-    return 0.0 if layout is None else layout.above
 
 
 @contextmanager

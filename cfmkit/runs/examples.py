@@ -30,7 +30,7 @@ class Example:
     name : str
         Path below the folder of all, without its ending: ``cam``, ``studies/cam_tolerance``.
     family : str
-        As the file says; ``figure`` for a figure of several runs.
+        As the file says.
     about : str
         What it is: the first sentence of the file's comment.
     path : Path
@@ -67,7 +67,7 @@ def examples() -> tuple[Example, ...]:
     --------
     >>> import cfmkit
     >>> cfmkit.examples()[0].name, len({example.family for example in cfmkit.examples()})
-    ('beam_cantilever', 5)
+    ('beam_cantilever', 4)
     """
     root = folder()
     files = sorted(root.rglob("*.yaml"), key=lambda path: (len(path.parts), path))
@@ -77,10 +77,9 @@ def examples() -> tuple[Example, ...]:
 def _example(path: Path, root: Path) -> Example:
     lines = path.read_text(encoding="utf-8").splitlines()
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("family:"))
-    is_figure = any(line.startswith("panels:") for line in lines)
     head = takewhile(lambda line: line.startswith("#"), lines)
     comment = " ".join(line.removeprefix("#").strip() for line in head)
-    family = "figure" if is_figure else next(named, "")
+    family = next(named, "")
     name = path.relative_to(root).with_suffix("").as_posix()
     searches = any(line.strip() == "optimise:" for line in lines)
     return Example(name, family, _first_sentence(comment), path, searches)
@@ -139,19 +138,11 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     from cfmkit.runs.editor_schema import write_schema
     from cfmkit.specs.data_file_paths import named_in
     from cfmkit.store.safe_disk_changes import discard, make_folders, remove_empty, reporting, write_new
-    from cfmkit.studies.batch_sources_and_outcomes import is_figure
 
     chosen = example(name)
     target = Path(out) / chosen.path.name
-    composed = is_figure(str(chosen.path))
-    schema = schema and not composed
-    if composed:
-        from cfmkit.runs.composed_figure import read
-
-        data = [(panel.run, chosen.path.parent / panel.run) for panel in read(str(chosen.path)).panels]
-    else:
-        data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
-    # what is there already and says the same stays: a figure finds the studies that were copied one by one
+    data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
+    # what is there already and says the same stays: two examples may name the same data
     missing = [(text, path) for text, path in data if not _same(target.parent / text, path)]
     wanted = {target: chosen.path, **{target.parent / text: path for text, path in missing}}
     _refuse_taken(wanted)

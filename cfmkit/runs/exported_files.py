@@ -136,7 +136,7 @@ def _decks(spec: Spec) -> dict[str, bytes]:
     record = family(spec.family)
     if record.elastic_parts is None:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
-    from cfmkit.elastica.beam_deck_for_abaqus import beam_deck
+    from cfmkit.export.beam_deck_for_abaqus import beam_deck
     from cfmkit.solid.mesh_deck_for_abaqus import deck
 
     parts = record.driven_parts(spec)

@@ -29,14 +29,6 @@ from cfmkit.specs.units import (
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 
-class OldWords:
-    """Words of a closed choice that are still understood, and that are not documented (an annotation)."""
-
-    def __init__(self, *words: str) -> None:
-        """Keep them."""
-        self.old_words = words
-
-
 class Requirement(Model):
     """One condition that a finished run is checked against."""
 
@@ -349,10 +341,6 @@ class Spec(Model):
         """What is cut from a sheet: each width out of the plane [m], by its key below `mechanism`."""
         return {}
 
-    def old_keys(self) -> Iterator[tuple[str, str, str]]:
-        """Yield (path, path by its name of today, what to write there) of each key that stands under an old name."""
-        yield from ()
-
     def windows(self) -> Iterator[tuple[tuple[str | int, ...], Ends]]:
         """Yield (path, window) of the analysis, then of each requirement that has its own."""
         # a family need not have this block, and no family is named here
@@ -485,7 +473,6 @@ __all__ = [
     "Length",
     "Model",
     "NonNegativeLength",
-    "OldWords",
     "PositiveForce",
     "PositiveLength",
     "Requirement",

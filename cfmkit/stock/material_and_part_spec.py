@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -132,6 +132,7 @@ class MaterialSpec(Model):
     counts as set: with another name come that material's values.
     """
 
+    removed_keys: ClassVar[dict[str, str]] = {"allowable_stress": "write 'yield_strength', beside a 'safety_factor'"}
     name: str | None = Field(None, description="a name from `show materials`")
     youngs_modulus: PositiveStress | None = Field(None, description="E; default: the named material's")
     poisson_ratio: Annotated[Ratio, Field(gt=-1, le=0.5)] | None = Field(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MANIFEST = "manifest.json"
 RESERVED = ".cfmkit"
-JOURNAL = ".cfmkit-journal.jsonl"
+JOURNAL = ".cfmkit-journal.sqlite"
 """What a long run notes as it goes; unlike its other files it is there before the run ends, and stays."""
 CURE = "move it away or give another output folder (--out)"
 

@@ -20,8 +20,6 @@ import errno
 import logging
 import os
 import platform
-import re
-import stat
 import tempfile
 import time
 import warnings
@@ -49,8 +47,6 @@ second."""
 
 _NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL}
 """EINVAL is what Windows says of a network drive without locks."""
-
-_SIGNATURE = re.compile(rb" ?[0-9]+ \S*\n")
 
 NO_LOCK = "CFMKIT_NO_LOCK"
 """Variable of the environment that says to lock nothing: workers in other processes write folders, too."""
@@ -96,7 +92,7 @@ class FolderLock:
             If the lock file cannot be made; FileNotFoundError if the folder has gone.
         """
         os.stat(self._folder)
-        if os.environ.get(NO_LOCK, "") in ("", "0"):
+        if locks_wanted():
             self._descriptor = _lock(self._folder / LOCK, self._folder)
             if self._descriptor < 0:
                 self._soft = _lock_softly(self._folder / SOFT_LOCK, self._folder)
@@ -128,30 +124,20 @@ class FolderLock:
         self._descriptor, self._soft, self.name = -1, None, ""
 
 
+def locks_can_be_used(folder: Path) -> bool:
+    """Return True if files in a folder may be locked (no ``--no-lock``), and can be."""
+    return locks_wanted() and has_native_locks(folder)
+
+
+def locks_wanted() -> bool:
+    """Return True unless the user said to lock nothing."""
+    return os.environ.get(NO_LOCK, "") in ("", "0")
+
+
 def has_native_locks(folder: Path) -> bool:
     """Return True if files in a folder can be locked by the operating system; the folder must be writable."""
     with tempfile.TemporaryFile(dir=folder) as file:
         return _try(file.fileno()) is not None
-
-
-def lock_files(folder: Path) -> tuple[str, ...]:
-    """Return the names of the lock files that a run has left in a folder, or has there now: those that say whose."""
-    return tuple(name for name in (LOCK, SOFT_LOCK) if _is_signed(folder / name))
-
-
-def _is_signed(file: Path) -> bool:
-    if not os.path.lexists(file) or not stat.S_ISREG(os.lstat(file).st_mode):
-        return False
-    try:
-        with file.open("rb", buffering=0) as opened:
-            text = opened.read(300)
-    except PermissionError:
-        if os.name != "nt":
-            raise
-        return True  # Windows: what another process has locked cannot be read
-    if file.name == LOCK:
-        return _SIGNATURE.fullmatch(text) is not None
-    return re.fullmatch(rb"[0-9]+\n\S+\n([0-9]+\n)?", text) is not None
 
 
 def _lock(file: Path, folder: Path) -> int:

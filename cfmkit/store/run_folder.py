@@ -154,11 +154,6 @@ class RunFolder:
         self._require_open()
         return self.path / JOURNAL
 
-    @property
-    def lock_file(self) -> str:
-        """The name of the file that is the lock; "" if the folder is not locked."""
-        return self._lock.name
-
     def commit(self, info: Mapping[str, Any]) -> Manifest:
         """Put the files and a manifest in place of those of the run before, all or none; once.
 

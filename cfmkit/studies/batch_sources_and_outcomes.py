@@ -154,7 +154,7 @@ def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
     for path in sorted(_paths(pattern, root or "")):
         whole = os.path.join(root, path) if root else path
         ours = OUTPUTS in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
-        if os.path.isfile(whole) and not ours and not is_figure(whole):
+        if os.path.isfile(whole) and not ours:
             found.append(path)
     return found
 
@@ -196,21 +196,6 @@ def _folders_below(top: str, root: str) -> Iterator[str]:
         below = [one for one in kept if os.path.isdir(one)]  # one.is_dir() fails where a link leads to itself
         waiting.extendleft(os.path.join(folder, one.name, "") for one in reversed(below) if not one.is_symlink())
         waiting.extend(os.path.join(folder, one.name, "") for one in below if one.is_symlink())
-
-
-def is_figure(path: str) -> bool:
-    """Return whether a YAML file says how a figure is composed: a search for specifications passes it by."""
-    if not path.lower().endswith(ENDINGS):
-        return False
-    try:
-        with open(path, encoding="utf-8", errors="replace") as file:
-            return any(line.startswith("panels:") for line in file.read(LONGEST_HEAD).splitlines())
-    except OSError:
-        return False
-
-
-LONGEST_HEAD = 4000
-"""Characters of a file in which the key `panels` is looked for; no comment at the top of a file is as long."""
 
 
 def folders(files: Sequence[str]) -> tuple[str, ...]:

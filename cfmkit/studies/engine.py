@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
-from cfmkit.studies.journal import INSIDE, MOST_TOGETHER, Memory, line_of
+from cfmkit.studies.journal import Memory
 from cfmkit.studies.point_evaluation import Row
 from cfmkit.studies.row_blocks_for_journal import ResultRows, cut, gathered, joined, recalled, recalled_row, record
 from cfmkit.studies.serial_and_cluster_executors import Lost, serial
@@ -38,8 +38,8 @@ TOGETHER, SHARES = 256, 12
 A sweep of 3600 cams takes a seventh less time per row in 256 at a time than in 64, in 1024 another fifteenth.
 """
 
-MISSING, HELD = -1, -2
-"""In place of where a row lies in the journal: it is not there yet; it is held in memory."""
+MISSING, HELD, NOTED = 0, 1, 2
+"""Where a row is: nowhere yet, in memory, in the journal."""
 
 
 @dataclass(frozen=True)
@@ -161,10 +161,9 @@ class Records:
     def __init__(self, work: Work, journal: Journal | Memory) -> None:
         """Start without rows."""
         self.work, self._journal = work, journal
-        self._places = np.full(len(work.plan), MISSING, dtype=np.int64)
+        self._places = np.full(len(work.plan), MISSING, dtype=np.uint8)
         self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
         self._held: dict[int, ResultRows] = {}
-        self._line: tuple[str, ResultRows | None] = ("", None)
         self.reused = self.bugs = 0
         self.bug = ""
 
@@ -179,28 +178,29 @@ class Records:
 
     def recall(self, job: Job) -> ResultRows | None:
         """Return rows that the journal had from before, and remember them; None if it had not."""
-        place = self._journal.find(job.key)
-        if place < 0:
+        reported = self._journal.find(job.key)
+        if reported is None:
             return None
-        rows = self._rows(self._journal.read(place, job.key))
+        rows = self.work.recall(reported)
         if len(rows) != job.stop - job.start:
             return None
-        self._lies(job, place)
+        self._noted(job)
         self.reused += len(rows)
         return rows
 
     def keep(self, job: Job, rows: ResultRows) -> None:
         """Note rows: in the journal if they would be the same anywhere, else until the process ends."""
         if rows.keepable:
-            self._lies(job, self._journal.add(job.key, record(rows)))
+            self._journal.add(job.key, record(rows))
+            self._noted(job)
             return
         self._places[job.start : job.stop] = HELD
         self._held[job.start] = rows
         self.bugs += len(rows.bugs)
         self.bug = self.bug or next(iter(rows.bugs.values()), "")
 
-    def _lies(self, job: Job, place: int) -> None:
-        self._places[job.start : job.stop] = place
+    def _noted(self, job: Job) -> None:
+        self._places[job.start : job.stop] = NOTED
         self._keys[job.start : job.stop] = np.frombuffer(bytes.fromhex(job.key), dtype=np.uint8)
 
     def batches(self, size: int = BLOCK) -> Iterator[tuple[NDArray[np.int64], ResultRows]]:
@@ -238,67 +238,29 @@ class Records:
             yield at, part
             at += 1 if isinstance(part, Row) else len(part)
 
-    @property
-    def loose(self) -> bool:
-        """Whether single rows have lines of their own in the journal."""
-        alone = (self._places >= 0) & ((self._places & INSIDE) == 0)
-        return not self.work.vectorised and int(alone.sum()) > 1
-
-    def places(self) -> NDArray[np.int64]:
-        """Return where in the journal rows lie, each place once."""
-        return np.unique(self._places[self._places >= 0])
-
-    def lines(self) -> Iterator[bytes]:
-        """Yield the lines of a journal that holds these rows and nothing else: single ones stand together."""
-        keys: list[str] = []
-        rows: list[ResultRows] = []
-        at = 0
-        while at < len(self._places):
-            if self._places[at] < 0:
-                at += 1
-                continue
-            key, reported = self._key(at), self._reported(at)
-            if "n" in reported and "keys" not in reported:
-                yield self._journal.line(int(self._places[at]), key)
-                at += int(reported["n"])
-                continue
-            keys.append(key)
-            rows.append(self._rows(reported))
-            at += 1
-            if len(keys) == MOST_TOGETHER:
-                yield _together(keys, rows)
-                keys, rows = [], []
-        if keys:
-            yield _together(keys, rows)
+    def noted_keys(self) -> Iterator[bytes]:
+        """Yield the keys of all rows that are in the journal; rows of one block have the same."""
+        noted = self._keys[self._places == NOTED]
+        first = np.append(True, (noted[1:] != noted[:-1]).any(axis=1))[: len(noted)]
+        yield from (key.tobytes() for key in noted[first])
 
     def _key(self, index: int) -> str:
         key: bytes = self._keys[index].tobytes()
         return key.hex()
 
     def _reported(self, index: int) -> Any:
-        return self._journal.read(int(self._places[index]), self._key(index))
+        return self._journal.read(self._key(index))
 
     def _read(self, index: int) -> ResultRows | Row:
         reported = self._reported(index)
-        return self._rows(reported) if "n" in reported else recalled_row(reported)
-
-    def _rows(self, reported: Any) -> ResultRows:
-        """Return the rows stored in a record; of one among others its own, the line being read once for all of them."""
-        if "at" not in reported:
-            return self.work.recall(reported)
-        keys, whole = self._line
-        if whole is None or keys is not reported["keys"]:
-            whole = self.work.recall(reported)
-            self._line = reported["keys"], whole
-        return cut(whole, reported["at"], reported["at"] + 1)
+        return self.work.recall(reported) if "n" in reported else recalled_row(reported)
 
     def row(self, index: int) -> ResultRows:
         """Return the row of one finished point."""
-        start = index - index % self.work.step if int(self._places[index]) != HELD else index
         if int(self._places[index]) == HELD:
             start = max(at for at in self._held if at <= index)
             return cut(self._held[start], index - start, index - start + 1)
-        rows = self._rows(self._reported(index))
+        rows, start = self.work.recall(self._reported(index)), index - index % self.work.step
         return rows if len(rows) == 1 else cut(rows, index - start, index - start + 1)
 
 
@@ -383,24 +345,14 @@ def _merged(jobs: list[Job]) -> Job:
     return first if first is last else Job(first.start, last.stop, first.key, tuple(jobs))
 
 
-def _together(keys: list[str], rows: list[ResultRows]) -> bytes:
-    """Return the line of a journal that holds several single rows."""
-    whole = joined(rows)
-    return line_of(keys[0], {"keys": "".join(keys), **record(whole)} if len(keys) > 1 else record(whole))
-
-
 def compact(journal: Journal, pieces: Sequence[Records]) -> None:
-    """Bring the journal of a finished study to a tenth of its size; a later run with more points still finds these.
+    """Make the journal of a finished study small; a later run with more points still finds its rows.
 
     What it holds of other studies is dropped: most of it is of older code or another specification. If it cannot be
     written anew it stays as it is.
     """
-    used = np.unique(np.concatenate([piece.places() for piece in pieces])) if pieces else np.zeros(0)
-    tidy = len(used) == journal.held and not journal.damaged and not any(piece.loose for piece in pieces)
-    if tidy or not len(used):
-        return
     with suppress(OutputError):
-        journal.rewrite(line for piece in pieces for line in piece.lines())
+        journal.keep_only(key for piece in pieces for key in piece.noted_keys())
 
 
 __all__ = ["Job", "Monitor", "Records", "Silent", "Work", "compact", "run"]

@@ -61,10 +61,9 @@ class KeptRuns:
         file that it names may be there now.
         """
         key = self._asked[folder] = self._key(spec, folder)
-        place = -1 if key is None else self._notes.find(key)
-        if key is None or place < 0:
+        reported = None if key is None else self._notes.find(key)
+        if reported is None:
             return None
-        reported = self._notes.read(place, key)
         entry = _entry(reported["entry"])
         if not entry.verb:
             return entry

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import UsageError, visible
 from cfmkit.plots.study import figures
 from cfmkit.plots.study_data_to_draw import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.results import Status
@@ -17,7 +15,6 @@ from cfmkit.tables import Table, TableColumn, border_values, read_csv
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -152,35 +149,6 @@ def _branches(table: Table) -> dict[str, tuple[FloatArray, FloatArray]]:
     branch = np.array(table.columns[0].cells())
     motion, effort = (np.array(column.cells(), dtype=np.float64) for column in table.columns[1:3])
     return {name: (motion[branch == name], effort[branch == name]) for name in dict.fromkeys(branch.tolist())}
-
-
-def makers_of(folder: Path, spec: Spec) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each picture of a sweep, by name; its curves where curves.csv has them.
-
-    Parameters
-    ----------
-    folder : Path
-        Output folder of a sweep.
-    spec : Spec
-        What was swept.
-
-    Raises
-    ------
-    cfmkit.errors.CfmError
-        If a file is missing or is not as it was written.
-    """
-    try:
-        summary = json.loads((folder / "metrics.json").read_bytes())
-        curves = folder / "curves.csv"
-        known = read_csv(curves) if curves.is_file() else None
-        table = read_csv(folder / "results.csv")
-        found = _marks(spec, summary, table)
-        makers = makers_of_tables(spec, summary, table, known)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise UsageError(f"the sweep in {visible(str(folder))} cannot be drawn from its files: run it again") from None
-    if len(table) < int(summary["points"]["total"]) or not np.isfinite([one.values for one in found.varied]).all():
-        raise UsageError(f"the sweep in {visible(str(folder))} was not finished: run the same command again")
-    return makers
 
 
 def makers_of_tables(

@@ -17,7 +17,6 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.spec import Sensitivity, Tolerance
-from cfmkit.stock.material_and_part_spec import PartProcess
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES, SPRING_RATE, usual
 from cfmkit.studies.sensitivity.distributions import draw, values_at
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.specs.spec import DesignBlock, Spec
-    from cfmkit.stock.material_and_part_spec import MaterialSpec
+    from cfmkit.stock.material_and_part_spec import MaterialSpec, PartProcess
     from cfmkit.stock.processes import ProcessAccuracy
     from cfmkit.studies.sensitivity.parameters import Parameter
 
@@ -226,14 +225,10 @@ def _band(material: MaterialSpec) -> tuple[float, float] | None:
 
 
 def process_of_part(spec: Spec) -> PartProcess | None:
-    """Return how a part is made, as `mechanism.part.process` or its old name `mechanism.process` says; None: unsaid."""
+    """Return how a part is made, as `mechanism.part.process` says; None: unsaid."""
     mechanism = getattr(spec, "mechanism", None)
     blocks = (getattr(mechanism, name, None) for name in ("part", "plate"))
-    said: PartProcess | None = next((one for block in blocks if (one := getattr(block, "process", None))), None)
-    old = getattr(mechanism, "process", None)
-    if said is None and old is not None:
-        return PartProcess(position=old.layer, least_feature=old.thinnest)
-    return said
+    return next((one for block in blocks if (one := getattr(block, "process", None))), None)
 
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:

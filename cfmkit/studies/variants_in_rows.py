@@ -14,7 +14,6 @@ from cfmkit.metrics.branches_cut_to_window import TOLERANCE
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.metrics.requirements import Bounds
-from cfmkit.results import OLD_KEY
 from cfmkit.specs.units import between
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
@@ -142,9 +141,7 @@ class SolvedVariants:
         return np.asarray(np.take_along_axis(stack, chosen[None], axis=0)[0])
 
     def _findings(self) -> dict[str, NDArray[np.bool_]]:
-        found = self.solved.findings()
-        old = np.array([any(True for _ in spec.old_keys()) for spec in self.specs])
-        return {**found, OLD_KEY: old} if old.any() else found
+        return self.solved.findings()
 
 
 SMALLEST, SMALLEST_TRACED = 64, 8

@@ -15,7 +15,7 @@ CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 LONG = ("beam_design_lan", "beam_lan_rising")
 
 
-JOURNAL = ".cfmkit-journal.jsonl"
+JOURNAL = ".cfmkit-journal.sqlite"
 """Where a search notes what it has finished."""
 
 EVERY_DESIGN = "design.yaml", "geometry/"

@@ -17,7 +17,7 @@ def test_every_config_is_listed_with_its_family_and_a_sentence(cli):
         path.relative_to(ROOT / "configs").with_suffix("").as_posix() for path in (ROOT / "configs").rglob("*.yaml")
     }
     assert {one["name"] for one in listed} == files
-    assert {one["family"] for one in listed} == {"beam", "cam", "figure", "slider-crank", "vcfm"}
+    assert {one["family"] for one in listed} == {"beam", "cam", "slider-crank", "vcfm"}
     assert all(len(one["about"]) > 20 for one in listed)
 
 
@@ -89,18 +89,6 @@ def test_a_copy_of_a_study_names_the_command_that_runs_it_and_the_file_as_it_lie
     assert "configs/" not in (cli.folder / "cam_tolerance.yaml").read_text()
     cli("examples", "cam_as_built")
     assert "--data synthetic/cam_loop.csv" in (cli.folder / "cam_as_built.yaml").read_text()
-
-
-def test_a_figure_takes_the_studies_that_were_copied_before_and_no_others(cli):
-    cli("examples", "studies/vcfm_fig9_theta2")
-    before = (cli.folder / "vcfm_fig9_theta2.yaml").read_bytes()
-    done = cli("examples", "studies/figure", "--json")
-    assert done.code == 0
-    assert "vcfm_fig9_theta2.yaml" not in done.document["files"]
-    assert (cli.folder / "vcfm_fig9_theta2.yaml").read_bytes() == before
-    (cli.folder / "figure.yaml").unlink()
-    (cli.folder / "vcfm_fig9_theta2.yaml").write_bytes(before.replace(b"25 mm", b"26 mm"))
-    assert cli("examples", "studies/figure").code == 7
 
 
 def test_quick_examples_are_run_first_and_can_be_run_alone(cli, monkeypatch):

@@ -23,12 +23,10 @@ COMMANDS = {
     "batch": ("batch", "cam.yaml", "-o", "out", "-j", "1", "--no-plots"),
     "calibrate": ("calibrate", "cam_as_built.yaml", "few.csv", *FRICTION, "-o", "out", "--no-plots"),
     "check": ("check", "cam.yaml"),
-    "clean": ("clean", "."),
     "design": ("design", "cam.yaml", "-o", "out"),
     "doctor": ("doctor",),
     "examples": ("examples",),
     "export": ("export", "cam.yaml", "-o", "out"),
-    "figure": ("figure", "one.yaml", "-o", "out"),
     "measure": ("measure", "synthetic/cam_loop.csv", "-o", "out", "--no-plots"),
     "new": ("new", "cam", "-o", "new.yaml"),
     "docs": ("docs", "--json"),
@@ -42,7 +40,7 @@ COMMANDS = {
 SECONDS = re.compile(r" +(\w+ )*[\d.]+ (ms|s|min|h)( \d+ s)?$|\d+ files, [\d.]+ MB", re.M)
 """What differs on the page between two runs: how long they took, and how much other tests have put into caches."""
 
-OWN = ("manifest.json", ".cfmkit-journal.jsonl")
+OWN = ("manifest.json", ".cfmkit-journal.sqlite")
 """Files that hold the time, the first, and the hash of such a file, the second."""
 
 
@@ -62,7 +60,6 @@ def test_the_program_says_and_writes_what_the_same_command_does_here(cli, comman
         shutil.copytree(CONFIGS, configs)
         *head, lines = (configs / "synthetic/cam_loop.csv").read_text().split("\n", 2)
         (configs / "few.csv").write_text("\n".join([*head, *lines.splitlines()[::20]]))
-        (configs / "one.yaml").write_text("panels:\n  - {run: cam.yaml, plot: loop}\n")
         cli.folder = configs
         done = run(*command)
         files = {str(path.relative_to(configs)): path for path in configs.rglob("*") if path.is_file()}

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+from journal_support import keys_in
 
 CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
 RANGES = ("--vary", "mechanism.rest_half_width=uniform:0.1 mm", "--vary", "mechanism.rolling_friction=uniform:10 %")
@@ -234,8 +235,8 @@ def test_an_interrupted_study_exits_130_and_goes_on_where_it_stopped(cli, study)
     )
     slow = ("--set", "analysis.points=100000")
     process = cli.start(*command, *slow, "-q")
-    journal, deadline = cli.folder / "out" / ".cfmkit-journal.jsonl", time.monotonic() + 60
-    while not journal.exists() or journal.stat().st_size < 500:
+    journal, deadline = cli.folder / "out" / ".cfmkit-journal.sqlite", time.monotonic() + 60
+    while not keys_in(journal):
         assert time.monotonic() < deadline
         assert process.poll() is None
         time.sleep(0.02)

@@ -14,7 +14,7 @@ from cfmkit.tables import read_csv
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-def test_a_designed_strip_comes_with_its_drawing_its_limits_and_a_second_opinion(cli):
+def test_a_designed_strip_comes_with_its_drawing_and_its_limits(cli):
     (cli.folder / "taper.yaml").write_bytes((CONFIGS / "slider_crank_taper_design.yaml").read_bytes())
     done = cli("design", "taper.yaml", "-o", "out", "--no-plots")
     assert done.code == 0, done.err
@@ -24,9 +24,6 @@ def test_a_designed_strip_comes_with_its_drawing_its_limits_and_a_second_opinion
         "slider-crank.svg",
         "strip.csv",
     }
-    reported = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
-    assert abs(reported["recheck_force"]["value"]) < 1e-4
-    assert abs(reported["recheck_stress"]["value"]) < 2e-3
     again = cli("analyze", "out/design.yaml", "-o", "again", "--no-plots", "-q")
     assert again.code == 0
 

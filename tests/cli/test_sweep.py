@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from journal_support import keys_in
 
 RADII = "mechanism.roller_radius=8 mm:16 mm:5"
 BRACES = "mechanism.brace_length=[60 mm, 200 mm, -1 mm]"
@@ -22,7 +23,7 @@ FEW = (
     # a cam cut for friction is not computed in blocks
     "--set", "mechanism.profile.friction=0.0001",
 )  # fmt: skip
-JOURNAL = ".cfmkit-journal.jsonl"
+JOURNAL = ".cfmkit-journal.sqlite"
 
 
 def rows(folder):
@@ -182,7 +183,7 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
     command = ("sweep", str(CAM), *SOME, "-o", "out", *FEW, "-j", "2")
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: journal.exists() and journal.stat().st_size > 10_000)
+    until(lambda: len(keys_in(journal)) > 20)
     process.send_signal(signal.SIGINT)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 130
@@ -204,7 +205,7 @@ def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, 
     command = ("sweep", str(CAM), *MANY, "-o", "out", *FEW, "-j", "2", *options)
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: journal.exists() and journal.stat().st_size > 2_000)
+    until(lambda: len(keys_in(journal)) > 4)
     process.send_signal(signal.SIGTERM)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 143
@@ -216,13 +217,13 @@ def test_ctrl_c_twice_ends_at_once_and_keeps_the_journal(cli, tmp_path):
     slow = ("--vary", "analysis.points=[21, 999999, 1000000]", "-o", "out", "--no-plots", "-j", "2")
     process = cli.start("sweep", str(CAM), *slow, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: journal.exists() and journal.read_bytes().count(b"\n") == 1)
+    until(lambda: len(keys_in(journal)) == 1)
     process.send_signal(signal.SIGINT)
     assert b"press Ctrl-C again to end at once" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
     assert process.returncode in (130, -signal.SIGINT)
-    assert journal.read_bytes().count(b"\n") == 1
+    assert len(keys_in(journal)) == 1
     assert not (tmp_path / "out" / "results.csv").exists()
 
 
@@ -232,7 +233,7 @@ def test_kills_at_random_moments_lose_no_row_and_change_no_byte(cli, tmp_path, k
     quiet = (*points, *FEW, "-q")
     assert cli("sweep", str(CAM), *quiet, "-o", "undisturbed", "-j", "1").code == 0
     expected = (tmp_path / "undisturbed" / "results.csv").read_bytes()
-    chance, struck, acknowledged = random.Random(kills), 0, b""
+    chance, struck, acknowledged = random.Random(kills), 0, set()
     journal = tmp_path / "out" / JOURNAL
     while struck < kills:
         jobs = chance.choice(("1", "2"))
@@ -242,14 +243,13 @@ def test_kills_at_random_moments_lose_no_row_and_change_no_byte(cli, tmp_path, k
         _, complaints = process.communicate()
         struck += process.returncode == -signal.SIGKILL
         assert b"Traceback" not in complaints
-        content = journal.read_bytes() if journal.exists() else b""
-        if not content.startswith(acknowledged):  # written anew, smaller, once the study had been finished
-            assert (tmp_path / "out" / "results.csv").read_bytes() == expected
-        acknowledged = content[: content.rfind(b"\n") + 1]
+        kept = keys_in(journal)
+        assert acknowledged <= kept
+        acknowledged = kept
         if process.returncode == 0:
             assert (tmp_path / "out" / "results.csv").read_bytes() == expected
             journal.unlink()
-            acknowledged = b""
+            acknowledged = set()
     done = cli("sweep", str(CAM), *quiet, "-o", "out")
     assert done.code == 0
     assert (tmp_path / "out" / "results.csv").read_bytes() == expected

@@ -21,4 +21,4 @@ def test_a_study_is_written_and_replaced_without_what_only_posix_has(tmp_path):
         done = cfmkit(*SWEEP, out=tmp_path / "out")
         assert (done.returncode, done.stderr) == (0, "")
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {".cfmkit-journal.jsonl", "manifest.json", "metrics.json", "resolved.yaml", "results.csv"}
+    assert names == {".cfmkit-journal.sqlite", "manifest.json", "metrics.json", "resolved.yaml", "results.csv"}

@@ -10,6 +10,11 @@ from equilibria import equilibria
 from cfmkit.elastica.results.path import EquilibriumPath, PathStatus
 
 
+def beam_stress(path: EquilibriumPath, beam: str, axial: bool = True) -> Any:
+    """Return the largest stress of a beam at every point [Pa] and its place (share of the length), (2, n)."""
+    return np.array(path.beam_stresses(axial))[:, list(path.network.beams).index(beam)]
+
+
 def functional_path(net: Any, drive: Any, degree: int = 18, pieces: int = 1) -> EquilibriumPath:
     """Return the path of a network at the points of a drive."""
     at, _ = equilibria(net, drive, degree, pieces)

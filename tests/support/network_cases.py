@@ -12,6 +12,7 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from functional_paths import beam_stress
 
 import cfmkit.elastica as elastica
 from cfmkit.elastica.model.shapes import Bent
@@ -100,7 +101,7 @@ def observe(path: elastica.Path) -> dict[str, Any]:
             seen["motion"][name] = path.motion(name)[at].tolist()
             seen["reaction"][name] = path.reaction(name)[at].tolist()
     for name in network.beams:
-        seen["stress"][name] = path.beam_stress(name)[0][at].tolist()
+        seen["stress"][name] = beam_stress(path, name)[0][at].tolist()
     loads = (*network.loads, *path.load_case.loads)
     if path.unstable[at[-1]] == 0 and not any(getattr(load, "follows", False) for load in loads):
         masses = NetworkMasses(dict.fromkeys(network.beams, DENSITY))

@@ -42,16 +42,6 @@ def test_nothing_that_may_vary_is_refused():
         cfmkit.loads(text)
 
 
-@pytest.mark.parametrize(("beams", "erring"), [("", {"s"}), ("beams: [s]", {"s"}), ("beams: []", set())])
-def test_tolerances_are_on_the_shapes_that_the_search_may_choose(beams, erring):
-    """Before, an empty list was none: the shapes of all beams erred."""
-    spec = cfmkit.loads(
-        TEXT.replace("starts: 2", f"starts: 2\n    tolerances: {{coefficients: 0.01 rad}}\n    {beams}")
-    )
-    found = spec.design.optimise.scatter(spec.mechanism)
-    assert {path.split(".")[2] for path in found if "coefficients" in path} == erring
-
-
 def test_a_start_that_the_time_ended_is_no_reason_to_widen_the_envelope():
     nothing = Explored({0: None}, reused=0, missing=0)
     assert "the time budget ended" in _nothing(nothing, StartBudget(clock=Clock(0.0))).message

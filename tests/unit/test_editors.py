@@ -2,10 +2,7 @@
 
 import contextlib
 import json
-import os
 import re
-import shutil
-import subprocess
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,11 +13,10 @@ import cfmkit
 from cfmkit import families
 from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
-from cfmkit.cli.shell_completion import BASH, ZSH
 from cfmkit.runs.editor_schema import LINE, metric_names, schema
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = [one for one in cfmkit.examples() if one.family != "figure" and "/" not in one.name]
+EXAMPLES = [one for one in cfmkit.examples() if "/" not in one.name]
 
 
 @pytest.mark.parametrize("name", ["cam", "beam", "vcfm", "slider-crank"])
@@ -89,47 +85,6 @@ def test_after_the_sign_of_equality_come_the_words_of_a_closed_choice():
     found = completed("mechanism.positive.structure=", spec=str(ROOT / "configs/vcfm_pla.yaml"))
     assert "mechanism.positive.structure=diamond" in found
     assert completed("mechanism.positive.length=", spec=str(ROOT / "configs/vcfm_pla.yaml")) == []
-
-
-@pytest.mark.parametrize(
-    ("typed", "answer"),
-    [
-        ("cfmkit analyze cam.yaml --set mechanism.roller_r", "mechanism.roller_radius=|nospace"),
-        ("cfmkit analyze mo", "more/|nospace"),
-        ("cfmkit new vc", "vcfm|"),
-        ("cfmkit analyze cam.yaml --set a.structure=di", "diamond|"),  # bash puts this behind the "="
-    ],
-)
-def test_bash_puts_no_blank_behind_a_key_or_a_folder(tmp_path, typed, answer):
-    word = answer.partition("|")[0]
-    word = f"a.structure={word}" if "structure" in typed else word
-    program = tmp_path / "cfmkit"
-    program.write_text(f"#!/bin/sh\necho '{word}'\n")
-    program.chmod(0o755)
-    press = f"""
-        compopt() {{ chosen=$2; }}
-        COMP_LINE="{typed}"; COMP_POINT=${{#COMP_LINE}}
-        _cfmkit_completion "{program}"
-        echo "${{COMPREPLY[*]}}|$chosen"
-    """
-    done = subprocess.run(["bash", "-c", BASH + press], capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == (f"{answer}\n", "")
-
-
-@pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
-def test_zsh_describes_keys_and_folders_apart_for_they_get_no_blank(tmp_path):
-    program = tmp_path / "cfmkit"
-    program.write_text("#!/bin/sh\nprintf 'sub folder/\\nmechanism.width=\\nshow\\tExplain: all\\n'\n")
-    program.chmod(0o755)
-    press = """
-        _describe() { print -r -- $1 "<${(Pj:|:)2}>" "${@:3}" }
-        words=(cfmkit s) CURRENT=2
-        _cfmkit_completion
-    """
-    defined = "compdef() { : }\n" + ZSH + press
-    path = f"{tmp_path}:{os.environ['PATH']}"
-    done = subprocess.run(["zsh", "-fc", defined], capture_output=True, text=True, env={**os.environ, "PATH": path})
-    assert done.stdout == "more follows <sub folder/|mechanism.width=> -S \nwords <show:Explain\\: all>\n"
 
 
 def test_the_recipe_for_conda_needs_what_the_package_needs():

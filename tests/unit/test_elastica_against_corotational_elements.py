@@ -3,9 +3,8 @@
 The other program: straight two-node elements, corotational and linear inside, their energy's gradient by hand and its
 derivative by complex steps. Curved beams become polygons with rigid joints: second order in the element length, which
 two meshes and Richardson's extrapolation take out. It shares no code with the engine but the fit of the shapes, and
-follows its own way from the unloaded pose. `cfmkit.elastica.verification.corotational`, the second opinion that users
-get, cannot stand in for it: it begins at the engine's pose and takes supports, links and the drive from the engine's
-layout.
+follows its own way from the unloaded pose. `corotational` in tests/support cannot stand in for it: it begins
+at the engine's pose and takes supports, links and the drive from the engine's layout.
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from corotational import recheck
 from lan_2010 import half
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Polynomial, Section, guided, trace
 from cfmkit.elastica.model.beam_fits import BeamFits
-from cfmkit.elastica.verification.corotational import recheck
 
 
 @dataclass
@@ -152,7 +151,7 @@ def test_a_v_beam_on_its_stable_branch_agrees_with_corotational_elements() -> No
 
 
 def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elements() -> None:
-    """The second opinion of the package: forces and stability there, and on the symmetric branch that is left."""
+    """Forces and stability there, and on the symmetric branch that is left."""
     length, angle = 35e-3, np.radians(7)
     nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
     network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, THICK))})

@@ -123,7 +123,7 @@ def test_what_a_function_collects_comes_from_processes_as_it_is() -> None:
     ]
 
 
-@pytest.mark.parametrize(("workers", "most"), [(1, 128), (2, 5 * 128)])
+@pytest.mark.parametrize(("workers", "most"), [(1, 256), (2, 5 * 256)])
 def test_networks_are_taken_as_they_are_needed(workers: int, most: int) -> None:
     """Endlessly many networks do not fill the memory."""
     taken = 0

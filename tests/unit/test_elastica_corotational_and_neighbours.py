@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from corotational import recheck
 
 from cfmkit.elastica import (
     CLAMPED,
@@ -25,7 +26,6 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
-from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.errors import InputError
 
 DOWN = Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 9e-3]))

@@ -37,10 +37,19 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.designs import NetworkDesigns, set_up
+from cfmkit.elastica.mechanics.designs import NetworkDesigns, raise_designs, set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
-from cfmkit.elastica.mechanics.march import SWITCH, CompiledEquations, compiled, engine, equations, march_many
+from cfmkit.elastica.mechanics.march import (
+    SWITCH,
+    CompiledEquations,
+    compiled,
+    engine,
+    equations,
+    march_many,
+    solve_designs,
+)
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.families.beam.network_from_spec import assemble
 
 ROOT = Path(__file__).parents[2]
@@ -257,7 +266,7 @@ def leaves(count: int, taper: bool = False) -> NetworkDesigns:
 @pytest.mark.parametrize("taper", [False, True])
 def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
     """Of beams that are set up together, and one by one."""
-    efforts, codes = march_many(leaves(4, taper), TARGETS)
+    efforts, codes, _ = march_many(leaves(4, taper), TARGETS)
     assert (codes == MarchCode.DONE).all()
     for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
         own = NumpyEquations(discretise(*leaf(thickness, taper), 8))
@@ -269,7 +278,7 @@ def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
 
 def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
     pairs = [(two_leaves(bend=bend), Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
-    efforts, codes = march_many(set_up(discretise(*pairs[0], 16), pairs[0], pairs), TARGETS)
+    efforts, codes, _ = march_many(set_up(discretise(*pairs[0], 16), pairs[0], pairs), TARGETS)
     assert (codes == MarchCode.DONE).all()
     for pair, row in zip(pairs, efforts, strict=True):
         path = trace(*pair, Control(tolerance=1e-8))
@@ -279,8 +288,24 @@ def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
 def test_designs_of_a_batch_may_differ_in_their_springs() -> None:
     net, drive = leaf(1e-3)
     pairs = [(replace(net, springs=(SlideSpring("b", 0.0, stiffness),)), drive) for stiffness in (10.0, 500.0)]
-    efforts, _ = march_many(set_up(discretise(*pairs[0], 8), pairs[0], pairs), TARGETS)
+    efforts, *_ = march_many(set_up(discretise(*pairs[0], 8), pairs[0], pairs), TARGETS)
     assert np.abs(efforts[1] - efforts[0]) == pytest.approx(490.0 * TARGETS, rel=1e-9)
+
+
+@pytest.mark.parametrize("numpy_only", [False, True])
+def test_states_of_a_batch_lead_to_those_of_a_higher_degree(monkeypatch: pytest.MonkeyPatch, numpy_only: bool) -> None:
+    """Efforts of designs solved from states of a lower degree are those of a march with the higher one."""
+    if numpy_only:
+        monkeypatch.setenv(SWITCH, "1")
+    designs, chosen = leaves(2), [3, 9]
+    mesh, fine = designs.template, raise_degree(designs.template, 12)
+    _, _, states = march_many(designs, TARGETS, chosen=chosen)
+    z = np.zeros((2, 2, mesh.size))
+    z[..., mesh.free] = states
+    raised = raise_designs(designs, fine)
+    found = solve_designs(raised, embed(mesh, fine, z)[..., fine.free], TARGETS[chosen], 1e-12)
+    assert found == pytest.approx(march_many(raised, TARGETS)[0][:, chosen], rel=1e-9)
+    assert np.isnan(solve_designs(raised, np.full((2, 2, len(fine.free)), 1e3), TARGETS[chosen], 1e-12)).all()
 
 
 @needs_c
@@ -301,7 +326,7 @@ def test_numpy_takes_over_without_the_compiled_module(monkeypatch: pytest.Monkey
     monkeypatch.setenv(SWITCH, "1")
     assert engine() == "numpy"
     assert type(equations(discretise(*leaf(1e-3), 8))) is NumpyEquations
-    efforts, codes = march_many(leaves(2), TARGETS)
+    efforts, codes, _ = march_many(leaves(2), TARGETS)
     assert (codes == MarchCode.DONE).all()
     assert efforts == pytest.approx(compiled_efforts, rel=1e-9)
 

@@ -7,7 +7,7 @@ from typing import Any
 import beam_networks
 import numpy as np
 import pytest
-from functional_paths import functional_path
+from functional_paths import beam_stress, functional_path
 
 from cfmkit.elastica import (
     CLAMPED,
@@ -44,7 +44,7 @@ def test_sections_of_a_cantilever_are_those_of_statics() -> None:
     assert np.hypot(seen.normal, seen.shear) == pytest.approx(force, rel=1e-9)
     assert seen.bending_stress[0] == pytest.approx(6 * seen.moment[0] / (WIDTH * THICKNESS**2))
     assert seen.axial_stress[0] == pytest.approx(seen.normal[0] / (WIDTH * THICKNESS))
-    stress, place = path.beam_stress("x", axial=False)
+    stress, place = beam_stress(path, "x", axial=False)
     assert stress[0] == pytest.approx(abs(seen.bending_stress[0, 0]), rel=1e-9)
     assert place[0] == pytest.approx(0.0, abs=1e-9)
     assert path.places("x")[[0, -1]] == pytest.approx([0.0, 1.0])
@@ -59,7 +59,7 @@ def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() 
         path = functional_path(
             Network(nodes, {"x": beam}), Displacement("b", np.pi, np.array([0.1 * LENGTH])), 16, pieces
         )
-        found.append((path.beam_stress("x")[0][0], path.beam_stress("x")[1][0], path.sections("x")))
+        found.append((*beam_stress(path, "x")[:, 0], path.sections("x")))
     (value, place, seen), (again, same, _) = found
     assert again == pytest.approx(value, rel=1e-8)
     assert same == pytest.approx(place, abs=1e-6)

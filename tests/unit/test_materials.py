@@ -230,17 +230,6 @@ def test_the_allowable_stress_is_the_yield_strength_over_the_safety_factor_in_ev
         assert result.values["allowable_stress"].value == 45e6 / factor
 
 
-def test_the_old_word_of_vcfm_for_the_allowable_stress_is_still_read_and_no_longer_written():
-    spec, _ = made_of("vcfm_ding2022", "{name: pla, allowable_stress: 30 MPa}")
-    assert spec.mechanism.allowable_stress == 30e6
-    assert "allowable_stress" not in dump(spec, complete=True)
-    assert "yield_strength: 30 MPa" in dump(spec)
-    again = spec.replace({"mechanism.material.allowable_stress": "22 MPa"})
-    assert again.mechanism.allowable_stress == 22e6
-
-
-def test_the_old_word_beside_a_safety_factor_is_refused_because_it_could_mean_two_things():
-    with pytest.raises(SpecError) as caught:
-        made_of("vcfm_ding2022", "{name: pla, allowable_stress: 30 MPa}", "mechanism.safety_factor=1.5")
-    (problem,) = caught.value.problems
-    assert "give 'yield_strength' instead" in problem.message
+def test_the_old_word_of_vcfm_for_the_allowable_stress_is_refused_with_that_of_today():
+    with pytest.raises(SpecError, match="'allowable_stress' was removed; write 'yield_strength'"):
+        made_of("vcfm_ding2022", "{name: pla, allowable_stress: 30 MPa}")

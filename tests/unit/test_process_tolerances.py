@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import pytest
+
 import cfmkit
+from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import designed
@@ -28,7 +31,7 @@ def test_every_process_has_a_reason_and_a_size():
 
 def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     asked = (Requirement(metric="force_mean", min="1.4 N", max="1.6 N"), Requirement(metric="half_band", max="1.5 %"))
-    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
+    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
     shares = first_order_shares(result, assumed(spec), Run())
@@ -43,7 +46,7 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
 
 def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     asked = (Requirement(metric="force_mean", min="1 N", max="2 N"),)
-    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
+    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     found = assumed(spec)
     assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))
@@ -114,3 +117,42 @@ def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
     again = [part for part in solved if part.mechanism.model_dump() == nominal]
     assert all(part.analysis.points < spec.analysis.points for part in again)  # once with fewer points, if any
     assert len(again) <= 1 < len(solved)
+
+
+def test_the_process_of_a_part_is_what_it_is_assumed_to_be_made_by_and_its_own_values_count():
+    spec = cfmkit.load(STRIP)
+    named = spec.replace({"mechanism.part": {"process": "mill"}})
+    own = spec.replace({"mechanism.part": {"process": {"name": "mill", "thickness": "0.007 mm"}}})
+    assert assumed(named).deviations == {"mechanism.beam.offset": 2e-5}
+    assert assumed(own).deviations == {"mechanism.beam.offset": pytest.approx(7e-6)}
+    assert assumed(own).process.least_feature == assumed(named).process.least_feature
+    # it says how parts are made where their yield is asked for, and judges no parts otherwise
+    assert tolerances_of(own, own.design, 0) is None
+    asked = own.replace({"design.yield": 0.9})
+    assert tolerances_of(asked, asked.design, 0).paths == ("mechanism.beam.offset",)
+
+
+def test_the_process_of_a_part_warns_of_what_it_cannot_make():
+    part = {"process": {"position": "0.1 mm", "least_feature": "2 mm"}}
+    spec = cfmkit.load(STRIP).replace({"analysis.points": 11, "mechanism.part": part})
+    assert {"kink_too_small", "too_thin"} <= {one.name for one in cfmkit.analyze(spec).warnings}
+
+
+@pytest.mark.parametrize(
+    ("change", "reported"),
+    [
+        ({"mechanism.part": {"process": "origami"}}, "process"),
+        ({"mechanism.process": {"layer": "0.1 mm"}}, r"'process' was removed; write 'part: \{process: \{position"),
+    ],
+    ids=["none", "the old place"],
+)
+def test_a_process_that_is_none_is_refused(change, reported):
+    with pytest.raises(SpecError, match=reported):
+        cfmkit.load(STRIP).replace(change)
+
+
+def test_tolerances_of_a_search_of_shapes_are_those_of_its_audit_alone():
+    spec = cfmkit.load("configs/beam_design_arch.yaml").replace({"design.optimise.tolerances": {"nodes": "0.05 mm"}})
+    assert tolerances_of(spec, spec.design, 0) is None
+    toleranced = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}}})
+    assert tolerances_of(toleranced, toleranced.design, 0).paths == ("mechanism.nodes.b.at.1",)

@@ -162,7 +162,6 @@ WARNED = {
         *("cam", "overstressed", "analyze", CAM),
         *changed("mechanism.contact={width: 0.01 mm, material: {name: pom}}"),
     ),
-    "old name": ("cam", "old_word", "analyze", MOVING, *changed("analysis.dynamics.method=direct")),
     "rolling in nine coordinates": (
         *("cam", "friction_left_out", "analyze", MOVING),
         *changed("analysis.dynamics.method=multibody", "mechanism.rolling_friction=0.002"),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from corotational import recheck
 from flexure_support import (
     ABS,
     LINKAGE,
@@ -25,7 +26,6 @@ from flexure_support import (
 
 import cfmkit
 from cfmkit import api
-from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import strip_thickness_search
@@ -166,7 +166,7 @@ def test_a_branch_that_begins_late_begins_at_its_limit_point_whatever_the_points
     found = []
     for points in (41, 301):
         changes = ("analysis.side=before", f"mechanism.unloaded_angle={unloaded}", f"analysis.points={points}")
-        one = api.analyze(spec(name, *changes, "analysis.recheck=false"))
+        one = api.analyze(spec(name, *changes))
         travel = one.curve.motion
         assert travel[0] == pytest.approx(begins * MM, rel=1e-4)
         assert np.diff(travel)[1:] == pytest.approx(travel[-1] / (points - 1))  # none behind the limit point is missing
@@ -195,7 +195,6 @@ def test_a_chain_that_turns_with_its_slider_keeps_its_side(branch: str) -> None:
     about = [
         f"analysis.travel=[0 mm, {travel}]",
         "analysis.points=31",
-        "analysis.recheck=false",
         "analysis.window=null",
     ]
     result = api.analyze(spec("lumped", *changes, *about))
@@ -325,7 +324,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_what_can_go_wrong_is_found_by_name(name: str) -> None:
     config, changes = CASES[name]
-    result = api.analyze(spec(config, "analysis.points=61", "analysis.recheck=false", *changes))
+    result = api.analyze(spec(config, "analysis.points=61", *changes))
     assert name in names(result), result.message
     if name in ("pulled", "wrong_branch"):
         assert result.status is Status.NO_EQUILIBRIUM
@@ -338,14 +337,30 @@ def test_a_travel_beyond_all_reason_is_never_a_complete_curve() -> None:
     assert names(result) & {"limit_point", "unstable", "not_converged"}
 
 
-def test_a_second_opinion_that_differs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two elements to a strip are too few to agree; with enough of them nothing is told."""
-    from cfmkit.families.slider_crank.printed import solution
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("strip", ()),
+        ("strip", ("mechanism.wide_beams=true", "mechanism.beam.width=30 mm")),  # as narrow ones 10 % softer
+        ("tapered", ()),
+        ("lumped", ()),
+        pytest.param("taper_design", (), marks=pytest.mark.slow),
+    ],
+)
+def test_corotational_elements_have_the_force_and_the_stress_of_printed_chains(name: str, changes: Any) -> None:
+    result = api.analyze(spec(name, "analysis.points=5", *changes))
+    path = result.state.pressed.path
+    chosen = path.at_requested[1:]
+    other = recheck(path, chosen)
+    np.testing.assert_allclose(other.effort, path.effort[chosen], rtol=2e-5)
+    np.testing.assert_allclose(other.stress, path.peak_stress().value[chosen], rtol=2e-3)
+    assert other.stable.all()
 
-    wanted = spec("strip", "analysis.points=21", "analysis.recheck=true")
-    assert "second_opinion" not in names(api.analyze(wanted))
-    monkeypatch.setattr(solution, "by_elements", lambda path, points: recheck(path, points, elements=2))
-    assert "second_opinion" in names(api.analyze(wanted))
+
+@pytest.mark.parametrize("value", ["true", "false"])
+def test_the_removed_key_of_the_second_opinion_says_what_to_write(value: str) -> None:
+    with pytest.raises(cfmkit.SpecError, match=r"the key 'recheck' was removed; .*'fidelity: solid'"):
+        spec("strip", f"analysis.recheck={value}")
 
 
 def test_a_strip_is_on_its_side_from_the_first_micrometre() -> None:
@@ -356,7 +371,7 @@ def test_a_strip_is_on_its_side_from_the_first_micrometre() -> None:
 
 
 def test_the_kink_of_a_line_of_its_own_is_that_of_the_line() -> None:
-    points = ["analysis.points=21", "analysis.recheck=false"]
+    points = ["analysis.points=21"]
     line = "mechanism.beam.centreline=[[0 mm, 0 mm], [50 mm, {} mm], [100 mm, 60 mm]]"
     right = api.analyze(spec("strip", line.format(29), *points))
     assert right.values["kink"].value == pytest.approx(-np.cos(np.arctan(0.6)) * MM)
@@ -378,7 +393,7 @@ def test_flexures_longer_than_their_links_are_refused() -> None:
 def test_a_chain_is_not_pressed_through_its_own_anchor(model: str) -> None:
     """Without an offset the slider runs onto the anchor; lines without thickness would let it pass."""
     lengths = ["mechanism.offset=0 mm", "mechanism.unloaded_angle=null", "mechanism.unloaded_offset=1 deg"]
-    about = ["analysis.travel=[0 mm, 150 mm]", "analysis.points=61", "analysis.recheck=false"]
+    about = ["analysis.travel=[0 mm, 150 mm]", "analysis.points=61"]
     result = api.analyze(spec(model, *lengths, *about))
     assert result.status is Status.PARTIAL
     assert result.warnings[0].name == "meets_itself"
@@ -400,7 +415,7 @@ def test_flexures_longer_than_their_link_are_refused_at_their_place(tmp_path: Pa
 
 def test_the_run_in_is_solved_for_and_not_read_off_the_points() -> None:
     """Points 1.1 mm apart gave 1.09 mm where 0.076 mm are right; what is left is their mean force."""
-    few, many = (api.analyze(spec("strip", f"analysis.points={n}", "analysis.recheck=false")) for n in (31, 301))
+    few, many = (api.analyze(spec("strip", f"analysis.points={n}")) for n in (31, 301))
     assert few.values["run_in_95"].value == pytest.approx(many.values["run_in_95"].value, rel=0.02)
     assert many.values["run_in_95"].value == pytest.approx(0.0758 * MM, rel=0.01)
 
@@ -461,7 +476,6 @@ def test_a_design_tells_what_holds_it() -> None:
     assert "lower edge of the band" in text
     assert "stress 42.5 MPa at the end" in text
     assert "converged to a local optimum" in found.message
-    assert "corotational elements" in found.message
 
 
 def test_a_thickness_at_its_bound_is_told() -> None:
@@ -500,7 +514,7 @@ def test_what_would_be_feasible_is_said_with_its_number() -> None:
 
 def test_a_given_travel_keeps_the_stress_at_its_exact_peak() -> None:
     """Between the samples of the search the stress is higher: it is then searched again."""
-    wanted = ["design={force: 1.5 N, travel: [1 mm, 60 mm], beam: {goal: ripple, nodes: 5}}", "analysis.recheck=false"]
+    wanted = ["design={force: 1.5 N, travel: [1 mm, 60 mm], beam: {goal: ripple, nodes: 5}}"]
     result = api.analyze(api.design(spec("taper_design", *wanted)).spec)
     assert result.curve.extra["max_stress"].values.max() <= 42.5e6
     assert "overstressed" not in names(result)
@@ -569,7 +583,7 @@ def test_the_travel_up_to_the_allowable_stress_is_found_within_a_longer_travel(
     name: str, end: int, stroke: float
 ) -> None:
     """The strokes that the strips reach, not the travel at which the configurations end."""
-    changes = f"analysis.travel=[0 mm, {end} mm]", "analysis.points=161", "analysis.recheck=false"
+    changes = f"analysis.travel=[0 mm, {end} mm]", "analysis.points=161"
     found = api.analyze(spec(name, *changes)).values["stress_stroke"].value
     assert found == pytest.approx(stroke * MM, abs=0.01 * MM)
 
@@ -635,7 +649,7 @@ def test_the_side_of_a_strip_is_found_without_its_stresses(monkeypatch: pytest.M
     """They were computed along the whole strip at every point, for each point anew."""
     calls: list[int] = []
     monkeypatch.setattr("cfmkit.elastica.results.path.EquilibriumPath.sections", lambda *_: calls.append(1))
-    assert api.analyze(spec("strip", "analysis.points=7", "analysis.recheck=false")).status.usable
+    assert api.analyze(spec("strip", "analysis.points=7")).status.usable
     assert not calls
 
 
@@ -674,7 +688,7 @@ PLACES += ("band_range_5pct", "run_in_95", "run_in_98")
 def test_places_do_not_depend_on_the_number_of_points(name: str, changes: tuple[str, ...]) -> None:
     found = []
     for points in (21, 301):
-        one = spec(name, *changes, f"analysis.points={points}", "analysis.recheck=false")
+        one = spec(name, *changes, f"analysis.points={points}")
         metrics = api.evaluate(api.analyze(one))
         found.append([metrics[each].value for each in PLACES])
         found[-1].append(metrics["stress_stroke"].value or 0.0)
@@ -684,7 +698,7 @@ def test_places_do_not_depend_on_the_number_of_points(name: str, changes: tuple[
 
 
 def test_the_course_between_the_points_is_that_of_the_chain_pressed_there() -> None:
-    one = api.analyze(spec("tapered", "analysis.points=11", "analysis.recheck=false"))
+    one = api.analyze(spec("tapered", "analysis.points=11"))
     travel = np.sort(np.random.default_rng(3).uniform(1e-7, 16 * MM, 40))
     again = one.state.chain.press(travel)
     np.testing.assert_allclose(one.closed.effort("load", travel), again.force, rtol=1e-8)
@@ -694,7 +708,7 @@ def test_the_course_between_the_points_is_that_of_the_chain_pressed_there() -> N
 
 
 def test_the_stress_stroke_is_where_the_pressed_chain_has_the_allowable_stress() -> None:
-    one = api.analyze(spec("tapered", "analysis.fidelity=lumped", "analysis.points=11", "analysis.recheck=false"))
+    one = api.analyze(spec("tapered", "analysis.fidelity=lumped", "analysis.points=11"))
     place = one.values["stress_stroke"].value
     path = one.state.chain.press(np.array([place])).path
     assert path.peak_stress().value[path.at_requested[0]] == pytest.approx(42.5e6, rel=1e-6)

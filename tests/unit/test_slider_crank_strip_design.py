@@ -27,7 +27,7 @@ TASK = StripTask(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01)
 
 
 def spec(name: str, *changes: str) -> Any:
-    return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml", ("analysis.recheck=false", *changes))
+    return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml", changes)
 
 
 def found(task: StripTask, z: list[float]) -> FoundStrip:

@@ -11,8 +11,8 @@ import pytest
 
 import cfmkit
 from cfmkit.elastica import Control, Displacement, trace
-from cfmkit.elastica.beam_deck_for_abaqus import beam_deck
 from cfmkit.errors import UsageError
+from cfmkit.export.beam_deck_for_abaqus import beam_deck
 from cfmkit.families import family
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring

@@ -13,7 +13,7 @@ from cfmkit.api import load
 from cfmkit.specs.spec import Spec, _with
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-FILES = sorted({*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")} - {CONFIGS / "studies" / "figure.yaml"})
+FILES = sorted([*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")])
 SWITCHES = [
     ("mechanism.bistable.structure", "hybrid"),
     ("mechanism.safety_factor", 2.0),

@@ -1,14 +1,14 @@
 """The journal: what was acknowledged stays, what is damaged is reported and done again."""
 
-import json
-import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from journal_support import damage_a_record
 
 from cfmkit.errors import OutputError
+from cfmkit.store import lock
 from cfmkit.studies.journal import Journal
 
 
@@ -18,11 +18,7 @@ def key(number):
 
 @pytest.fixture
 def path(tmp_path):
-    return tmp_path / "journal.jsonl"
-
-
-def recalled(journal, key):
-    return journal.read(journal.find(key), key)
+    return tmp_path / "journal.sqlite"
 
 
 def filled(path, count=5):
@@ -34,118 +30,179 @@ def filled(path, count=5):
 def test_a_record_comes_back_as_it_was(path):
     filled(path)
     with Journal(path) as journal:
-        assert [recalled(journal, key(n))["v"] for n in range(5)] == [[n / 3] for n in range(5)]
-        assert journal.find(key(7)) == -1
-        assert (len(journal), journal.damaged, journal.torn) == (5, 0, False)
+        assert [journal.find(key(n))["v"] for n in range(5)] == [[n / 3] for n in range(5)]
+        assert journal.find(key(7)) is None
+        assert (len(journal), journal.damaged) == (5, 0)
+
+
+def test_a_closed_journal_is_one_file_and_an_empty_one_is_none(path):
+    filled(path)
+    assert [one.name for one in path.parent.iterdir()] == [path.name]
+    with Journal(path.with_name("other")):
+        pass
+    assert [one.name for one in path.parent.iterdir()] == [path.name]
+
+
+def test_a_run_that_adds_nothing_changes_no_byte(path):
+    filled(path)
+    before = path.read_bytes()
+    with Journal(path) as journal:
+        assert journal.find(key(1)) is not None
+        journal.keep_only(bytes.fromhex(key(number)) for number in range(5))
+    assert path.read_bytes() == before
 
 
 def test_a_long_record_comes_back_too(path):
+    text = "".join(np.random.default_rng(0).choice(list("abcdefgh"), 3_000_000))
     with Journal(path) as journal:
-        place = journal.add(key(1), {"v": "x" * 3_000_000})
-        assert len(journal.read(place, key(1))["v"]) == 3_000_000
+        journal.add(key(1), {"v": text})
+        assert journal.read(key(1)) == {"v": text}
 
 
-def test_numbers_that_json_lacks_come_back_as_they_were_from_lines_that_are_json(path):
+def test_numbers_that_json_lacks_come_back_as_they_were(path):
     record = {"found": {"x": [0.1, np.nan], "violation": np.inf, "float": "inf"}, "pair": (-np.inf, np.float64("inf"))}
     expected = {"found": {"x": [0.1, np.nan], "violation": np.inf, "float": "inf"}, "pair": [-np.inf, np.inf]}
     with Journal(path) as journal:
         journal.add(key(1), record)
     with Journal(path) as journal:
-        np.testing.assert_equal(recalled(journal, key(1)), expected)
-        assert journal.damaged == 0
-
-    def refused(word):
-        raise AssertionError(word)
-
-    json.loads(path.read_bytes(), parse_constant=refused)
+        np.testing.assert_equal(journal.find(key(1)), expected)
 
 
-def test_keys_that_begin_alike_are_told_apart(path):
-    alike = ["a" * 16 + "0" * 16, "a" * 16 + "1" * 16]
+def test_only_what_was_there_at_the_start_is_found_and_nothing_if_fresh(path):
+    filled(path, 1)
     with Journal(path) as journal:
-        for one in alike:
-            journal.add(one, one)
+        journal.add(key(1), "new")
+        assert (journal.find(key(0)), journal.find(key(1)), journal.read(key(1))) == ({"v": [0.0]}, None, "new")
+    with Journal(path, fresh=True) as journal:
+        journal.add(key(0), "newer")
+        assert (journal.find(key(0)), journal.find(key(1)), journal.read(key(0))) == (None, None, "newer")
     with Journal(path) as journal:
-        assert [recalled(journal, one) for one in alike] == alike
+        assert (journal.find(key(0)), journal.find(key(1))) == ("newer", "new")
 
 
-def test_a_torn_last_line_is_dropped_wherever_it_is_cut(path):
-    filled(path, 2)
-    whole = path.read_bytes()
-    first = whole.index(b"\n") + 1
-    for cut in range(first + 1, len(whole)):
-        path.write_bytes(whole[:cut])
+def test_a_log_that_is_cut_off_anywhere_loses_its_last_records_only(path):
+    """As a failing power supply may leave it."""
+    logged = path.with_name(path.name + "-wal")
+    filled(path, 1)
+    with Journal(path) as journal:
+        for number in range(1, 5):
+            journal.add(key(number), number)
+        main, log = path.read_bytes(), logged.read_bytes()
+    for cut in range(0, len(log), 997):
+        path.write_bytes(main)
+        logged.write_bytes(log[:cut])
         with Journal(path) as journal:
-            assert (len(journal), journal.torn, journal.damaged) == (1, True, 0)
-            journal.add(key(9), 9)
-        with Journal(path) as journal:
-            assert (len(journal), journal.torn, journal.damaged) == (2, False, 0)
+            known = [journal.find(key(number)) for number in range(1, 5)]
+            count = sum(one is not None for one in known)
+            assert known == [1, 2, 3, 4][:count] + [None] * (4 - count)
+            assert (journal.find(key(0)), journal.damaged) == ({"v": [0.0]}, 0)
 
 
-def test_a_damaged_record_is_passed_over_and_counted(path):
+def test_a_damaged_record_is_passed_over_counted_and_said(path, caplog):
     filled(path, 3)
-    whole = bytearray(path.read_bytes())
-    start = whole.index(b"\n") + 1
-    end = whole.index(b"\n", start)
-    for place in range(start, end):
-        hurt = whole.copy()
-        hurt[place] ^= 0x01
-        path.write_bytes(hurt)
-        with Journal(path) as journal:
-            assert journal.damaged == 1
-            assert journal.find(key(1)) == -1
-            assert recalled(journal, key(2)) == {"v": [2 / 3]}
-
-
-def test_a_line_of_anything_else_is_damage_not_an_error(path):
-    path.write_bytes(b"\n\x00\xff\xfe\n" + b"[" * 5000 + b"\nhello\n")
+    damage_a_record(path, bytes.fromhex(key(1)))
     with Journal(path) as journal:
-        assert (len(journal), journal.damaged) == (0, 4)
+        assert journal.find(key(1)) is None
+        assert (journal.find(key(2)), journal.damaged) == ({"v": [2 / 3]}, 1)
+        journal.add(key(1), "again")
+    assert "damaged records that were computed again: 1" in caplog.text
+    with Journal(path) as journal:
+        assert (journal.find(key(1)), journal.damaged) == ("again", 0)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: b"\n\x00\xff\xfe\n" + b"[" * 5000 + b"\nhello\n",
+        lambda content: content[: len(content) // 2],
+        lambda content: content[:4096] + bytes(4096) + content[8192:],
+        lambda content: bytes(len(content)),
+    ],
+    ids=["something else", "half", "zeros within", "zeros"],
+)
+def test_a_damaged_file_is_begun_anew_and_that_is_said(path, damage, caplog):
+    filled(path, 500)
+    path.write_bytes(damage(path.read_bytes()))
+    with Journal(path) as journal:
+        assert (journal.find(key(1)), len(journal)) == (None, 0)
+        journal.add(key(1), "again")
+    assert "was damaged: everything is computed again" in caplog.text
+    with Journal(path) as journal:
+        assert journal.find(key(1)) == "again"
+
+
+def test_a_journal_of_lines_is_not_read_and_goes_and_that_is_said_once(path, caplog):
+    older = path.with_suffix(".jsonl")
+    older.write_bytes(b'{"c":"00000000","k":"0"}\n')
+    for _ in range(2):
+        filled(path, 2)
+    assert caplog.text.count("earlier version") == 1
+    assert not older.exists()
 
 
 def test_a_link_in_place_of_the_journal_is_refused(path, tmp_path):
     other = tmp_path / "other"
     other.write_text("precious")
     path.symlink_to(other)
-    with pytest.raises(OutputError, match="cannot open"):
+    with pytest.raises(OutputError, match=r"cannot open .* it is a link"):
         Journal(path).__enter__()
     assert other.read_text() == "precious"
 
 
-def test_a_full_disk_is_an_output_error(path, monkeypatch):
+def test_a_folder_in_place_of_the_journal_is_refused(path):
+    path.mkdir()
+    with pytest.raises(OutputError, match="cannot open"):
+        Journal(path).__enter__()
+
+
+def test_a_full_disk_is_an_output_error_and_the_records_before_stay(path):
     with Journal(path) as journal:
-        monkeypatch.setattr(os, "write", lambda *_: (_ for _ in ()).throw(OSError(28, "no space")))
+        journal.add(key(1), 1)
+        journal._db.execute("PRAGMA max_page_count=3")
         with pytest.raises(OutputError, match="the disk is full"):
-            journal.add(key(1), 1)
-
-
-def test_what_was_acknowledged_survives_a_kill(path):
-    code = (
-        "import sys, os, signal; from pathlib import Path; from cfmkit.studies.journal import Journal\n"
-        "with Journal(Path(sys.argv[1])) as journal:\n"
-        "    for n in range(100): journal.add(f'{n:032x}', n)\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    assert subprocess.run([sys.executable, "-c", code, str(path)]).returncode == -9
+            journal.add(key(2), np.random.default_rng(0).random(3000).tolist())
+        assert journal.read(key(1)) == 1
+        journal.add(key(3), 3)
     with Journal(path) as journal:
-        assert [recalled(journal, key(n)) for n in range(100)] == list(range(100))
+        assert [journal.find(key(n)) for n in (1, 2, 3)] == [1, None, 3]
 
 
-def test_a_record_is_believed_by_its_key_not_by_its_place(path):
-    filled(path, 2)
-    with Journal(path) as journal, pytest.raises(OutputError, match="it was changed while the study ran"):
-        journal.read(journal.find(key(0)), key(1))
+KILLED = (
+    "import sys, os, signal; from pathlib import Path; from cfmkit.studies.journal import Journal\n"
+    "with Journal(Path(sys.argv[1])) as journal:\n"
+    "    for n in range(100): journal.add(f'{n:032x}', n)\n"
+    "    os.kill(os.getpid(), signal.SIGKILL)\n"
+)
+
+
+@pytest.mark.parametrize("locks", ["locks", "no locks"])
+def test_what_was_acknowledged_survives_a_kill(path, locks, monkeypatch):
+    if locks == "no locks":  # of the file system; the database then runs without any
+        monkeypatch.setenv(lock.NO_LOCK, "1")
+    assert subprocess.run([sys.executable, "-c", KILLED, str(path)]).returncode == -9
+    with Journal(path) as journal:
+        assert [journal.find(key(n)) for n in range(100)] == list(range(100))
+
+
+def test_a_record_that_somebody_took_away_is_an_output_error(path):
+    with Journal(path) as journal, Journal(path) as other:
+        journal.add(key(0), 0)
+        other.add(key(1), 1)
+        journal.keep_only([bytes.fromhex(key(0))])
+        assert (journal.read(key(0)), other.read(key(1))) == (0, 1), "of a later writer"
+        other.keep_only([])
+        with pytest.raises(OutputError, match="it was changed during the run"):
+            journal.read(key(0))
 
 
 def test_each_of_two_writers_reads_its_own_records(path):
     filled(path, 1)
     with Journal(path) as first, Journal(path) as second:
-        places = {}
-        for number in range(1, 9):
-            writer = (first, second)[number % 2]
-            places[number] = writer, writer.add(key(number), {"v": ["x" * number]})
-        for number, (writer, place) in places.items():
-            assert writer.read(place, key(number)) == {"v": ["x" * number]}
+        writers = {number: (first, second)[number % 2] for number in range(1, 9)}
+        for number, writer in writers.items():
+            writer.add(key(number), {"v": ["x" * number]})
+        for number, writer in writers.items():
+            assert writer.read(key(number)) == {"v": ["x" * number]}
     with Journal(path) as journal:
         assert (len(journal), journal.damaged) == (9, 0)
 
@@ -155,4 +212,14 @@ def test_the_newest_record_of_a_key_counts(path):
         journal.add(key(1), "old")
         journal.add(key(1), "new")
     with Journal(path) as journal:
-        assert recalled(journal, key(1)) == "new"
+        assert journal.find(key(1)) == "new"
+
+
+def test_what_another_study_left_is_dropped_and_gives_its_room_back(path):
+    filled(path, 2000)
+    large = path.stat().st_size
+    with Journal(path) as journal:
+        journal.keep_only(bytes.fromhex(key(number)) for number in range(10))
+    assert path.stat().st_size < large / 5
+    with Journal(path) as journal:
+        assert (len(journal), journal.find(key(9)), journal.find(key(10))) == (10, {"v": [3.0]}, None)

@@ -20,6 +20,7 @@ from cfmkit.families.beam.proposals_for_wish import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.proposals_for_wish import PUSHED, _strip, largest_printed
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
 from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
@@ -272,6 +273,40 @@ def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
     assert pair["across"] > 1.9 * single["across"]
 
 
+@pytest.mark.parametrize("crank", [0.02, 0.05, 0.12])
+@pytest.mark.parametrize("lengths", PUSHED)
+def test_the_largest_strip_of_some_proportions_just_fits_its_room(lengths, crank):
+    """Pads of small parts are smaller, those of large ones are not larger: the box is that of the finished drawing."""
+    keys = {"force": "0.5 N", "travel": "2 mm", "room": "[1 m, 1 m, 5 mm]"}
+    spec = _strip(wish(**keys), {"name": "pom"}, lengths, crank, (1e-4, 0.05 * crank)).spec
+    width = {"mechanism.beam.width": 4e-3, "mechanism.beam.thickness": 0.01 * crank}
+    box = family("slider-crank").envelope(cfmkit.analyze(spec.replace({"design": None, **width})))
+    assert largest_printed((box.across, box.along), lengths) == pytest.approx(crank, rel=2e-4)
+    assert largest_printed((2.0 * box.across, box.along), lengths) == pytest.approx(crank, rel=2e-4)
+
+
+def test_a_small_strip_with_pads_in_proportion_is_found():
+    """A strip of half the published size in PETG does this; with pads of the usual size nothing fits."""
+    room = "[50 mm, 78 mm, 2.95 mm]"
+    asked, candidates = offered(
+        "slider-crank", force="0.417 N", travel="14 mm", ripple="2.2 %", room=room, material="petg"
+    )
+    one = made(ProposalJob("slider-crank", next(one for one in candidates if one.variant == "strip"), asked, 0))
+    assert one.passes, one.missed or one.message
+
+
+def test_a_material_without_a_known_strength_gets_designs_whose_stress_is_not_judged():
+    keys = {"force": "13 N", "travel": "1.98 mm", "ripple": "6 %", "room": "[95 mm, 72 mm, 14 mm]"}
+    asked = wish(**keys, material="{youngs_modulus: 1.477 GPa, poisson_ratio: 0.3}")
+    assert [one.materials[0]["yield_strength"] for one in asked.with_strengths] == [0.015 * 1.477e9, 0.04 * 1.477e9]
+    candidate = search.offer_of(family("vcfm"), asked, Run()).candidates[0]
+    one = made(ProposalJob("vcfm", candidate, asked, 0))
+    assert one.passes, one.missed or one.message
+    assert one.spec.mechanism.material.yield_strength is None
+    assert any("no strength is known" in reason for reason in one.unjudged)
+    assert wish().with_strengths == (wish(),)
+
+
 def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
     asked, candidates = offered("cam", room="[80 mm, 60 mm, 20 mm]")
     one = next(each for each in candidates if each.variant == "catalogue springs")
@@ -377,6 +412,16 @@ def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(room
     found = made(ProposalJob("beam", first, asked, 0))
     assert found.passes, found.missed
     assert found.numbers["ripple"] < 0.025
+
+
+def test_two_layers_are_proposed_where_one_does_not_travel_so_far():
+    material = "{youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 76 MPa}"
+    room = "[74.3 mm, 97.5 mm, 10.1 mm]"
+    asked, candidates = offered("beam", force="9.67 N", travel="13 mm", ripple="5.3 %", room=room, material=material)
+    layered = next(one for one in candidates if one.variant == "shape lan-2010 in two layers")
+    one = made(ProposalJob("beam", layered, asked, 0))
+    assert one.passes, one.missed or one.message
+    assert one.spec.mechanism.copies.layers == 2
 
 
 def test_the_reason_is_that_of_a_shape_that_travels_so_far():

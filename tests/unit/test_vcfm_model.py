@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from functional_paths import beam_stress
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
 
 import cfmkit
@@ -456,7 +457,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     force, stress, _, buckled = found.at(path.drive[here])
     peak = np.abs(path.effort[path.drive < rise]).max()
     assert force == pytest.approx(path.effort[here], abs=1e-6 * peak)
-    assert stress == pytest.approx(path.beam_stress("leaf")[0][here], rel=1e-3, abs=2e-4 * stress.max())
+    assert stress == pytest.approx(beam_stress(path, "leaf")[0][here], rel=1e-3, abs=2e-4 * stress.max())
     assert buckled.tolist() == [found.edges[1] < place < found.buckled_range[1] for place in path.drive[here]]
 
 

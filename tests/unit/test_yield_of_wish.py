@@ -34,7 +34,7 @@ def offered(name, asked):
 @pytest.mark.slow
 def test_after_a_trim_no_error_of_the_modulus_is_left():
     asked = ({"metric": "force_mean", "min": "1.45 N", "max": "1.55 N"}, {"metric": "half_band", "max": "5 %"})
-    spec = cfmkit.load("configs/slider_crank_strip.yaml").replace({"analysis.points": 17, "analysis.recheck": False})
+    spec = cfmkit.load("configs/slider_crank_strip.yaml").replace({"analysis.points": 17})
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     mean = cfmkit.analyze(spec).metrics["force_mean"].value
     spec = spec.replace({"mechanism.beam.width": spec.mechanism.beam.width * 1.5 / mean, "requirements": asked})
@@ -158,7 +158,7 @@ def test_a_strip_moved_for_a_yield_has_it():
     asked = tuple(one for one in given.requirements if one.metric != "yield")
     parameters = {path: {"normal": one.normal} for path, one in given.design.tolerances.items()}
     block = {"method": "tolerance", "parameters": parameters, "samples": 60}
-    given = given.replace({"analysis.points": 31, "analysis.recheck": False})
+    given = given.replace({"analysis.points": 31})
     spec = given.replace({"design": None, "requirements": asked, "sensitivity": block})
     candidate = Candidate("strip", given, design=True)
     moved = moved_for_yield(candidate, spec, wish(**{"yield": "85 %"}), 0.85, Run())

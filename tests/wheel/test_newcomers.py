@@ -61,12 +61,11 @@ def test_a_designer_with_a_laser_gets_parts_and_a_page_to_send(cfmkit, tmp_path)
 
 
 def test_a_researcher_gets_a_figure_for_print_and_its_bibtex(cfmkit, tmp_path):
-    cfmkit("examples", "studies/figure")
-    cfmkit("figure", "figure.yaml", "--figures", "pdf,svg", "--figure-width", "174 mm")
-    drawn = tmp_path / "cfm-out" / "figure-figure" / "figures"
-    assert b"/FontFile2" in (drawn / "figure.pdf").read_bytes()
-    assert "force [N]" in (drawn / "figure.svg").read_text()
-    cfmkit("sweep", "vcfm_fig9_t1.yaml", "--no-plots")
+    cfmkit("examples", "studies/vcfm_fig9_t1")
+    cfmkit("sweep", "vcfm_fig9_t1.yaml", "--figures", "pdf,svg", "--figure-width", "174 mm")
+    drawn = tmp_path / "cfm-out" / "vcfm_fig9_t1-sweep" / "figures"
+    assert b"/FontFile2" in (drawn / "curves.pdf").read_bytes()
+    assert "force [N]" in (drawn / "curves.svg").read_text()
     with (tmp_path / "cfm-out" / "vcfm_fig9_t1-sweep" / "results.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["complete"] * 4

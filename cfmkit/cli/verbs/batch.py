@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cfmkit.cli import shell_completion
 from cfmkit.cli.options import (
     Changing,
     Fidelity,
@@ -57,9 +56,7 @@ class BatchOptions(Changing, FigureChoice):
 
     specs: Annotated[
         list[str],
-        argument(
-            "SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.", shell_completion.specs
-        ),
+        argument("SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'."),
     ]
     out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/batch/.")] = (
         None

@@ -7,7 +7,6 @@ from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import shell_completion
 from cfmkit.cli.options import (
     Computing,
     Measuring,
@@ -36,7 +35,7 @@ EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_friction"
 class CalibrateOptions(Computing, Measuring):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.", shell_completion.tables)]
+    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.")]
     fit: Annotated[
         str,
         option(

@@ -6,7 +6,6 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import shell_completion
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
 from cfmkit.cli.page_block_types import BAD, GOOD, Span, whole_line, within
@@ -30,7 +29,7 @@ class CheckOptions(Changing):
 
     specs: Annotated[
         list[str],
-        argument("SPEC", "YAML files, or folders with them; - reads standard input.", shell_completion.specs),
+        argument("SPEC", "YAML files, or folders with them; - reads standard input."),
     ]
     quiet: Quiet = False
 

@@ -6,7 +6,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import shell_completion
 from cfmkit.cli.failures import Stopped, told
 from cfmkit.cli.options import Changing, argument, flag, option
 from cfmkit.cli.page_block_types import line, whole_line
@@ -25,7 +24,7 @@ EXAMPLE = "cfmkit explore cam.yaml"
 class ExploreOptions(Changing):
     """Arguments and options."""
 
-    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism.", shell_completion.specs)]
+    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism.")]
     port: Annotated[
         int, option("--port", metavar="N", low=0, text="Port of this computer to listen on; default: a free one.")
     ] = 0

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import shell_completion
 from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 from cfmkit.cli.verb_result import Answer
@@ -27,9 +26,7 @@ EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 class MeasureOptions(Measuring, FigureChoice):
     """Arguments and options."""
 
-    data: Annotated[
-        str, argument("DATA.csv", "Columns with displacement and force, optionally time.", shell_completion.tables)
-    ]
+    data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, optionally time.")]
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/DATA-measure/.")
     ] = None

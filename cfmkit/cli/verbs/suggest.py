@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import shell_completion
 from cfmkit.cli.options import (
     Common,
     Fresh,
@@ -69,7 +68,7 @@ class SuggestOptions(Common):
 
     wish: Annotated[
         str | None,
-        argument("WISH", "YAML file with a block 'wish'; - reads standard input.", shell_completion.specs),
+        argument("WISH", "YAML file with a block 'wish'; - reads standard input."),
     ] = None
     force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None

@@ -218,9 +218,13 @@ class _ArrayBuilder:
     # -- bodies and attachments ------------------------------------------------------------------------------------
     def _scales(self) -> MechanicsUnits:
         lengths = [np.real(self.fits[name].length) for name in (self.bundle.names[k] for k in self.bundle.others)]
-        length = float(np.mean([*(np.real(self.bundle.length) if self.bundle.plain else ()), *lengths]))
-        section = next(iter(self.network.beams.values())).section
-        rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
+        lengths += np.real(self.bundle.length).tolist() if self.bundle.plain else []
+        length = float(sum(lengths) / len(lengths))
+        if self.bundle.plain[:1] == [0]:
+            rigidity = float(np.real(self.bundle.rigidities[0][0]))
+        else:
+            section = next(iter(self.network.beams.values())).section
+            rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
         return MechanicsUnits(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
 
     def _number(self, more: int) -> int:

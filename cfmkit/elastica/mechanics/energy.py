@@ -7,10 +7,12 @@ into place.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
@@ -56,9 +58,10 @@ def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields
     )
 
 
+@lru_cache(maxsize=64)
 def rotation_columns(degree: int) -> Any:
     """Return which of an element's unknowns are coefficients of its rotation: own rotations of both ends, bubbles."""
-    return np.r_[3, 7, 8 : degree + 7]
+    return read_only([3, 7, *range(8, degree + 7)], np.int64)
 
 
 def line_load(mesh: Discretisation, drive: Any, share: Any = 1.0) -> Any:

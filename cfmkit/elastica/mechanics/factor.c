@@ -68,18 +68,25 @@ int factors_add(Factors *f, const Int *at, Int count, const double *matrix) {
                 if (at[i] >= 0 && at[j] >= 0) f->dense[at[i] * f->n + at[j]] += matrix[i * count + j];
         return 1;
     }
+    Int met = 0, from[MAX_LOCAL];
     for (Int i = 0; i < count; i++) {
-        if (at[i] >= 0 && f->position[at[i]] < 0 && !enter(f, at[i])) return 0;
-        where[i] = at[i] < 0 ? -1 : f->position[at[i]];
+        if (at[i] < 0) continue;
+        if (f->position[at[i]] < 0 && !enter(f, at[i])) return 0;
+        where[met] = f->position[at[i]];
+        from[met++] = i;
     }
-    for (Int i = 0; i < count; i++)
-        for (Int j = 0; j <= i; j++) {
-            const Int a = where[i], b = where[j];
-            if (a < 0 || b < 0) continue;
-            const double own = matrix[i * count + j] * (a == b && i != j ? 2.0 : 1.0); /* an unknown may stand twice */
-            if (a >= b) f->front[row_start(a) + (size_t)b] += own;
-            else f->front[row_start(b) + (size_t)a] += own;
+    for (Int i = 0; i < met; i++) {
+        const double *own = matrix + from[i] * count;
+        const Int a = where[i];
+        double *row = f->front + row_start(a);
+        for (Int j = 0; j < i; j++) {
+            const Int b = where[j];
+            if (b < a) row[b] += own[from[j]];
+            else if (b > a) f->front[row_start(b) + (size_t)a] += own[from[j]];
+            else row[a] += 2.0 * own[from[j]]; /* an unknown may stand twice */
         }
+        row[a] += own[from[i]];
+    }
     return 1;
 }
 
@@ -123,12 +130,14 @@ FAST static void take_two(Int rows, double *restrict front, const double *restri
 /* Return the largest number beside the diagonal of a column, one row left out. */
 static double largest_beside(const Factors *f, Int column, Int skip) {
     double largest = 0.0;
-    const double *row = f->front + row_start(column);
-    for (Int k = 0; k < column; k++)
-        if (k != skip && fabs(row[k]) > largest) largest = fabs(row[k]);
-    for (Int k = column + 1; k < f->fronts; k++) {
-        const double size = fabs(f->front[row_start(k) + (size_t)column]);
-        if (k != skip && size > largest) largest = size;
+    const double *row = f->front + row_start(column), *cell = row + 2 * column + 1; /* below the diagonal */
+    for (Int k = 0; k < column; k++) {
+        const double size = k == skip ? 0.0 : fabs(row[k]);
+        largest = size > largest ? size : largest;
+    }
+    for (Int k = column + 1; k < f->fronts; cell += ++k) {
+        const double size = k == skip ? 0.0 : fabs(*cell);
+        largest = size > largest ? size : largest;
     }
     return largest;
 }
@@ -209,29 +218,33 @@ static int eliminate_two(Factors *f, Int one, Int other) {
     return 1;
 }
 
+static int is_free(const Factors *f, const Int *leaves, Int element, Int at) { return leaves[f->index[at]] <= element; }
+
+/* Return whether two unknowns of the front are large enough together beside what they are coupled with. */
+static int is_pivot(const Factors *f, Int at, Int partner) {
+    const double d = entry(f, at, at), c = entry(f, partner, partner), b = entry(f, at, partner), det = d * c - b * b;
+    const double most = fabs(det) / THRESHOLD, mine = largest_beside(f, at, partner), its = largest_beside(f, partner, at);
+    return det != 0.0 && fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most;
+}
+
 /* Eliminate what no later element holds; return 0 if there is no memory, or at the end if the matrix is singular. */
 int factors_eliminate(Factors *f, const Int *leaves, Int element) {
     int progress = 1;
     while (progress) { /* what had no pivot may have one after the others */
         progress = 0;
-        for (Int at = f->fronts - 1; at >= 0; at--) {
-            if (at >= f->fronts || leaves[f->index[at]] > element) continue;
+        for (Int at = f->fronts - 1; at >= 0; at--) { /* one by one: forces have a pivot of their own behind rotations */
+            if (at >= f->fronts || !is_free(f, leaves, element, at)) continue;
             const double d = entry(f, at, at);
-            if (d != 0.0 && fabs(d) >= THRESHOLD * largest_beside(f, at, -1)) {
-                if (!eliminate_one(f, at)) return 0;
-                progress = 1;
-                continue;
-            }
+            if (d == 0.0 || fabs(d) < THRESHOLD * largest_beside(f, at, -1)) continue;
+            if (!eliminate_one(f, at)) return 0;
+            progress = 1;
+        }
+        for (Int at = f->fronts - 1; at >= 0 && !progress; at--) {
+            if (!is_free(f, leaves, element, at)) continue;
             const Int partner = find_partner(f, leaves, element, at);
-            if (partner < 0) continue;
-            const double c = entry(f, partner, partner), b = entry(f, at, partner), det = d * c - b * b;
-            const double most = fabs(det) / THRESHOLD;
-            if (det == 0.0) continue;
-            const double mine = largest_beside(f, at, partner), its = largest_beside(f, partner, at);
-            if (fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most) {
-                if (!eliminate_two(f, at, partner)) return 0;
-                progress = 1;
-            }
+            if (partner < 0 || !is_pivot(f, at, partner)) continue;
+            if (!eliminate_two(f, at, partner)) return 0;
+            progress = 1;
         }
     }
     return 1;

@@ -49,6 +49,8 @@ void work_close(Work *w) {
     free(w);
 }
 
+static double larger(double a, double b) { return a > b ? a : b; } /* fmax is a call */
+
 static void place(const Model *m, Work *w, const double *x, Stage at) {
     for (Int i = 0; i < m->size; i++)
         w->z[i] = m->slot[i] >= 0 ? x[m->slot[i]] : at.share * m->base[i] + at.drive * m->rate[i];
@@ -200,12 +202,12 @@ static double correct(const Model *m, Work *w, double along, double *x, double *
         const double d = w->step[i] + along * w->slope[i], unit = m->unit[i];
         double size = fabs(d);
         if (!(size <= 1e300)) return -1.0;
-        if (unit < HUGE_VAL) size /= fmax(10.0 * unit, fabs(x[i]));
+        if (unit < HUGE_VAL) size /= larger(10.0 * unit, fabs(x[i]));
         else if (size > LARGEST_CORRECTION) return -1.0;
-        else *moved = fmax(*moved, size);
-        step = fmax(step, size);
+        else *moved = larger(*moved, size);
+        step = larger(step, size);
         x[i] += d;
-        if (unit == HUGE_VAL) *largest = fmax(*largest, fabs(x[i]));
+        if (unit == HUGE_VAL) *largest = larger(*largest, fabs(x[i]));
     }
     return step;
 }
@@ -274,19 +276,23 @@ int solve(const Model *m, double *x, double *way, const double *border, double l
     return code;
 }
 
-/* Newton's method for each of several guesses (count, n): codes, unstable directions and efforts to found (count, 3). */
-int solve_many(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found) {
+/* Newton's method for each of several guesses (designs, count, n) at places (count) of the way: codes, unstable directions
+ * and efforts to found (designs, count, 3), slopes to rate unless that is NULL. */
+int solve_many(const Model *models, Int designs, double *x, double *way, Int count, double tolerance, int quick, double *rate,
+               double *found) {
     const Goal goal = {NULL, 0.0, NULL, tolerance, quick};
-    Work *w = work_open(m);
-    if (!w) return DIVERGED;
-    for (Int k = 0; k < count; k++, x += m->free, rate += m->free, found += 3) {
-        Found end = {0, 0, 0.0};
-        found[0] = newton(m, w, x, way + k, &goal, &end);
-        memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
-        found[1] = (double)end.told;
-        found[2] = end.effort;
+    for (const Model *m = models; m < models + designs; m++) {
+        Work *w = work_open(m);
+        if (!w) return DIVERGED;
+        for (Int k = 0; k < count; k++, x += m->free, found += 3) {
+            Found end = {0, 0, 0.0};
+            found[0] = newton(m, w, x, way + k, &goal, &end);
+            if (rate) { memcpy(rate, w->slope, (size_t)m->free * sizeof(double)); rate += m->free; }
+            found[1] = (double)end.told;
+            found[2] = end.effort;
+        }
+        work_close(w);
     }
-    work_close(w);
     return CONVERGED;
 }
 
@@ -350,12 +356,12 @@ static Judgement judge(const Model *m, const Known *here, const double *x, const
     for (Int i = 0; i < m->free; i++) {
         const double d = x[i] - here->x[i];
         if (m->unit[i] < HUGE_VAL) {
-            j.force = fmax(j.force, fabs(d) / (allowed_force * m->unit[i] + 0.5 * fabs(here->x[i])));
+            j.force = larger(j.force, fabs(d) / (allowed_force * m->unit[i] + 0.5 * fabs(here->x[i])));
             continue;
         }
-        j.moved = fmax(j.moved, fabs(d));
-        j.missed = fmax(j.missed, fabs(x[i] - guess[i]));
-        bend = fmax(bend, fabs(d - 0.5 * ahead * (here->rate[i] + rate[i])));
+        j.moved = larger(j.moved, fabs(d));
+        j.missed = larger(j.missed, fabs(x[i] - guess[i]));
+        bend = larger(bend, fabs(d - 0.5 * ahead * (here->rate[i] + rate[i])));
         chord += d * d; by_old += d * here->rate[i]; by_new += d * rate[i];
         old += here->rate[i] * here->rate[i]; new += rate[i] * rate[i];
     }
@@ -375,7 +381,7 @@ static int leads_back(const Model *m, Work *w, const Known *here, const double *
     for (Int i = 0; i < m->free; i++) back[i] = x[i] - ahead * slope[i];
     const int code = newton(m, w, back, &way, &goal, &found);
     for (Int i = 0; i < m->free && code == CONVERGED; i++)
-        if (m->unit[i] == HUGE_VAL) apart = fmax(apart, fabs(back[i] - here->x[i]));
+        if (m->unit[i] == HUGE_VAL) apart = larger(apart, fabs(back[i] - here->x[i]));
     memcpy(w->slope, slope, (size_t)m->free * sizeof(double));
     return code == CONVERGED && apart < SAME_EQUILIBRIUM + 1e-3 * moved;
 }
@@ -429,7 +435,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
         const int same = found.unstable == (Int)plan->unstable;
         const int too_far = bad || j.moved > plan->largest_turn || j.missed > 0.4 * j.moved + SAME_EQUILIBRIUM;
         if (!bad && j.force > 1.0 && j.moved <= plan->largest_turn) /* too long for the forces: no sign of trouble */
-            plan->step = fabs(ahead) * fmax(0.7 / j.force, 1e-4);
+            plan->step = fabs(ahead) * larger(0.7 / j.force, 1e-4);
         else if (too_far || (same && j.moved > SAME_EQUILIBRIUM && !j.agrees)) {
             plan->step = 0.5 * fabs(ahead);
             rejected += 2;
@@ -449,7 +455,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
             store(n, rows + wide * kept++, x, rate, to, &found, lands ? (double)passed : -1.0);
             passed += lands;
             const double quality = j.missed / (j.moved + 1e-8), size = fabs(ahead);
-            if (quality < 0.1) plan->step = fmin(plan->range, 1.6 * (lands ? plan->step : fmax(plan->step, size)));
+            if (quality < 0.1) plan->step = fmin(plan->range, 1.6 * (lands ? plan->step : larger(plan->step, size)));
             else if (quality > 0.25) plan->step = 0.8 * size;
             continue;
         }
@@ -465,9 +471,10 @@ end:
     return code;
 }
 
-/* One path a design: efforts at the targets (designs, count), not a number from where a path does not simply go on. */
+/* One path a design: efforts at the targets (designs, count), not a number from where a path does not simply go on, and
+ * the states (designs, some, n) at some of the targets. */
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts, Int room,
-               Int *codes) {
+               Int *codes, const Int *chosen, Int some, double *states) {
     for (Int d = 0; d < designs; d++) {
         const Model *m = models + d;
         const Int wide = 2 * m->free + 4;
@@ -479,7 +486,10 @@ int march_many(const Model *models, Int designs, const Plan *plan, const double 
         codes[d] = march(m, &own, x, x + m->free, &way, NULL, targets, count, rows, room, stored);
         for (Int k = 0; k < stored[0]; k++) {
             const double *row = rows + k * wide, target = row[wide - 1];
-            if (target >= 0.0) efforts[d * count + (Int)target] = row[wide - 3];
+            if (target < 0.0) continue;
+            efforts[d * count + (Int)target] = row[wide - 3];
+            for (Int j = 0; j < some; j++)
+                if (chosen[j] == (Int)target) memcpy(states + (d * some + j) * m->free, row, (size_t)m->free * sizeof(double));
         }
         free(x);
         free(rows);

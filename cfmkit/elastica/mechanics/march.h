@@ -14,7 +14,7 @@ typedef int64_t Int;
 /* Inner loops once more for processors with wider vectors, where the compiler can choose at run time. Without contraction
  * (-std=c99) results are the same. */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
-#define FAST __attribute__((target_clones("arch=haswell", "default")))
+#define FAST __attribute__((target_clones("avx2", "default")))
 #else
 #define FAST
 #endif
@@ -86,7 +86,8 @@ int linearise(const Model *m, const double *x, double way, double *residual, dou
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
           int quick, double *rate, double *found);
-int solve_many(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found);
+int solve_many(const Model *models, Int designs, double *x, double *way, Int count, double tolerance, int quick, double *rate,
+               double *found);
 double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
 
 /* Of a march: numbers of 8 bytes, too. */
@@ -97,6 +98,6 @@ typedef struct {
 int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
           Int count, double *rows, Int room, Int *stored);
 int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts,
-               Int room, Int *codes);
+               Int room, Int *codes, const Int *chosen, Int some, double *states);
 
 #endif

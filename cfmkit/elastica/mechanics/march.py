@@ -34,7 +34,7 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
@@ -101,7 +101,7 @@ class CompiledEquations(NumpyEquations):
 
     arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
     row: Any = field(init=False)  # counts and addresses
-    code: Any = field(init=False, default_factory=compiled)  # the compiled module
+    code: Any = field(init=False, default_factory=_module)  # the compiled module
 
     def __post_init__(self) -> None:
         """Collect the arrays."""
@@ -243,7 +243,8 @@ def march_many(
     first_step: float = 0.05,
     tolerance: float = 1e-9,
     largest_turn: float = MarchPlan.largest_turn,
-) -> tuple[FloatArray, Any]:
+    chosen: Sequence[int] = (),
+) -> tuple[FloatArray, Any, FloatArray]:
     """Return the efforts of many designs under a drive by a motion, each followed from rest.
 
     Parameters
@@ -258,6 +259,8 @@ def march_many(
         Of corrections, relative to the largest motion and force.
     largest_turn : float
         Change of a motion in one step [rad, or lengths of a beam].
+    chosen : sequence of int
+        Targets at which the states are wanted, too.
 
     Returns
     -------
@@ -265,31 +268,70 @@ def march_many(
         [N or N m]; not a number from where a path does not simply go on.
     codes : (d,) int array
         `MarchCode` of each.
+    states : (d, chosen, n) array
+        Free unknowns.
     """
     own = equations(designs.template)
     goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
     span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
     plan = MarchPlan(first_step * span, span, largest_turn=largest_turn, tolerance=tolerance)
     efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
+    states = np.full((designs.count, len(chosen), own.n), np.nan)
     if isinstance(own, CompiledEquations) and not own.follows:
-        kept = design_arrays(own, designs)
-        given = _plan_row(plan, 0, True)
-        if not compiled().march_many(_rows(own, kept, designs.count), given, goals, efforts, codes, plan.room):
+        kept, given, some = design_arrays(own, designs), _plan_row(plan, 0, True), np.array(chosen, np.int64)
+        rows = _rows(own, kept, designs.count)
+        if not compiled().march_many(rows, given, goals, efforts, codes, some, states, plan.room):
             raise MemoryError
     else:
         for number in range(designs.count):
-            march_one(equations(design_of(designs, number)), goals, plan, efforts[number], codes[number : number + 1])
-    return efforts * own.effort_unit, codes
+            march = _march_one(equations(design_of(designs, number)), goals, plan)
+            codes[number] = march.code
+            for state in march.states:
+                if state.target >= 0:
+                    efforts[number, state.target] = state.effort
+                    states[number, [k for k, target in enumerate(chosen) if target == state.target]] = state.free
+    return efforts * own.effort_unit, codes, states
 
 
-def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: FloatArray, code: Any) -> None:
-    """Follow one network from rest; put its efforts at the goals and how it ended into the arrays given."""
+def _march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan) -> NaturalMarch:
+    """Return the march of one network from rest."""
     start = begin(own)
-    march = NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
-    code[0] = march.code
-    for state in march.states:
-        if state.target >= 0:
-            efforts[state.target] = state.effort
+    return NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
+
+
+def solve_designs(designs: NetworkDesigns, free: FloatArray, drives: FloatArray, tolerance: float) -> FloatArray:
+    """Return the efforts of designs at equilibria near guesses, not a number where there is none [N or N m].
+
+    Parameters
+    ----------
+    designs : NetworkDesigns
+        As of `march_many`.
+    free : (d, k, n) array
+        Guesses.
+    drives : (k,) array
+        Values of the drive [m or rad].
+    tolerance : float
+        Of the next correction, relative to the largest motion and force.
+
+    Returns
+    -------
+    (d, k) array
+        Also not a number where an equilibrium is unstable.
+    """
+    own = equations(designs.template)
+    ways = np.ascontiguousarray(drives, float) / designs.template.scales.drive
+    found = np.zeros((*free.shape[:2], 3))
+    if isinstance(own, CompiledEquations) and not own.follows:
+        kept = design_arrays(own, designs)
+        rows = _rows(own, kept, designs.count)
+        if compiled().solve_many(rows, np.array(free, float, order="C"), ways, np.empty(0), found, tolerance, True):
+            raise MemoryError
+    else:
+        for number in range(designs.count):
+            solved = equations(design_of(designs, number)).solve_each(free[number], ways, tolerance, quick=True)
+            found[number] = np.stack([~solved.converged, solved.unstable, solved.effort], axis=1)
+    stable = (found[..., 0] == 0) & (found[..., 1] == 0)
+    return np.where(stable, found[..., 2] * own.effort_unit, np.nan)
 
 
 def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
@@ -309,7 +351,7 @@ def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, 
 
 
 def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
-    """Return a `Model` for each design: the template's, with addresses of its own."""
+    """Return a `Model` for each design: the template's, with addresses of its own, good as long as `kept` is."""
     rows = np.tile(own.row, (count, 1))
     for name, array in kept.items():
         rows[:, len(COUNTS) + ADDRESSES.index(name)] = array.ctypes.data + array.strides[0] * np.arange(count)

@@ -96,7 +96,7 @@ static PyObject *py_solve(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(code);
 }
 
-/* solve_many(model, x, ways, rates, found, tolerance, quick) -> code */
+/* solve_many(models, x, ways, rates, found, tolerance, quick) -> code */
 static PyObject *py_solve_many(PyObject *self, PyObject *arguments) {
     Buffers b;
     double tolerance, quick;
@@ -105,7 +105,8 @@ static PyObject *py_solve_many(PyObject *self, PyObject *arguments) {
     if (!number(arguments, 5, &tolerance) || !number(arguments, 6, &quick) || !take(arguments, 0, 5, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
     const Int count = b.view[2].len / (Int)sizeof(double);
-    code = solve_many(at(&b, 0), at(&b, 1), at(&b, 2), count, tolerance, quick != 0.0, at(&b, 3), at(&b, 4));
+    const Int designs = count ? b.view[4].len / (3 * (Int)sizeof(double) * count) : 0;
+    code = solve_many(at(&b, 0), designs, at(&b, 1), at(&b, 2), count, tolerance, quick != 0.0, at(&b, 3), at(&b, 4));
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(code);
@@ -164,16 +165,16 @@ static PyObject *py_march(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(code);
 }
 
-/* march_many(models, plan, targets, efforts, codes, room) -> whether there was memory */
+/* march_many(models, plan, targets, efforts, codes, chosen, states, room) -> whether there was memory */
 static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
     Buffers b;
     double room;
     int code;
     (void)self;
-    if (!number(arguments, 5, &room) || !take(arguments, 0, 5, &b)) return NULL;
+    if (!number(arguments, 7, &room) || !take(arguments, 0, 7, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
     code = march_many(at(&b, 0), b.view[4].len / (Int)sizeof(Int), at(&b, 1), at(&b, 2), b.view[2].len / (Int)sizeof(double),
-                      at(&b, 3), (Int)room, at(&b, 4));
+                      at(&b, 3), (Int)room, at(&b, 4), at(&b, 5), b.view[5].len / (Int)sizeof(Int), at(&b, 6));
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(code);

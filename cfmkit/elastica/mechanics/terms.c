@@ -2,7 +2,6 @@
  *
  * The formulas are those of energy.py and terms.py, which a test holds equal to these. */
 #include <math.h>
-#include <stddef.h>
 #include <string.h>
 
 #include "march.h"
@@ -175,8 +174,11 @@ static void element(const Model *m, Int e, const double *z, Stage at, int with_h
     const Int triangle = shapes * (shapes + 1) / 2;
     double phi[MAX_SHAPES];
     Sums sum;
-    memset(&sum, 0, offsetof(Sums, stiffness));
-    for (Int k = 0; k < shapes; k++) phi[k] = z[own[local(k)]];
+    for (Int k = 0; k < shapes; k++) { /* not the whole of the arrays, which are long */
+        phi[k] = z[own[local(k)]];
+        sum.rotation[k] = sum.change[k] = sum.by_x[k] = sum.by_y[k] = 0.0;
+    }
+    sum.reach[0] = sum.reach[1] = sum.reach_change[0] = sum.reach_change[1] = sum.xx = sum.yy = sum.xy = 0.0;
     if (with_hessian) memcpy(sum.stiffness, m->bend + e * triangle, (size_t)triangle * sizeof(double));
     gauss_points(m, e, phi, last, load, growth, &sum, with_hessian);
     t->count = count;

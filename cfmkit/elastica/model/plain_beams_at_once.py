@@ -15,6 +15,7 @@ from cfmkit.elastica.model.beam import GAUSS, Fit
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
+from cfmkit.numerics.dual_array import cos_sin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -139,8 +140,8 @@ def coefficients_of(beams: Sequence[Beam]) -> Any:
 
 def chords(coefficients: Any) -> tuple[Any, Any]:
     """Return the chords of shapes of length 1 with coefficients (..., b, m), x and y (..., b) each."""
-    angle = coefficients @ powers(coefficients.shape[-1])
-    return np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
+    cos, sin = cos_sin(coefficients @ powers(coefficients.shape[-1]))
+    return cos @ GAUSS[1], sin @ GAUSS[1]
 
 
 def fit_to_ends(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:

@@ -261,17 +261,8 @@ class EquilibriumPath(ShortRepr):
         return read_only(strain_energy(self.at) * self.mesh.scales.moment)
 
     # -- stresses ----------------------------------------------------------------------------------------------------
-    def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
-        known = self._beam_stresses.get(axial)
-        if known is not None:
-            number = list(self.network.beams).index(beam)
-            return known[0][number], known[1][number]
-        value, place = stress_extremes.largest_stresses(self.network, self.at, [beam], axial)
-        return value[0], place[0]
-
     def beam_stresses(self, axial: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Return the largest stress of each of b beams at every point, (b, n) [Pa], and its place."""
+        """Return the largest stress of b beams at every point, (b, n) [Pa], and its place (share of the length)."""
         if axial not in self._beam_stresses:
             found = stress_extremes.largest_stresses(self.network, self.at, list(self.network.beams), axial)
             self._beam_stresses[axial] = read_only(found[0]), read_only(found[1])

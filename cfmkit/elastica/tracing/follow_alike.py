@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.designs import make_up, set_up
+from cfmkit.elastica.mechanics.designs import make_up, raise_designs, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import MarchCode
-from cfmkit.elastica.mechanics.march import engine, march_many
+from cfmkit.elastica.mechanics.march import engine, march_many, solve_designs
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import apart
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.elastica.results.path import PathStatus
-from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, ROUNDING, SAFETY, pick_points
+from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, NEXT_CORRECTION, ROUNDING, SAFETY, pick_points
 from cfmkit.elastica.tracing.start import FREE, next_correction
 from cfmkit.errors import InputError
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Control
     from cfmkit.elastica.model.network import Network
@@ -101,25 +103,32 @@ def _follow(path: Path, networks: list[Network], control: Control) -> Any:
     drive, points = path.load_case, path.load_case.points
     origin, pairs = (path.network, drive), [(network, drive) for network in networks]
 
-    def efforts_at(degree: int, some: list[Any], targets: FloatArray) -> FloatArray:
-        template = discretise(*origin, degree, scales=path.mesh.scales, fits=path.mesh.fits)
-        designs = set_up(template, origin, some)
+    def set_up_at(degree: int, some: list[Any]) -> NetworkDesigns:
+        return set_up(discretise(*origin, degree, scales=path.mesh.scales, fits=path.mesh.fits), origin, some)
+
+    def efforts_of(designs: NetworkDesigns, chosen: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
         correction, turn = next_correction(control), control.largest_turn
-        efforts, codes = march_many(designs, targets, tolerance=correction, largest_turn=turn)
-        return np.where((codes == MarchCode.DONE)[:, None], efforts, np.nan)
+        found = march_many(designs, points, tolerance=correction, largest_turn=turn, chosen=chosen)
+        efforts, codes, states = found
+        return np.where((codes == MarchCode.DONE)[:, None], efforts, np.nan), states
 
     highest = path.mesh.degree + DEGREES_MORE
-    exact = efforts_at(highest, [origin], points)[0]
+    exact = efforts_of(set_up_at(highest, [origin]))[0][0]
     size = np.abs(exact).max()
-    errors = ((k, np.abs(efforts_at(k, [origin], points)[0] - exact).max()) for k in range(LOWEST_DEGREE, highest))
+    degrees = range(LOWEST_DEGREE, highest)
+    errors = ((k, np.abs(efforts_of(set_up_at(k, [origin]))[0][0] - exact).max()) for k in degrees)
     degree = next((k for k, error in errors if MARGIN * error <= control.tolerance * size), highest)
     few = np.sort(path.requested[pick_points(path, ())])
     efforts = np.full((len(pairs), len(points)), np.nan)
     left = np.arange(len(pairs))
     while left.size and degree <= highest:  # a degree for all, a higher one for those that miss the tolerance
-        some = [pairs[k] for k in left]
-        coarse = efforts_at(degree, some, points)
-        finer = efforts_at(degree + DEGREES_MORE, some, points[few])
+        designs = set_up_at(degree, [pairs[k] for k in left])
+        coarse, states = efforts_of(designs, few.tolist())
+        mesh, fine = designs.template, raise_degree(designs.template, degree + DEGREES_MORE)
+        z = np.zeros((*states.shape[:2], mesh.size))
+        z[..., mesh.free] = states
+        guesses = embed(mesh, fine, z)[..., fine.free]
+        finer = solve_designs(raise_designs(designs, fine), guesses, points[few], NEXT_CORRECTION)
         error = SAFETY * np.abs(finer - coarse[:, few]).max(axis=1) + ROUNDING * size
         accurate = error <= control.tolerance * np.abs(coarse).max(axis=1)
         efforts[left[accurate]] = coarse[accurate]

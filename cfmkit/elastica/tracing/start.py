@@ -146,8 +146,8 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
 
 def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
     """Return True if a beam that does not stretch was stretched through its floor at any of k states, (k, size)."""
-    elements = np.flatnonzero(mesh.floored)
-    if not elements.size or not len(z):
+    if not len(z) or not np.any(mesh.floored):
         return False
+    elements = np.flatnonzero(mesh.floored)
     force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
     return bool((force * mesh.elements.axial[elements].max(axis=1) > FLOOR_STRAIN).any())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -175,7 +176,8 @@ def _first_degree(network: Network, tolerance: float) -> int:
 
 
 def _plain_degree(tolerance: float) -> int:
-    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
+    lowest, highest = DEGREES
+    return min(max(math.ceil(1 - math.log10(tolerance)), lowest), highest)
 
 
 def _next_degree(path: Path, tolerance: float) -> int:
@@ -442,6 +444,8 @@ def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     if not len(path):
         return {}
     whole = _tautness(path)
+    if not whole.max() > TAUT:
+        return {}
     resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
         if right - left > WHOLE and resolved[number] * (right - left) > TAUT:
@@ -454,7 +458,9 @@ def _tautness(path: Path) -> FloatArray:
     e = path.mesh.elements
     force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=1) * e.length
-    lengths = {beam: e.length[[other == beam for other in e.beam]].sum() for beam in set(e.beam)}
+    lengths = dict.fromkeys(e.beam, 0.0)
+    for beam, length in zip(e.beam, e.length.tolist(), strict=True):
+        lengths[beam] += length
     return np.asarray(np.sqrt(force / bending) * [lengths[beam] for beam in e.beam])
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.path import Path
 
-_CHUNK, _AHEAD = 128, 2  # networks set up at once; chunks for each process that are on their way
+_CHUNK, _AHEAD = 256, 2  # networks set up at once; chunks for each process that are on their way
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
@@ -312,7 +312,7 @@ def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
 def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
     """Return the same as beams, for decks of other solvers; none where a node is turned that is free to move."""
     from cfmkit.elastica import Displacement, Rotation
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
 
     assembly = assemble(spec)
     drive = assembly.drive()

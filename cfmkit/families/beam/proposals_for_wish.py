@@ -12,15 +12,16 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.bounding_box import room
+from cfmkit.families.beam.bounding_box import COARSE, room
 from cfmkit.families.beam.model import analyze
+from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
@@ -48,8 +49,11 @@ SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
 STRESS = 0.95
 """Share of the allowable stress by bending alone: what stretching adds is judged afterwards."""
 
-RIPPLE = 0.95
-"""Share of the ripple wished that the scaled curve may have."""
+RIPPLES = (0.95, 1.02)
+"""Shares of the ripple wished that the scaled curve may have: the second where no window has the first."""
+
+DEEPER = 1.02
+"""Width over the depth that may seem to be needed: stretch and shear make beams softer or stiffer by as much."""
 
 STOUT = 1.15
 """Largest thickness over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do."""
@@ -57,7 +61,7 @@ STOUT = 1.15
 FLAT = 1.0
 """Least width of a beam over its thickness: narrower ones leave the plane."""
 
-OFFERED = 14
+OFFERED = 18
 
 WIDE_LAST = 100.0
 """Promise of shapes whose beams are too wide to curl: they come after all others."""
@@ -86,7 +90,8 @@ def kept_shapes() -> tuple[Kept, ...]:
     That is bending alone, whose curve is the same for every thickness, or, where beams are stout, with stretch and
     shear: then the curve is exact where the thickness goes with the size, and a guess elsewhere.
     """
-    return tuple(_followed(name) for name in SHAPES)
+    plain = tuple(_followed(name) for name in SHAPES)
+    return (*plain, *(_in_two_layers(kept) for kept in plain if kept.spec.mechanism.copies is not None))
 
 
 def _followed(name: str) -> Kept:
@@ -97,6 +102,15 @@ def _followed(name: str) -> Kept:
     assert space is not None
     curve = result.curve
     return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, space)
+
+
+def _in_two_layers(kept: Kept) -> Kept:
+    """Return two of a shape in series: twice the travel at the same force and stress."""
+    spec = kept.spec.replace({"mechanism.copies.layers": 2})
+    heights = [drawing(one, COARSE, check=False).contours for one in (kept.spec, spec)]
+    one, both = (max(contour.extents[3] for contour in contours if contour.layer == "cut") for contours in heights)
+    space = replace(kept.room, along=kept.room.along + both - one)
+    return replace(kept, name=f"{kept.name} in two layers", spec=spec, motion=2.0 * kept.motion, room=space)
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -147,8 +161,8 @@ def _rescaled(wish: Wish, kept: Kept, size: float, block: dict[str, Any]) -> Can
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
     stress = np.maximum.accumulate(kept.stress)[ends]
-    flat = np.flatnonzero(ripple <= RIPPLE * wish.ripple)
-    if not len(flat):
+    flat = next((flat for share in RIPPLES if len(flat := np.flatnonzero(ripple <= share * wish.ripple))), None)
+    if flat is None:
         least = float(ripple.min())
         reason = f"the force of beams in this room changes by {percent(least)} over the travel"
         return 1.0 + least / wish.ripple, reason
@@ -181,7 +195,7 @@ def _sized(
         wide = _width(wish, kept, size, stiffer, thicker, force)
     if thicker * thin < wish.thinnest:
         return wish.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick"
-    if wish.depth is not None and wide > 0.99 * wish.depth:
+    if wish.depth is not None and wide > DEEPER * wish.depth:
         return wide / wish.depth, f"the beams would be {mm(wide)} wide"
     spec = _written(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])

@@ -151,15 +151,6 @@ class BeamDesign(DesignBlock):
             raise ValueError(f"'target' must stay above {LEAST_SHARE:.0%} of its largest force in 'optimise.window'")
         return self
 
-    def tolerances_of(self, spec: Any) -> tuple[Mapping[str, Any], int]:
-        """Return the stated tolerances and the number of parts, those of `optimise.tolerances` by its old name, too."""
-        old = self.optimise.tolerances if self.optimise and "tolerances" in self.optimise.model_fields_set else None
-        if self.tolerances or old is None or not spec.part_requirements:
-            return super().tolerances_of(spec)
-        samples = self.samples if "samples" in self.model_fields_set else max(LEAST_DRAWN, old.samples)
-        assert self.optimise is not None
-        return self.optimise.scatter(spec.mechanism), samples
-
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if (self.rescale and self.optimise) or not (self.rescale or self.optimise or self.free):
@@ -243,14 +234,6 @@ class BeamSpec(Spec):
         if self.design is not None and self.design.rescale is not None:
             refuse("BeamSpec", self.design.rescale.sheet_fault(sheet_of(self.mechanism.part)))
         return self
-
-    def old_keys(self) -> Iterator[tuple[str, str, str]]:
-        """Yield (path, path by its name of today, what to write there) of each key that stands under an old name."""
-        wanted = self.design.optimise if self.design else None
-        if wanted is not None and "tolerances" in wanted.model_fields_set:
-            found = {} if self.design is None else wanted.scatter(self.mechanism)
-            said = ", ".join(f"{path}: {{normal: {one.normal}}}" for path, one in found.items())
-            yield "design.optimise.tolerances", "design.tolerances", f"{{{said}}}"
 
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:

@@ -61,7 +61,6 @@ FINDINGS = {
     "parts_touch": "the clearance between moving parts, or from them to the plate or its screws, is less than required",
     "bearing_overloaded": "the load of a roller's bearing exceeds its static rating",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
-    "old_word": "an old word in the specification, which the next version will not accept",
     "target_curve": "no cam gives the target curve: it ends too early, is not above zero, or needs a vertical path",
     "weight_too_large": "the target force is less than the weight of the moving parts",
     "force_constant_too_small": "the required force constant is below the smallest one without undercut",

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.families.cam.springs_spec import Springs
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, OldWords, PositiveLength, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Time, format_short
 from cfmkit.stock.material_and_part_spec import (
@@ -340,18 +340,15 @@ class Dynamics(Model):
     origin: Literal["path-start", "cam-start"] = Field(
         "path-start", description="where heights are zero: at the first point of the roller path, or of the cam"
     )
-    method: Annotated[Literal["inverse", "multibody", "direct"], OldWords("direct")] = Field(
+    method: Literal["inverse", "multibody"] = Field(
         "inverse",
-        description=(
-            "inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers; "
-            "'direct' is a deprecated name of 'inverse'"
-        ),
+        description="inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers",
     )
 
     @property
     def closed(self) -> bool:
-        """Whether the kinematics are closed: `method` is 'inverse', by its own word or the old one."""
-        return self.method != "multibody"
+        """Whether the kinematics are closed: `method` is 'inverse'."""
+        return self.method == "inverse"
 
     @field_validator("stroke")
     @classmethod

@@ -60,7 +60,6 @@ FINDINGS = {
     "lateral_buckling": "the part bends out of its plane nearly as easily as in its plane",
     "side_force": "the transverse force on the guide is large: friction in the guide adds to the force",
     "pulled": "the requested travel pulls the chain instead of compressing it",
-    "second_opinion": "corotational elements give a different force or stress",
     "optimizer_stopped": "the optimiser ended without converging: the design is the best one found",
     "target_unreachable": "the target force cannot be reached within the given ranges",
 }

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.findings import mm
 from cfmkit.families.flattest_window import flattest
+from cfmkit.families.slider_crank.printed.outline import PAD, drawing
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import (
@@ -31,6 +33,9 @@ from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.wishes import Wish
 
@@ -48,9 +53,12 @@ STARTS = (0.04, 0.1)
 SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
 """Sizes that are tried, over the largest that the room allows."""
 
-PADS = (0.031, 0.040)
-"""What the pads at both ends of a printed part add across the slider's path and along it [m]: twice their length, and
-the corners of the inclined one."""
+FULL_PADS = 0.054
+"""Crank from which on the pads of a printed part are as large as usual [m], that of Bilancia, Geraci, Berselli 2019;
+those of smaller parts are smaller in proportion."""
+
+ROUNDED_BOX = 1.0 - 1e-4
+"""Share of the room that the largest part takes: its sizes are rounded, and its outline is known to a few digits."""
 
 PAIR_GAP = (0.1, 4e-3)
 """Between the parts of a mirrored pair: a share of one's height, and a length [m], as they are drawn."""
@@ -95,12 +103,12 @@ def _of_force(wish: Wish) -> FamilyOffer:
     if found := [one for one in tried if isinstance(one, Candidate)]:
         return FamilyOffer(tuple(_varied(found)))
     reasons = []
-    fits = [printed_size(wish, lengths) for lengths in PUSHED]
-    wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
+    fits = [largest_printed(wish.room, lengths) for lengths in PUSHED]
+    wide = min((strip_width(wish, block, one) for one in fits for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
         reasons.append(f"a strip would have to be about {mm(wide)} wide")
     largest = max(fits)
-    if largest > 0.0 and not _can_be_cut(wish, THICKEST * largest):
+    if not _can_be_cut(wish, THICKEST * largest):
         text = f"strips are made {mm(wish.thinnest)} thick at least, too thick for a crank of {mm(largest)}"
         reasons.append(f"{text}, the longest that fits")
     if most := max((one for one in tried if isinstance(one, float)), default=0.0):
@@ -110,21 +118,50 @@ def _of_force(wish: Wish) -> FamilyOffer:
         reasons.append(reason)
     if reasons:
         return FamilyOffer(reason="; ".join(reasons))
-    need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
+    crank = wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach
+    need = _printed_box(PUSHED[0], crank) if wish.depth is not None else _pinned_box(PUSHED[0], crank)
     return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
 
 
-def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tuple[float, float]:
-    """Return the room that a linkage needs across and along the slider's path [m]."""
-    pin = crank * np.sin(lengths.unloaded)
-    across = max(lengths.offset * crank, pin) + PADS[0] * pads + 2.0 * EYE_SHARE * crank * (not pads)
-    along = lengths.stretched * crank + PADS[1] * pads + 2.0 * EYE_SHARE * crank * (not pads)
+def _pinned_box(lengths: Proportions, crank: float) -> tuple[float, float]:
+    """Return the room that a linkage with pins needs across and along the slider's path [m]."""
+    across = max(lengths.offset, math.sin(lengths.unloaded)) + 2.0 * EYE_SHARE
+    return across * crank, (lengths.stretched + 2.0 * EYE_SHARE) * crank
+
+
+def _printed_box(lengths: Proportions, crank: float) -> tuple[float, float]:
+    """Return the room that a strip with its pads needs across and along the slider's path [m]; it moves within."""
+    small, large = _boxes_as_drawn(lengths)
+    slope, beyond = (large - small) / FULL_PADS, crank - FULL_PADS
+    across, along = small * crank / FULL_PADS if beyond <= 0.0 else small + slope * beyond
     return float(across), float(along)
 
 
-def printed_size(wish: Wish, lengths: Proportions) -> float:
-    """Return the crank's length of the largest part that fits the room [m]; not above zero where the pads do not."""
-    return min((wish.room[0] - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
+@cache
+def _boxes_as_drawn(lengths: Proportions) -> FloatArray:
+    """Return the box of the outline of a strip, across and along the slider's path, for two cranks, (2, 2) [m]."""
+    boxes = []
+    for crank in (FULL_PADS, 2.0 * FULL_PADS):
+        beam = {"width": crank, "thickness": 0.01 * crank}
+        mechanism = {**_mechanism(lengths, crank), "material": {"name": "pom"}, "beam": beam}
+        analysis = {"drive": "force", "fidelity": "beam"}
+        drawn = drawing(
+            SliderCrankSpec.model_validate({"family": "slider-crank", "mechanism": mechanism, "analysis": analysis})
+        )
+        extents = np.array([contour.extents for contour in drawn.contours if contour.layer == "cut"])
+        along, across = extents[:, 2:].max(axis=0) - extents[:, :2].min(axis=0)
+        boxes.append([across, along])
+    return np.array(boxes)
+
+
+def largest_printed(room: Sequence[float], lengths: Proportions) -> float:
+    """Return the crank's length of the largest strip whose outline fits the first two sides of a room [m]."""
+    small, large = _boxes_as_drawn(lengths)
+    wide = np.array(room[:2]) * ROUNDED_BOX
+    in_proportion = FULL_PADS * float((wide / small).min())
+    if in_proportion <= FULL_PADS:
+        return in_proportion
+    return FULL_PADS * (1.0 + float(((wide - small) / (large - small)).min()))
 
 
 def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate | float]:
@@ -132,7 +169,7 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate | float]:
 
     Or the largest force that springs at pins can hold, where that is less than what is wished [N].
     """
-    printed = printed_size(wish, lengths)
+    printed = largest_printed(wish.room, lengths)
     pinned = min(wish.room[0] / (lengths.offset + 2 * EYE_SHARE), wish.room[1] / (lengths.stretched + 2 * EYE_SHARE))
     pins = overfilled(wish) is None
     found: list[Candidate | float] = []
@@ -174,7 +211,7 @@ def _can_be_cut(wish: Wish, thickest: float) -> bool:
 def pair_size(wish: Wish, lengths: Proportions) -> float:
     """Return the crank's length of the largest mirrored pair that fits the room [m]: two heights and a gap."""
     one = (wish.room[0] - PAIR_GAP[1]) / (2.0 + PAIR_GAP[0])
-    return min((one - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
+    return largest_printed((one, wish.room[1]), lengths) if one > 0.0 else 0.0
 
 
 def _pairs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
@@ -220,9 +257,12 @@ def _materials(wish: Wish) -> list[dict[str, Any]]:
 
 
 def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
+    """Return the linkage of a printed part, and its pads where they are smaller than usual."""
+    small = crank / FULL_PADS
+    pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD)}}
     return {
         "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
-        "unloaded_angle": lengths.unloaded,
+        "unloaded_angle": lengths.unloaded, **pads,
     }  # fmt: skip
 
 

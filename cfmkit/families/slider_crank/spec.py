@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -128,14 +128,6 @@ class SliderCrankSpec(Spec):
     mechanism: Mechanism
     design: CrankDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: CrankAnalysis = Field(default_factory=CrankAnalysis, description="how it is run")
-
-    def old_keys(self) -> Iterator[tuple[str, str, str]]:
-        """Yield (path, path by its name of today, what to write there) of each key that stands under an old name."""
-        old = self.mechanism.process
-        if old is not None:
-            values = {"position": old.layer, "least_feature": old.thinnest}
-            said = ", ".join(f"{key}: {format_short(one, 'length')}" for key, one in values.items() if one is not None)
-            yield "mechanism.process", "mechanism.part.process", f"{{{said}}}"
 
     @property
     def durability(self) -> Durability | None:

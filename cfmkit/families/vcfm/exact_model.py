@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.kinds import SpringChain
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
     from cfmkit.families.vcfm.leaves_spec import Bistable
-    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
+    from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
+    from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 DOWN = -0.5 * np.pi
 
@@ -57,7 +58,7 @@ def leaf_network(spec: VcfmSpec) -> Network:
     return _network_of(parts.bistable, parts.material, parts.wide_beams)
 
 
-def _network_of(about: Bistable, made_of: LeafMaterial, wide: bool) -> Network:
+def _network_of(about: Bistable, made_of: MaterialSpec, wide: bool) -> Network:
     from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, guided
 
     law = leaf_law(about, made_of)
@@ -80,7 +81,7 @@ in one room after another."""
 
 
 @lru_cache(maxsize=KEPT)
-def _leaf_path(about: Bistable, made_of: LeafMaterial, wide: bool, end: float, branch: str | None) -> Traced:
+def _leaf_path(about: Bistable, made_of: MaterialSpec, wide: bool, end: float, branch: str | None) -> Traced:
     """Return what a leaf does up to `end` [m]; a branch is followed, and its waviness counts, where one is stated."""
     control = {} if branch is None else {"branch": branch, "imperfection": about.waviness}
     return traced(_network_of(about, made_of, wide), "shuttle", end, **control)
@@ -95,7 +96,7 @@ def spring_chain(spec: VcfmSpec) -> SpringChain:
 def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
     """Return leaf and, unless it is bought, spring as beams with their travels, for decks of other solvers."""
     from cfmkit.elastica import Displacement
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
 
     found = [DrivenNetwork("vcfm-leaf", leaf_network(spec), Displacement("shuttle", DOWN, np.array([spec.travel])))]
     if spec.mechanism.springs is None:

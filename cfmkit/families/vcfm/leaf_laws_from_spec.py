@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
     from cfmkit.families.vcfm.leaves_spec import Bistable, Positive
-    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
+    from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Parts:
         return self.leaf.balance
 
 
-def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> LeafStrip:
+def strip_of(leaf: Positive | Bistable, made_of: MaterialSpec) -> LeafStrip:
     """Return a leaf of a specification."""
     angle = leaf.angle if leaf.kind.is_inclined else 0.0
     return LeafStrip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
@@ -101,12 +102,12 @@ def parts(spec: VcfmSpec) -> Parts:
     return Parts(leaf, spring, bistable.half_beams)
 
 
-def leaf_law(bistable: Bistable, made_of: LeafMaterial) -> LeafLaw:
+def leaf_law(bistable: Bistable, made_of: MaterialSpec) -> LeafLaw:
     """Return the closed form of one snap-through leaf, with its shape."""
     return bistable.kind.law(strip_of(bistable, made_of), bistable)
 
 
-def leaf_spring(positive: Positive, made_of: LeafMaterial) -> LeafSpring:
+def leaf_spring(positive: Positive, made_of: MaterialSpec) -> LeafSpring:
     """Return the closed form of a spring of leaves, as much of it as is loaded, with its shape."""
     return positive.kind.law(strip_of(positive, made_of), positive, share_of(positive))
 

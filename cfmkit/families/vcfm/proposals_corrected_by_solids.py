@@ -49,16 +49,15 @@ def correct(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
     preloads, largest = solid.analysis.preloads, max(solid.analysis.preloads)
     force, stress = sampler.spring(np.array([last - wish.travel, last]))
-    side = float(np.max(stress)) * float(parts(solid).spring.stress(last + largest) / parts(solid).spring.stress(last))
     rate = stiff * float(force[1] - force[0]) / wish.travel
     strength = wish.strength_used * (solid.mechanism.material.allowable(1.0) or np.inf)
-    longer = [max(1.0, sqrt(1.02 * one / strength)) for one in (leaf, side)]
-    made = solid
+    longer = [max(1.0, sqrt(1.02 * leaf / strength)), 1.0]
     if solid.mechanism.springs is None:
-        made = lengthened(solid, longer)
-        preloads = preloads_for(spec, wish, 1.0 / rate, solid.analysis.preloads)
-    else:
-        made = lengthened(solid, [longer[0], 1.0])
+        law = parts(solid).spring
+        side = float(np.max(stress) * law.stress(last + largest) / law.stress(last))
+        longer[1] = max(1.0, sqrt(1.02 * side / strength))
+        preloads = preloads_for(spec, wish, 1.0 / rate, preloads)
+    made = lengthened(solid, longer)
     made = widened(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
     begin = last - wish.travel * (1.0 + INSIDE)
     changes = {

@@ -25,29 +25,11 @@ from cfmkit.specs.spec import (
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
+from cfmkit.stock.material_and_part_spec import MaterialField, SafetyFactor, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
-
-
-class LeafMaterial(MaterialSpec):
-    """A material that also takes the old word of this family for how much of its strength may be used."""
-
-    allowable_stress: PositiveStress | None = Field(
-        None, description="deprecated: the 'yield_strength' where 'safety_factor' is 1", exclude=True
-    )
-
-    @model_validator(mode="after")
-    def _in_one_form(self) -> Self:
-        if self.allowable_stress is not None:
-            # past the frozen model: nothing that reads or writes a material knows two words
-            object.__setattr__(self, "yield_strength", self.allowable_stress)
-            object.__setattr__(self, "allowable_stress", None)
-            self.model_fields_set.discard("allowable_stress")
-            self.model_fields_set.add("yield_strength")
-        return self
 
 
 MOST_PRELOAD = 100.0
@@ -70,7 +52,7 @@ class Frame(Model):
 class Mechanism(CutLeaves, Model):
     """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
 
-    material: Annotated[LeafMaterial, material_input(LeafMaterial)] = Field(
+    material: MaterialField = Field(
         description="of leaves and spring: a name from `show materials`, or {youngs_modulus, ...}"
     )
     safety_factor: SafetyFactor = 1.0
@@ -84,16 +66,6 @@ class Mechanism(CutLeaves, Model):
     )
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
     part: VcfmPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes, frame")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _allowable_stress_is_given_once(cls, data: Any) -> Any:
-        block = keys_of(data)
-        old = keys_of(block.get("material")).get("allowable_stress")
-        if old is not None and block.get("safety_factor") not in (None, 1):
-            reported = "is deprecated and has no effect beside 'safety_factor': give 'yield_strength' instead"
-            refuse("Mechanism", {("material", "allowable_stress"): reported})
-        return data
 
     @model_validator(mode="after")
     def _one_kind_of_spring(self) -> Self:

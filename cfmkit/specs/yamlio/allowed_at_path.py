@@ -51,11 +51,8 @@ class Slot:
 
     @property
     def choices(self) -> tuple[Any, ...]:
-        """The words of a closed choice, but old ones that are only still understood."""
-        if self.origin is not Literal:
-            return ()
-        old = [word for item in self.metadata for word in getattr(item, "old_words", ())]
-        return tuple(word for word in get_args(self.kind) if word not in old)
+        """The words of a closed choice."""
+        return get_args(self.kind) if self.origin is Literal else ()
 
     @property
     def bounds(self) -> dict[str, Any]:

@@ -73,7 +73,10 @@ def _easings(wish: Wish) -> dict[str, Easing]:
 
 def _offered(wish: Wish, name: str, seed: int) -> Sequence[Candidate]:
     propose = family(name).propose
-    candidates: Sequence[Candidate] = function_named(propose)(wish, Run(seed)).candidates if propose else ()
+    if not propose:
+        return ()
+    asked = wish.with_strengths[-1]
+    candidates: Sequence[Candidate] = function_named(propose)(asked, Run(seed)).candidates
     return candidates
 
 

@@ -377,10 +377,17 @@ def model_of(name: str, spec: Spec) -> str:
 
 
 def made_as_wished(spec: Spec, wish: Wish) -> Spec:
-    """Return a specification whose part says by which process it is made, if one is wished.
+    """Return a specification whose material is as stated, and whose part says by which process it is made if one is.
 
     Its inside corners are as round as before, or as round as the process makes them: a smaller radius has more stress.
     """
+    mechanism = spec.at("mechanism")
+    owners = {"mechanism": mechanism, "mechanism.contact": getattr(mechanism, "contact", None)}
+    for path, owner in owners.items():
+        if (material := getattr(owner, "material", None)) is not None:
+            block = material.model_dump(exclude_unset=True)
+            if (stated := wish.stated_material(block)) != block:
+                spec = spec.replace({f"{path}.material": dict(stated)})
     if wish.process is None:
         return spec
     radius = PROCESSES[wish.process].least_radius

@@ -83,6 +83,9 @@ def unjudged(wish: Wish, result: Result) -> Iterator[str]:
         yield "force and stress not judged: the mesh is too coarse"
     if _bends(result) and result.allowable_stress is None:
         yield f"stress not judged: no strength is known of {_material(result)}"
+    contact = getattr(result.spec.at("mechanism"), "contact", None)
+    if contact is not None and contact.material.yield_strength is None:
+        yield f"contact pressure not judged: no strength is known of {_material(result)}"
 
 
 def pressed(wish: Wish, spec: Spec) -> tuple[str, str]:

@@ -14,6 +14,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -208,12 +209,8 @@ class _Making:
         """Make candidates, or find them in the journal; return whether the time sufficed for all."""
         run, notes = self._run, self._run.notes
         keys = [_key(job) for job in jobs]
-        places = [notes.find(key) for key in keys]
-        self._known = {
-            index: Proposal.of_record(notes.read(place, key))
-            for index, (place, key) in enumerate(zip(places, keys, strict=True))
-            if place >= 0
-        }
+        records = {index: notes.find(key) for index, key in enumerate(keys)}
+        self._known = {index: Proposal.of_record(one) for index, one in records.items() if one is not None}
         self.reused += len(self._known)
         left = [index for index in range(len(jobs)) if index not in self._known]
         work = partial(_made_of, tuple(jobs))
@@ -276,7 +273,7 @@ def _with_nearest(
     names = [one.family for one in answers]
     content = {"wish": repr(wish), "seed": run.seed, "code": code_stamp()}
     keys = {name: stable_hash(content | {"nearest": name})[:32] for name in names}
-    found = {name: run.notes.read(place, keys[name]) for name in names if (place := run.notes.find(keys[name])) >= 0}
+    found = {name: record for name in names if (record := run.notes.find(keys[name])) is not None}
     left = [name for name in names if name not in found]
     clock = Clock(deadline)
     work = partial(_nearest_of, wish, run.seed, clock)
@@ -335,17 +332,17 @@ def offer_of(record: Family, wish: Wish, run: Run) -> FamilyOffer:
     """Return what a family could do with a wish; elastic parts with a reserve of strength come first.
 
     Beams do not know the stress in fillets. Most parts that use all of their strength by beams use too much of it as
-    solids; those with a reserve are tried first.
+    solids; those with a reserve are tried first. Where the strength of a material is not known, parts of a small strain
+    come before those of a larger one.
     """
     propose = function_named(str(record.propose))
-    plain: FamilyOffer = propose(wish, run)
-    if record.elastic_parts is None:
-        return plain
-    careful: FamilyOffer = propose(replace(wish, reserve=RESERVE_FOR_FILLETS), run)
-    first = [replace(one, reserve=RESERVE_FOR_FILLETS) for one in careful.candidates]
-    known = {(one.variant, dump(one.spec)) for one in first}
-    rest = [one for one in plain.candidates if (one.variant, dump(one.spec)) not in known]
-    return FamilyOffer((*first, *rest), plain.reason)
+    reserves = (1.0,) if record.elastic_parts is None else (RESERVE_FOR_FILLETS, 1.0)
+    found: dict[tuple[str, str], Candidate] = {}
+    for one, reserve in product(wish.with_strengths, reserves):
+        offer: FamilyOffer = propose(replace(one, reserve=reserve), run)
+        for candidate in offer.candidates:
+            found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
+    return FamilyOffer(tuple(found.values()), offer.reason)
 
 
 def _next(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Model, PositiveLength, Tolerance, refuse
+from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Time
 
 if TYPE_CHECKING:
@@ -113,27 +113,7 @@ class Optimise(Model):
     drawn: int = Field(60, ge=1, le=100_000, description="random networks examined for each start")
     widened: int = Field(8, ge=1, le=10_000, description="how many of the best are widened, for `range`")
     time_budget: Annotated[Time, Field(gt=0)] | None = Field(None, description="end the search after this time")
-    tolerances: Tolerances = Field(
-        default_factory=Tolerances, description="for the audit; if stated, also read as `design.tolerances` (old name)"
-    )
-
-    def scatter(self, mechanism: Mechanism) -> dict[str, Tolerance]:
-        """Return the tolerances in the words of `design.tolerances`, on what the search may choose of a mechanism."""
-        nodes, turns = (
-            Tolerance(normal=f"{1e3 * self.tolerances.nodes:.9g} mm"),
-            Tolerance(normal=f"{self.tolerances.coefficients:.9g} rad"),
-        )
-        found: dict[str, Tolerance] = {}
-        if self.tolerances.nodes:
-            for name, node in self.free.items():
-                both = node.x is None and node.y is None
-                moved = [axis for axis, ends in enumerate((node.x, node.y)) if both or ends is not None]
-                found |= {f"mechanism.nodes.{name}.at.{axis}": nodes for axis in moved}
-        if self.tolerances.coefficients:
-            for name in self.beams if self.beams is not None else mechanism.beams:
-                count = len(getattr(mechanism.beams[name].shape, "coefficients", ()))
-                found |= {f"mechanism.beams.{name}.shape.coefficients.{k}": turns for k in range(1, count)}
-        return found
+    tolerances: Tolerances = Field(default_factory=Tolerances, description="for the audit of what was found")
 
     @model_validator(mode="after")
     def _sensible(self) -> Self:

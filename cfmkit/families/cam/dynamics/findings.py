@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.families.cam.dynamics.solution import Build, MotionSolution
-    from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
 
@@ -38,18 +37,6 @@ def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
     checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction, _sideways)
     return tuple(found for check in checks for found in check(moved))
-
-
-def old_word(spec: CamSpec) -> tuple[Finding, ...]:
-    """Return what to say where the method has its old name."""
-    dynamics = spec.analysis.dynamics
-    if dynamics is None or dynamics.method != "direct":
-        return ()
-    message = (
-        "'analysis.dynamics.method: direct' is the old name of 'inverse': forces follow from a given motion, which is "
-        "inverse dynamics; the next version will no longer accept it"
-    )
-    return (finding("old_word", message, INVERSE),)
 
 
 def outside(parts: Build, span: tuple[float, float]) -> Finding:

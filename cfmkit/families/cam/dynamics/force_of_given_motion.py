@@ -22,7 +22,7 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
+from cfmkit.families.cam.dynamics.findings import findings_of, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.machine_from_spec import build, stated_motion
@@ -85,7 +85,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         message=message,
         curves=(_curve(moved),),
         values=values_of(moved),
-        warnings=(*missing, *findings_of(moved), *rubbing_left_out(spec, "the dynamic model"), *old_word(spec)),
+        warnings=(*missing, *findings_of(moved), *rubbing_left_out(spec, "the dynamic model")),
         travel=_requested(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
         allowable_stress=allowable_stress(spec.mechanism),

@@ -1,4 +1,4 @@
-"""A strip that was found, rounded, pressed again at many places and looked at by independent elements."""
+"""A strip that was found, rounded, and pressed again at many places."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cfmkit.designing.bounds_and_rounding import at_bounds
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import strip_chain
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
-from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solution, first_at
+from cfmkit.families.slider_crank.printed.solution import Solution, first_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -41,7 +41,6 @@ class FinishedStrip:
     ripple: float
     rms: float
     active: tuple[str, ...]  # what holds it
-    opinion: SecondOpinion  # of corotational elements
     overstress: float  # largest stress over the allowed one where the stroke is given; 1 where the stress ends it
 
 
@@ -73,14 +72,13 @@ def judge(
     pressed = chain.press(travel)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
-    solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end), True)
+    solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end))
     ratio = solution.force / task.force - task.share(solution.travel)
     ripple, stress = limits
     stroke = min(end, _last(solution, ratio, ripple, stress))
     stroke = float(np.floor(stroke * 1e6) / 1e6) if task.goal == "stroke" else end
     inside = (travel >= task.start) & (travel <= stroke)
-    opinion = solution.recheck
-    if not inside.any() or stroke <= task.start or opinion is None:
+    if not inside.any() or stroke <= task.start:
         return None
     return FinishedStrip(
         strip,
@@ -89,7 +87,6 @@ def judge(
         float(np.abs(ratio[inside]).max()),
         _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even(task.start, stroke))),
         (*_at_bounds(found, values), *_held(solution, ratio, inside, limits)),
-        opinion,
         1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
     )
 

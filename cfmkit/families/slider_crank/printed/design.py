@@ -164,8 +164,6 @@ class Reported:
     deviation: float | None
     rms: float | None
     stress: float | None  # largest one in the window [Pa]
-    # differences of corotational elements in force and stress, where the analysis computes them
-    opinion: tuple[float, float] | None
     ending: str = ""  # how the analysis ended
 
     def keeps(self, ripple: float | None, stress: float | None) -> bool:
@@ -179,11 +177,9 @@ class Reported:
 def _reported(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Reported:
     result = analyze(spec, run)
     kind = "target" if spec.target_curve is None else "curve"
-    again = ("recheck_force", "recheck_stress") if spec.analysis.recheck else ()
-    names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max", *again)
-    deviation, rms, stress, *opinion = measured(result, window, *names)
-    said = (float(opinion[0] or 0.0), float(opinion[1] or 0.0)) if opinion and None not in opinion else None
-    return Reported(spec, deviation, rms, stress, said, result.message)
+    names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max")
+    deviation, rms, stress = measured(result, window, *names)
+    return Reported(spec, deviation, rms, stress, result.message)
 
 
 def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[float | None, float | None]) -> Design:
@@ -213,12 +209,6 @@ def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     """Return what only the search knows."""
     numbers: dict[str, tuple[float | None, str, str]] = {
         "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
-        "elements_force": (
-            judged.opinion.force,
-            "ratio",
-            "largest relative difference of corotational elements in force, in the audit",
-        ),
-        "elements_stress": (judged.opinion.stress, "ratio", "the same in stress"),
     }
     if _compared(found):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
@@ -398,7 +388,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
 def _analysed(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
     """Return a uniform strip as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
-    quick = {"recheck": False, "points": min(spec.analysis.points, POINTS)}
+    quick = {"points": min(spec.analysis.points, POINTS)}
     plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
     reported = _reported(plain, window, run)
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
@@ -449,14 +439,10 @@ def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> st
     if _compared(found):
         within = percent(max(found.task.ripple, LOOSE))
         compared = f"; one thickness reaches {mm(_one_thickness(found))} within {within}"
-    force, stress = reported.opinion or (judged.opinion.force, judged.opinion.stress)
-    opinion, shown = judged.opinion, judged.active[:TOLD]
+    shown = judged.active[:TOLD]
     more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
     held = f"; limited by {', '.join(shown)}{more}" if shown else ""
-    return (
-        f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}; "
-        f"{opinion.elements} corotational elements: force {100 * force:+.2g} %, stress {100 * stress:+.2g} %"
-    )
+    return f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}"
 
 
 def _warnings(found: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
@@ -466,6 +452,4 @@ def _warnings(found: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
         findings.append(finding("optimizer_stopped", text))
     if found.lost:
         findings.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(found.lost)}"))
-    if not judged.opinion.stable:
-        findings.append(finding("second_opinion", "according to corotational elements the equilibrium is unstable"))
     return tuple(findings)

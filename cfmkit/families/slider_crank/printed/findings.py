@@ -28,9 +28,6 @@ SIDE_SHARE = 0.5
 RUN_IN_SHARE = 0.1
 """Travel to 98 % of the force, as a share of all, above which the kink is called large."""
 
-CLOSE = 5e-3
-"""Difference of the second opinion, as a share, above which it is reported."""
-
 
 def left_out_friction(spec: SliderCrankSpec) -> str:
     """Return what to say of specified friction: a part of one piece has no pins, and its guide is ideal here."""
@@ -172,20 +169,6 @@ def _left_out_friction(solution: Solution) -> str:
     return left_out_friction(solution.spec)
 
 
-def _differs(solution: Solution) -> bool:
-    check = solution.recheck
-    return check is not None and (max(abs(check.force), abs(check.stress)) > CLOSE or not check.stable)
-
-
-def _second_opinion(solution: Solution) -> Sentence:
-    check = solution.recheck
-    assert check is not None
-    return (
-        f"{check.elements} corotational elements differ by {100 * check.force:.2g} % in force and "
-        f"{100 * check.stress:.2g} % in stress" + ("" if check.stable else ", and find the equilibrium unstable"),
-    )
-
-
 RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("overstressed", _is_overstressed, _too_large_stress),
     FindingRule("force_negative", lambda solution: _pulls(solution).any(), _pulling_chain),
@@ -205,6 +188,5 @@ RULES: tuple[FindingRule[Solution], ...] = (
         lambda solution: bool(_left_out_friction(solution)),
         lambda solution: (_left_out_friction(solution),),
     ),
-    FindingRule("second_opinion", _differs, _second_opinion),
 )
 """Everything worth a warning, the gravest first."""

@@ -101,7 +101,6 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         elasticity(spec.mechanism),
         spec.mechanism.sets,
         window,
-        spec.analysis.recheck,
         side,
         spec.analysis.accuracy,
         spec.mechanism.copies == "mirrored",

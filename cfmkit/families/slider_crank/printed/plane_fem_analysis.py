@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
@@ -187,7 +187,7 @@ def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
 def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
     """Return the same leg as beams, for decks of other solvers."""
     from cfmkit.elastica import Displacement
-    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.slider_crank.printed.beam_chain_from_spec import lumped_chain, strip_of
     from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER
 

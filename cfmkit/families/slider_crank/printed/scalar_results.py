@@ -13,13 +13,12 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solution
+    from cfmkit.families.slider_crank.printed.solution import Solution
 
 NO_STRENGTH = "the material has no 'yield_strength'"
-NO_RECHECK = "set 'analysis.recheck' to compute it"
 OF_PINS = "it belongs to springs at pins: see fidelity 'prb'"
 
 
@@ -52,15 +51,6 @@ def stress_stroke(solution: Solution) -> float:
 
 def _why_no_stroke(solution: Solution) -> str:
     return NO_STRENGTH if solution.material.allowable_stress is None else "the stress stays below the allowable one"
-
-
-def _rechecked(what: str, read: Callable[[SecondOpinion], float]) -> ScalarQuantity[Solution]:
-    return ScalarQuantity(
-        "ratio",
-        f"largest relative difference between the {what} and that of corotational elements",
-        lambda solution: math.nan if solution.recheck is None else read(solution.recheck),
-        NO_RECHECK,
-    )
 
 
 QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
@@ -96,8 +86,6 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "width_ratio": ScalarQuantity("factor", "smallest width over thickness", lambda solution: solution.width_ratio),
     "energy_max": ScalarQuantity(*OF_SPRINGS["energy_max"], lambda solution: solution.energy.max()),
     **{name: _absent(*about, "only the model of the part as a solid has it") for name, about in OF_SOLIDS.items()},
-    "recheck_force": _rechecked("force", lambda opinion: opinion.force),
-    "recheck_stress": _rechecked("stress", lambda opinion: opinion.stress),
     "stiffness_class": _absent(*OF_SPRINGS["stiffness_class"], OF_PINS),
     "crank_pin_rotation_max": _absent(*OF_SPRINGS["crank_pin_rotation_max"], OF_PINS),
 }

@@ -16,7 +16,6 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.results.member_efforts import effort_error
-from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
 from cfmkit.metrics.continuous_means_and_extremes import mean
@@ -140,19 +139,6 @@ ChainModel = Literal["lumped", "beam"]
 FOLLOWED = (PressingEnd.COMPLETE, PressingEnd.UNSTABLE)
 """Endings of a path that has all points that were requested."""
 
-CHECKED = 6
-"""Places at which the second opinion is requested."""
-
-
-@dataclass(frozen=True)
-class SecondOpinion:
-    """Largest differences of force and stress by corotational elements, as shares, and how many elements."""
-
-    force: float
-    stress: float
-    stable: bool
-    elements: int
-
 
 @dataclass(frozen=True, repr=False)
 class Solution(ShortRepr):
@@ -164,7 +150,6 @@ class Solution(ShortRepr):
     material: Elasticity  # with the stress allowed
     legs: int  # equal ones on one slider
     window: tuple[float, float]  # where metrics are taken [m]
-    checked: bool = False  # whether a second opinion was requested
     side: int = 0  # to which it was to bend, as `Chain.press` takes it
     accuracy: float = 1e-7  # of the path, relative
     mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
@@ -297,19 +282,6 @@ class Solution(ShortRepr):
             given = beam.section.thickness
             values.append(float(np.min(given if isinstance(given, float) else given.values)))
         return min(values)
-
-    @cached_property
-    def recheck(self) -> SecondOpinion | None:
-        """Results of corotational elements; None if they were not asked."""
-        if not self.checked:
-            return None
-        moved = np.flatnonzero(self.travel > 0.0)
-        chosen = moved[np.unique(np.linspace(0, len(moved) - 1, CHECKED).astype(int))]
-        found = by_elements(self.pressed.path, self._at[chosen])
-        force = found.effort / self.pressed.force[chosen] - 1.0
-        stress = found.stress / self.stress[chosen] - 1.0
-        worst = [float(part[np.abs(part).argmax()]) for part in (force, stress)]
-        return SecondOpinion(worst[0], worst[1], bool(found.stable.all()), found.elements)
 
 
 def first_at(place: FloatArray, values: FloatArray, level: float) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -100,18 +100,12 @@ class StripSpec(Model):
         return self
 
 
-class Process(Model):
-    """The smallest features that the process can make: smaller ones cause a warning."""
-
-    layer: PositiveLength | None = Field(
-        None, description="layer or position error in the plane; smaller kinks are lost in it"
-    )
-    thinnest: PositiveLength | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
-
-
 class Printed(RoundedCorners, Model):
     """What makes a slider-crank one piece: lumped flexures or a strip, and their material."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "process": "write 'part: {process: {position: ..., least_feature: ...}}' for its 'layer' and 'thinnest'"
+    }
     material: MaterialField | None = Field(
         None, description="of 'flexures', 'beam' or links: a name from `show materials`, or {youngs_modulus, ...}"
     )
@@ -125,7 +119,6 @@ class Printed(RoundedCorners, Model):
         description="whether a wide strip or flexure is stiffer because it cannot curl across its width; the effect of "
         "clamped ends is left out",
     )
-    process: Process | None = Field(None, description="deprecated: 'position' and 'least_feature' of 'part.process'")
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
 
     @property
@@ -142,9 +135,6 @@ class Printed(RoundedCorners, Model):
             stated = self.part.process
             known = stated.accuracy(PROCESSES[stated.name]) if stated.name else stated
             position, thinnest = known.position, known.least_feature
-        if self.process is not None:  # the old name of the same: what a command line still sets there counts
-            position = position if self.process.layer is None else self.process.layer
-            thinnest = thinnest if self.process.thinnest is None else self.process.thinnest
         return position, thinnest
 
     @property
@@ -220,5 +210,7 @@ class PrintedDesign(Model):
 class PrintedAnalysis(Analysis):
     """How flexures and strips are computed."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "recheck": "for a second opinion on force and stress write 'fidelity: solid', the part as a planar solid"
+    }
     accuracy: Annotated[Ratio, Field(ge=1e-10, le=1e-3)] = Field(1e-7, description="of the beams' forces")
-    recheck: bool = Field(False, description="compute force and stress again by corotational elements at a few places")

@@ -1,1 +1,0 @@
-"""Independent solutions that the engine is compared with."""
