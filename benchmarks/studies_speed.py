@@ -1,9 +1,10 @@
 """What a study costs beside its points: run ``python benchmarks/studies_speed.py`` on a quiet machine.
 
-Three questions: what journal and rows add to a single point (at most 50 us), what a
+Four questions: what journal and rows add to a single point (at most 50 us), what a
 second process brings for points of 10 ms (at least 1.7 times), and what a million
 points of a closed form, of a cam and of a slider-crank, take with 12 metrics (at most
-40 s on two cores, and 300 MB beyond the bare process).
+40 s on two cores, and 300 MB beyond the bare process); what a made part of Lan's beams
+costs that is judged for a yield (at most 12.5 ms).
 """
 
 from __future__ import annotations
@@ -19,14 +20,17 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
+from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Metric, Row, Study
 from cfmkit.studies.pool import Pool
+from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
 from cfmkit.studies.varied_axes import axes, wish
+from cfmkit.studies.yield_of_drawn_parts import judge
 
 ROOT = Path(__file__).parents[1]
 SPEC = cfmkit.load(ROOT / "configs" / "cam.yaml").replace({"requirements": ()})
@@ -124,8 +128,19 @@ def main() -> None:
     print(f"numpy {np.__version__}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
     overhead()
     two_processes()
+    made_parts()
     for name in MILLIONS:
         million(name)
+
+
+def made_parts(count: int = 192) -> None:
+    """Judge parts of the beams of Lan as a yield does: half band, largest stress, mean force."""
+    spec = cfmkit.load(ROOT / "configs" / "studies" / "beam_lan2010_yield.yaml")
+    nominal, made = cfmkit.analyze(spec), tolerances_of(spec, spec.design, 0)
+    values = made.drawn(count, 5)
+    start = time.process_time()
+    judge(made, values, nominal, Run())
+    print(f"a made part of Lan's     {1e3 * (time.process_time() - start) / count:.1f} ms   (allowed 12.5)")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.arrays import FloatArray, Named, ShortRepr, read_only
+from cfmkit.arrays import FloatArray, LazyMapping, Named, ShortRepr, read_only
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -54,7 +54,7 @@ class Curve(ShortRepr):
     stable : (n,) array of bool
         Whether the equilibrium is stable under the drive; one value for all points is enough.
     extra : mapping
-        Further columns by name, e.g. ``contact_force``.
+        Further columns by name, e.g. ``contact_force``; those of a `LazyMapping` are computed when they are read.
     kind : {"force", "torque"}
         Which pair `motion` and `effort` are.
     label : mapping
@@ -77,10 +77,11 @@ class Curve(ShortRepr):
             given = getattr(self, name)
             value = np.full(len(self.motion), given) if isinstance(given, str | bool) else given
             object.__setattr__(self, name, read_only(value, dtype))
-        object.__setattr__(self, "extra", MappingProxyType(Named(self.extra)))
         object.__setattr__(self, "label", MappingProxyType(dict(self.label)))
         lengths = {self.motion.shape, self.effort.shape, self.branch.shape, self.stable.shape}
-        lengths |= {column.values.shape for column in self.extra.values()}
+        if not isinstance(self.extra, LazyMapping):
+            object.__setattr__(self, "extra", MappingProxyType(Named(self.extra)))
+            lengths |= {column.values.shape for column in self.extra.values()}
         if len(lengths) != 1 or self.motion.ndim != 1:
             raise ValueError(f"columns of one curve must have one length, got {sorted(map(str, lengths))}")
 
@@ -152,7 +153,7 @@ class Curve(ShortRepr):
 
     def take(self, keep: NDArray[Any]) -> Curve:
         """Return the curve at the points that `keep` (indices or a mask) selects."""
-        extra = {name: Column(column.values[keep], column.dimension) for name, column in self.extra.items()}
+        extra = LazyMapping(self.extra, lambda name: Column(self.extra[name].values[keep], self.extra[name].dimension))
         return Curve(
             self.motion[keep], self.effort[keep], self.branch[keep], self.stable[keep], extra, self.kind, self.label
         )

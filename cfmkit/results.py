@@ -185,10 +185,10 @@ class ClosedForm(Protocol):
 
 @runtime_checkable
 class LargestStress(Protocol):
-    """A model that finds the largest stress in a window by itself: its curve then needs no column of stresses."""
+    """A model that may find the largest stress in a window by itself, without the stress at every point."""
 
-    def largest_stress(self, branch: str, low: float, high: float, /) -> float:
-        """Return the largest stress of a branch between two places [Pa]."""
+    def largest_stress(self, branch: str, low: float, high: float, /) -> float | None:
+        """Return the largest stress of a branch between two places [Pa]; None: look for it at the points."""
         ...
 
 

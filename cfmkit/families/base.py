@@ -272,8 +272,7 @@ class Family:
 
     def analyze(self, spec: Spec, run: Run) -> Result:
         """Return what the model that a specification picks makes of it, with its box where a requirement is on that."""
-        names = {*(one.metric for one in spec.requirements), *(run.wanted or ())}
-        return self.with_envelope(self.model_of(spec)(spec, run), names)
+        return self.with_envelope(self.model_of(spec)(spec, run), {one.metric for one in spec.requirements})
 
     def with_envelope(self, result: Result, names: Collection[str]) -> Result:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""

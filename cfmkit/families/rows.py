@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 S = TypeVar("S")
+S_co = TypeVar("S_co", covariant=True)
 
 T = TypeVar("T")
 
@@ -131,6 +132,33 @@ def findings_of_rows(rules: Iterable[FindingRule[S]], solution: S, count: int) -
     return held
 
 
+class SeveralSolutions(Protocol[S_co]):
+    """Mechanisms that are solved one by one, as traced ones are."""
+
+    @property
+    def each(self) -> Sequence[S_co]:
+        """Their solutions."""
+        ...
+
+
+def each_quantity(quantity: ScalarQuantity[S]) -> ScalarQuantity[Any]:
+    """Return a quantity of one solution as that of several."""
+
+    def function(several: SeveralSolutions[S]) -> FloatArray:
+        return np.array([float(np.ravel(quantity.function(one))[0]) for one in several.each])
+
+    return ScalarQuantity(*quantity.about, function, words=quantity.words)
+
+
+def each_rule(rule: FindingRule[S]) -> FindingRule[Any]:
+    """Return a rule on one solution as that on several."""
+
+    def holds(several: SeveralSolutions[S]) -> NDArray[np.bool_]:
+        return np.array([bool(np.ravel(rule.holds(one))[0]) for one in several.each])
+
+    return FindingRule(rule.name, holds, lambda several: rule.sentence(several.each[0]))
+
+
 class RowsSolution(Protocol):
     """Values and findings of several solved mechanisms, for studies."""
 
@@ -227,6 +255,7 @@ class SolvedRows(Generic[R]):
     quantities: Mapping[str, ScalarQuantity[R]]
     rules: Sequence[FindingRule[R]]
     complete: NDArray[np.bool_]  # (m,) others have curves that end early: they are analysed one by one
+    traced: bool = False  # whether the model is a path of each: then nothing of it is computed twice
 
     @np.errstate(all="ignore")
     def value(self, name: str) -> FloatArray | None:

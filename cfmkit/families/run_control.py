@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterator
 
     from cfmkit.designing.run_many_starts import Notes
 
@@ -118,11 +118,6 @@ class Run:
         Does independent jobs, in this process or in others.
     notes : Notes
         Keeps what is finished.
-    wanted : frozenset of str, optional
-        Plain names of the metrics that are looked at, and nothing else is: a model may leave its other values and
-        its findings out, and must keep status, curve and those metrics as they are. None: everything is looked at.
-    columns : bool
-        Whether columns of the curve beside motion and effort are looked at; False: metrics of them alone are.
     """
 
     seed: int = 0
@@ -130,17 +125,11 @@ class Run:
     time_budget: float | None = None
     executor: Executor = _one_by_one
     notes: Notes = field(default_factory=_Forgotten)
-    wanted: frozenset[str] | None = None
-    columns: bool = True
 
     def __post_init__(self) -> None:
         """Let no search that looks again take its progress back."""
         object.__setattr__(self, "progress", rising(self.progress))
         object.__setattr__(self, "time_budget", read_time(self.time_budget))
-
-    def wants(self, names: Iterable[str]) -> bool:
-        """Return True if any of these metrics is looked at."""
-        return self.wanted is None or not self.wanted.isdisjoint(names)
 
     def part(self, begun: float, ended: float) -> Run:
         """Return a run that is part of this one: what it calls done lies between two shares of the whole."""

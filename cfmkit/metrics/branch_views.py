@@ -182,27 +182,36 @@ class Branch:
         ends = [end for end in (0, -1) if not (motion == part.motion[end]).any()]
         if not ends:
             return part
-        effort, stress = part.effort.copy(), part.stress
+        effort = part.effort.copy()
         effort[ends] = model.effort(self.name, part.motion[ends])
-        if stress is not None:
+
+        def at_ends(stress: FloatArray) -> FloatArray:
             stress = stress.copy()
             stress[ends] = model.stress(self.name, part.motion[ends])
-        return replace(part, effort=effort, stress=stress)
+            return stress
+
+        return replace(part, effort=effort, read_stress=part.changed_stress(at_ends))
 
     def _stated(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends have effort and stress of the points that the model has there, if it has some."""
         stated = self.frame.ends
         if stated is None:
             return part
-        effort, stress = part.effort.copy(), None if part.stress is None else part.stress.copy()
+        effort, known = part.effort.copy(), dict[int, int]()
         slack = TOLERANCE * (part.extent[1] - part.extent[0])
         for end in (0, -1):
             there = np.flatnonzero((np.abs(stated.motion - part.motion[end]) <= slack) & (stated.branch == self.name))
             if len(there) == 1 and not (self.trace.motion == part.motion[end]).any():
-                effort[end] = stated.effort[there[0]]
-                if stress is not None and "max_stress" in stated.extra:
-                    stress[end] = stated.extra["max_stress"].values[there[0]]
-        return replace(part, effort=effort, stress=stress)
+                known[end] = int(there[0])
+        effort[list(known)] = stated.effort[list(known.values())]
+
+        def at_ends(stress: FloatArray) -> FloatArray:
+            if "max_stress" in stated.extra:
+                stress = stress.copy()
+                stress[list(known)] = stated.extra["max_stress"].values[list(known.values())]
+            return stress
+
+        return replace(part, effort=effort, read_stress=part.changed_stress(at_ends))
 
     @cached_property
     def beside(self) -> tuple[BranchTrace, ...]:

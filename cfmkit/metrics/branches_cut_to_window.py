@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
@@ -64,7 +66,17 @@ class BranchTrace:
     # motion, effort, (n,): displacement and force [m, N], or angle and torque [rad, N m]
     motion: FloatArray
     effort: FloatArray
-    stress: FloatArray | None = None  # (n,) the curve's column ``max_stress`` [Pa], if it has one
+    read_stress: Callable[[], FloatArray] | None = None  # the curve's column ``max_stress``, (n,) [Pa], if it has one
+
+    @cached_property
+    def stress(self) -> FloatArray | None:
+        """Largest stress at each point (n,) [Pa], computed when it is read; None if the curve has none."""
+        return None if self.read_stress is None else self.read_stress()
+
+    def changed_stress(self, change: Callable[[FloatArray], FloatArray]) -> Callable[[], FloatArray] | None:
+        """Return what reads the stress as a function changes it; None if there is none."""
+        read = self.read_stress
+        return None if read is None else lambda: change(read())
 
     @cached_property
     def way(self) -> int:
@@ -101,8 +113,8 @@ def traces(curve: Curve) -> tuple[BranchTrace, ...]:
 
 
 def _trace(curve: Curve, name: str, where: slice | NDArray[np.intp]) -> BranchTrace:
-    stress = curve.extra["max_stress"].values[where] if "max_stress" in curve.extra else None
-    return BranchTrace(name, curve.motion[where], curve.effort[where], stress)
+    read = (lambda: curve.extra["max_stress"].values[where]) if "max_stress" in curve.extra else None
+    return BranchTrace(name, curve.motion[where], curve.effort[where], read)
 
 
 def covers(extent: tuple[float, float], window: Window) -> bool:
@@ -138,9 +150,7 @@ def _straight(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
         pieces = [_along(values, head), values[first:last], _along(values, tail)]
         return np.concatenate(pieces)[:: trace.way] if head or tail else pieces[1][:: trace.way]
 
-    return BranchTrace(
-        trace.name, cut(trace.motion), cut(trace.effort), None if trace.stress is None else cut(trace.stress)
-    )
+    return BranchTrace(trace.name, cut(trace.motion), cut(trace.effort), trace.changed_stress(cut))
 
 
 def _between(motion: FloatArray, after: int, place: float) -> tuple[int, float]:
@@ -166,7 +176,7 @@ def _folded(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
         trace.name,
         np.insert(trace.motion, after, level)[kept],
         _inserted(trace.effort, where, after)[kept],
-        None if trace.stress is None else _inserted(trace.stress, where, after)[kept],
+        trace.changed_stress(lambda stress: _inserted(stress, where, after)[kept]),
     )
 
 

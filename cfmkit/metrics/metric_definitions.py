@@ -234,9 +234,6 @@ _LONG_TERM = (
     ),
 )
 
-ALL_STRESSES = frozenset({"usable_stroke", "usable_start", "usable_end", "fatigue_life"})
-"""Metrics that look at the stress at every point; others look at the largest in a window."""
-
 TABLE = (*_IN_WINDOW, *_RANGES, *_LOADS, *_LONG_TERM)
 """Every metric of the contract, in the order in which they are shown."""
 

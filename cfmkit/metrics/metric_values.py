@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.arrays import LazySequence
 from cfmkit.errors import UsageError
 from cfmkit.metrics.branch_views import MeasuringFrame, span_text
 from cfmkit.metrics.branches_cut_to_window import Undefined, Window, covers, traces
@@ -337,7 +338,7 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
 def windows_judged(result: Result) -> Result:
     """Return a result that warns of windows that its nominal curve does not cover."""
     found = tuple(Finding(WINDOW_OUTSIDE, _reported(gap, result)) for gap in gaps(result))
-    return replace(result, warnings=(*result.warnings, *found)) if found else result
+    return replace(result, warnings=LazySequence(lambda: (*result.warnings, *found))) if found else result
 
 
 def _reported(gap: UncoveredWindow, result: Result) -> str:

@@ -100,6 +100,8 @@ class StressRows:
     read: Callable[[], Sequence[RowSamples]]  # at the points of each load case, that of the curve first [Pa]
     at: Callable[[FloatArray, Any], FloatArray]  # of all load cases at places of some rows, (k, m), (k,) -> (k, m) [Pa]
     allowable: FloatArray  # (d,) NaN if there is none [Pa]
+    # between two places of each row, (d,), (d,) -> (d,) [Pa]; None: to be looked for from the points on
+    largest: Callable[[FloatArray, FloatArray], FloatArray] | None = None
 
     @cached_property
     def samples(self) -> Sequence[RowSamples]:
@@ -122,8 +124,11 @@ class CurveRows(ShortRepr):
     stress: StressRows | None = None
     kind: Kind = "force"
     pose: FloatArray | None = None  # (d,) where bands are taken; default: the middle of the window
-    peaks: FloatArray | None = None  # (d, k) places next to which an extreme may hide; default: the dense places
+    # (d, k) places next to which an extreme may stand that the points miss, NaN behind the last of a row; default: all
+    # dense ones
+    peaks: FloatArray | None = None
     travel: Ends | None = None  # (d,) each, of which windows may be shares; default: from end to end
+    traced: bool = False  # whether every place takes an equilibrium of its own
     _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
@@ -132,8 +137,11 @@ class CurveRows(ShortRepr):
 
     @cached_property
     def heights(self) -> FloatArray:
-        """The effort at the peaks."""
-        return self.dense_effort if self.peaks is None else self.all_at(self.peaks)
+        """The effort at the peaks; NaN behind the last of a row."""
+        if self.peaks is None:
+            return self.dense_effort
+        known = np.isfinite(self.peaks)
+        return np.where(known, self.all_at(np.where(known, self.peaks, self.samples.motion[:, :1])), np.nan)
 
     @cached_property
     def dense_effort(self) -> FloatArray:
@@ -198,8 +206,9 @@ class RowsInWindow:
 
     @cached_property
     def _uneven(self) -> NDArray[np.bool_]:
-        places = self._peaks[0]
-        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (places.shape[1] < FEW))
+        curves, places = self.curves, self._peaks[0]
+        count = np.isfinite(curves.dense if curves.peaks is None else curves.peaks).sum(axis=1)
+        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (count < FEW))
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
         known = self.inside.joined(*self._peaks) if self._peaks[0].shape[1] else self.inside
@@ -225,7 +234,9 @@ class RowsInWindow:
                 return np.where(np.isfinite(allowable), share, -np.inf)
 
         ends, error = self.ends, curves.error
-        return ManyBranches(curves.dense, curves.dense_effort, *ends, curves.effort, excess, curves.pose, error)
+        return ManyBranches(
+            curves.dense, curves.dense_effort, *ends, curves.effort, excess, curves.pose, error, curves.traced
+        )
 
     # --- metrics, (d,) each -----------------------------------------------------------------------------------------
 
@@ -244,6 +255,8 @@ class RowsInWindow:
         stress, (low, high) = self.curves.stress, self._cut
         if stress is None:
             return np.full(len(low), np.nan)
+        if stress.largest is not None:
+            return stress.largest(low, high)
         slack, ends = TOLERANCE * (high - low), np.stack([low, high], axis=1)
         points, *beside = stress.samples
         at_point = (np.abs(points.motion[:, :, None] - ends[:, None]) <= slack[:, None, None]).any(axis=1)

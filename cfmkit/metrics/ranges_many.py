@@ -48,6 +48,7 @@ class ManyBranches:
     pose: FloatArray | None = None  # (d,) where bands are taken; default: the middle of the window
     # (d,) numerical error of the effort [N or N m]: an effort that is not above it is none to compare with
     error: FloatArray | float = 0.0
+    traced: bool = False  # whether every place takes an equilibrium
 
     @property
     def reference(self) -> FloatArray:
@@ -110,8 +111,8 @@ def range_95_fraction(many: ManyBranches) -> FloatArray:
 
 def _first_95(many: ManyBranches) -> FloatArray:
     if many.exact is not None:
-        # of many branches a call costs more than its places, of one the places cost
-        return many.rise if len(many.motion) == 1 else many.solved[0]
+        # of many closed forms a call costs more than its places; of one, or where equilibria are traced, places cost
+        return many.rise if many.traced or len(many.motion) == 1 else many.solved[0]
     nominal, first, step, (earlier, later) = _rise(many)
     crossed = _crossing(step, (earlier - 0.95 * nominal, later - 0.95 * nominal))
     return np.where(np.abs(nominal) <= many.error, np.nan, np.where(first == 0, many.motion[:, 0], crossed))

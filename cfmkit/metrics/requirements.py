@@ -258,8 +258,11 @@ def check(
         If a requirement is not well put: see `validate_requirements`.
     """
     kind = kind_of(result)
-    own = values_of_family({name: (one.dimension, one.definition) for name, one in result.values.items()})
-    known = [*known_metrics(kind, tuple(extra_definitions)), *own]
+    extra = tuple(extra_definitions)
+    named = {one.name for one in extra}  # of these the value need not be computed to know its dimension
+    own = {name: result.values[name] for name in result.values if name not in named}
+    values = values_of_family({name: (one.dimension, one.definition) for name, one in own.items()})
+    known = [*known_metrics(kind, extra), *values]
     problems = tuple(requirement_problems(requirements, known, kind))
     if problems:
         raise SpecError(problems)

@@ -168,11 +168,11 @@ def stress_max(branch: Branch) -> float:
     model, beside = branch.frame.closed, [one.stress for one in branch.inside_beside if one.stress is not None]
     if any(np.isnan(one).any() for one in beside):
         raise Undefined(UNKNOWN_BESIDE)
-    if branch.inside.stress is None and isinstance(model, LargestStress):
+    branch.inside  # noqa: B018  (raises where the window is not covered)
+    own: float | None = None
+    if isinstance(model, LargestStress):
         own = model.largest_stress(branch.name, *branch.ends)
-    else:
-        own = _stress_range(branch)[1]
-    return max([own, *(float(one.max()) for one in beside)])
+    return max([_stress_range(branch)[1] if own is None else own, *(float(one.max()) for one in beside)])
 
 
 def _stress_range(branch: Branch, alone: bool = False) -> tuple[float, float]:

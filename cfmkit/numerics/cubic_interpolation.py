@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.arrays import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
 
@@ -46,15 +46,8 @@ def values_at(x: FloatArray, y: FloatArray, places: FloatArray) -> FloatArray:
     """Return the cubic's values at many places, (n,) or of samples (m, k) all columns, (n, k); see `value_at`."""
     count = min(4, len(x))
     first = np.clip(np.searchsorted(x, places) - 2, 0, len(x) - count)
-    near = x[first[:, None] + np.arange(count)]
-    total = np.zeros((len(places), *y.shape[1:]))
-    for i in range(count):
-        weight = np.ones(len(places))
-        for j in range(count):
-            if j != i:
-                weight *= (places - near[:, j]) / (near[:, i] - near[:, j])
-        total += weight.reshape(-1, *[1] * (y.ndim - 1)) * y[first + i]
-    return total
+    nodes = first[:, None] + np.arange(count)
+    return _cubics(x[nodes], y[nodes], places)
 
 
 BESIDE = 1e-10
@@ -70,27 +63,55 @@ def inner_extremes(x: FloatArray, y: FloatArray) -> FloatArray:
     >>> inner_extremes(x, x**2).round(12).tolist()
     [0.0]
     """
-    if len(x) < 4:
-        return np.zeros(0)
-    left = np.arange(len(x) - 1)
-    first = np.clip(left - 1, 0, len(x) - 4)
-    t = x[first[:, None] + np.arange(4)] - x[left][:, None]
-    one = np.diff(y[first[:, None] + np.arange(4)], axis=1) / np.diff(t, axis=1)
+    return inner_extremes_of_rows([(x, y)])[0]
+
+
+def inner_extremes_of_rows(rows: Sequence[tuple[FloatArray, FloatArray]]) -> list[FloatArray]:
+    """Return `inner_extremes` of several functions, each with samples of its own."""
+    long = [(x, y) for x, y in rows if len(x) >= 4]
+    if not long:
+        return [np.zeros(0) for _ in rows]
+    counts = np.array([len(x) for x, _ in long])
+    ends = np.cumsum(counts)
+    x, y = (np.concatenate(column) for column in zip(*long, strict=True))
+    row = np.repeat(np.arange(len(long)), counts - 1)
+    left = np.arange(len(row)) + row  # the last sample of a row begins no step
+    first = np.clip(left - 1, (ends - counts)[row], ends[row] - 4)[:, None] + np.arange(4)
+    near, values = x[first], y[first]
+    t = near - x[left][:, None]
+    one = np.diff(values, axis=1) / np.diff(t, axis=1)
     two = np.diff(one, axis=1) / (t[:, 2:] - t[:, :-2])
     three = (two[:, 1] - two[:, 0]) / (t[:, 3] - t[:, 0])
     # Newton's form as powers of t: the slope is c + 2 b t + 3 a t^2
     a, b = three, two[:, 0] - three * t[:, :3].sum(axis=1)
     c = one[:, 0] - two[:, 0] * (t[:, 0] + t[:, 1])
     c += three * (t[:, 0] * t[:, 1] + t[:, 0] * t[:, 2] + t[:, 1] * t[:, 2])
-    width, least = np.diff(x), BESIDE * float(np.abs(y).max())
+    width = x[left + 1] - x[left]
     with np.errstate(invalid="ignore", divide="ignore"):
         root = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * c), b))
         places = np.stack([root / (3.0 * a), c / root], axis=1)
         inside = (places > 0.0) & (places < width[:, None])
-    found = x[left][:, None] + np.where(inside, places, 0.0)
-    heights = values_at(x, y, found.ravel()).reshape(found.shape)
-    high, low = np.maximum(y[:-1], y[1:])[:, None], np.minimum(y[:-1], y[1:])[:, None]
-    return distinct(found[inside & ((heights > high + least) | (heights < low - least))])
+    step, which = np.nonzero(inside)
+    found = x[left[step]] + places[step, which]
+    heights = _cubics(near[step], values[step], found)
+    least = (BESIDE * np.maximum.reduceat(np.abs(y), ends - counts))[row[step]]
+    before, behind = y[left[step]], y[left[step] + 1]
+    turns = (heights > np.maximum(before, behind) + least) | (heights < np.minimum(before, behind) - least)
+    found, row = found[turns], row[step][turns]
+    each = iter([distinct(found[row == k]) for k in range(len(long))])
+    return [next(each) if len(x) >= 4 else np.zeros(0) for x, _ in rows]
+
+
+def _cubics(near: FloatArray, values: FloatArray, places: FloatArray) -> FloatArray:
+    """Return the polynomials through some samples each, (n, k), at one place each, (n,)."""
+    total, count = np.zeros((len(places), *values.shape[2:])), near.shape[1]
+    for i in range(count):
+        weight = np.ones(len(places))
+        for j in range(count):
+            if j != i:
+                weight *= (places - near[:, j]) / (near[:, i] - near[:, j])
+        total += weight.reshape(-1, *[1] * (values.ndim - 2)) * values[:, i]
+    return total
 
 
 def crossing(x: FloatArray, y: FloatArray, level: float) -> float | None:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Study
     from cfmkit.studies.serial_and_cluster_executors import Executor
 
-SMALLEST, JOBS = 64, 64
-"""Points in a block at least, and blocks that a study is cut into unless they become too large."""
+JOBS = 64
+"""Blocks that a study is cut into unless they become too large, or too small."""
 
 TOGETHER, SHARES = 256, 12
 """Points that small blocks are computed together up to, where that leaves a dozen processes something to do.
@@ -68,9 +68,14 @@ class Work:
         return self.gather(self.study.evaluate(self.plan.point(job.start)))
 
     @cached_property
+    def smallest(self) -> int:
+        """Number of points that a block has at least; 0 where points are done one by one."""
+        return are_solved_together(self.study, self.plan)
+
+    @property
     def vectorised(self) -> bool:
         """Whether points are done in blocks."""
-        return are_solved_together(self.study, self.plan)
+        return self.smallest > 0
 
     @property
     def step(self) -> int:
@@ -78,9 +83,9 @@ class Work:
         if not self.vectorised:
             return 1
         if self.study.curves:
-            return SMALLEST
+            return self.smallest
         # A power of two, so that a study with a few more points has the same blocks and finds them in the journal.
-        return 1 << (min(BLOCK, max(SMALLEST, len(self.plan) // JOBS)).bit_length() - 1)
+        return 1 << (min(BLOCK, max(self.smallest, len(self.plan) // JOBS)).bit_length() - 1)
 
     @property
     def together(self) -> int:

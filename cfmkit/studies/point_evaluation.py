@@ -19,17 +19,7 @@ from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families import origin as family_origin
 from cfmkit.families.run_control import Run
-from cfmkit.metrics import (
-    check,
-    evaluate,
-    gaps,
-    metrics_by_name,
-    other_name,
-    split_name,
-    values_of_family,
-    window_of,
-    windows_judged,
-)
+from cfmkit.metrics import check, evaluate, gaps, metrics_by_name, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
 from cfmkit.specs.data_file_paths import named_in
 from cfmkit.specs.units import to_border
@@ -104,8 +94,7 @@ class Study:
     design: bool = False  # whether the mechanism is designed anew at each point
     curves: bool = False  # whether curves are kept
     seed: int = 0  # of everything random inside an analysis
-    # whether metrics and requirements alone are looked at: models then leave out what those do not need
-    lean: bool = False
+    findings: bool = True  # whether the names of findings are noted
     # what makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes
     deliver: Deliver = of_perfect_parts
     made: bool = False  # whether points are manufactured parts, whose values need not agree as stated ones do
@@ -114,14 +103,6 @@ class Study:
     def names(self) -> tuple[str, ...]:
         """Names of the metrics."""
         return tuple(item.name for item in self.metrics)
-
-    @cached_property
-    def wanted(self) -> frozenset[str] | None:
-        """Plain names of all that is looked at, by the name of either kind of curve; None: everything is."""
-        if not self.lean:
-            return None
-        names = {split_name(one)[0] for one in (*self.names, *(one.metric for one in self.spec.part_requirements))}
-        return frozenset({*names, *map(other_name, names)})
 
     def definitions(self, kind: Kind) -> Mapping[str, Definition]:
         """Return every metric of curves of a kind and every value of the family, by name."""
@@ -150,7 +131,8 @@ class Study:
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
-        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.lean, self.made, computing, data]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.findings, self.made]
+        about += [computing, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
     def key(self, values: Sequence[Any]) -> str:
@@ -186,7 +168,7 @@ class Study:
 
     def solve(self, spec: Spec) -> Result:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
-        record, run = family(spec.family), Run(self.seed, wanted=self.wanted, columns=self.curves or not self.lean)
+        record, run = family(spec.family), Run(self.seed)
         if not self.design or record.design is None:
             return windows_judged(record.with_envelope(record.analyze(spec, run), self.names))
         design = self.deliver(spec, record.design, Run(self.seed))
@@ -197,7 +179,7 @@ class Study:
 
     def row(self, result: Result) -> Row:
         """Return what is noted about a result."""
-        warnings = () if self.lean else tuple(sorted({item.name for item in result.warnings}))
+        warnings = tuple(sorted({item.name for item in result.warnings})) if self.findings else ()
         if not result.status.usable:
             return Row(result.status, message=result.message, warnings=warnings)
         extra = values_of_family(family(result.spec.family).values)

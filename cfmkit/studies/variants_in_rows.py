@@ -155,7 +155,7 @@ class SolvedVariants:
             limits = Bounds.of(one, self._definitions[plain].dimension)
             chosen = [item for name, item in self._by_branch(plain, one.over).items() if branch in (None, name)]
             met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in chosen]) if chosen else False
-        return ResultRows(values, met, warned={} if self.study.lean else self._findings())
+        return ResultRows(values, met, warned=self._findings() if self.study.findings else {})
 
     def _by_branch(self, plain: str, over: Ends | None) -> ByBranch:
         found = self.values(plain, over)
@@ -189,20 +189,28 @@ def _between(ends: Ends, start: FloatArray, stop: FloatArray) -> tuple[FloatArra
     return None if (low == high).any() else (low, high)
 
 
-def are_solved_together(study: Study, plan: Plan) -> bool:
-    """Return whether points of a study are rows of one solution: its first, its middle and its last one are."""
+SMALLEST, SMALLEST_TRACED = 64, 8
+"""Points in a block at least, of closed forms and of traced models: a traced one takes milliseconds."""
+
+
+def are_solved_together(study: Study, plan: Plan) -> int:
+    """Return of how many points a block of rows is at least; 0 if the first, middle and last point are no rows."""
     solve = family(study.spec.family).rows
     if solve is None or study.design or not len(plan):
-        return False
+        return 0
     indices = sorted({0, len(plan) // 2, len(plan) - 1})
     try:
         variants = _variants(study, plan, indices)
         for index in range(len(variants)):
             variants[index]  # raises where one is not valid
         found = [(members, SolvedVariants(study, variants, members, part)) for members, part in solve(variants)]
-        return sum(len(members) for members, _ in found) == len(variants) and all(part.known for _, part in found)
+        traced = any(part.solved.traced for _, part in found)
+        together = sum(len(members) for members, _ in found) == len(variants) and all(part.known for _, part in found)
     except CfmError:
-        return False
+        return 0
+    if not together or (study.curves and traced):
+        return 0
+    return SMALLEST_TRACED if traced else SMALLEST
 
 
 def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:

@@ -256,6 +256,19 @@ def test_the_page_on_architecture_names_files_that_there_are():
     assert {name for name in shown if not any(path.endswith(f"/{name}") for path in there)} == set()
 
 
-def test_kinds_of_drives_are_asked_for_their_values_and_not_compared_by_name():
-    compared = re.compile(r"drive\.kind (==|!=|in|not in)\b")
+def test_kinds_of_drives_shapes_springs_and_loads_are_records_and_not_compared_by_name():
+    """A new one is its class, and its name in the union beside it."""
+    compared = re.compile(r"\b(drive|shape|spring|load)\.kind (==|!=|in|not in)\b")
     assert [path.name for path in SOURCES if compared.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_every_kind_of_shape_spring_and_load_builds_what_the_engine_has():
+    from typing import get_args
+
+    from cfmkit.families.beam.network_elements_spec import Load, LoadSpec, SpringElement, SpringSpec
+    from cfmkit.families.beam.shapes_spec import Shape, ShapeSpec
+
+    for union, base in ((ShapeSpec, Shape), (SpringSpec, SpringElement), (LoadSpec, Load)):
+        kinds = get_args(get_args(union)[0])
+        assert len(kinds) > 1
+        assert all(issubclass(kind, base) and kind.build is not base.build for kind in kinds)

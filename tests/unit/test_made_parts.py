@@ -153,20 +153,38 @@ def test_a_tolerance_on_what_the_design_lacks_ends_with_3(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["beam_cantilever", "slider_crank_strip"])
-def test_a_look_at_metrics_alone_leaves_out_the_rest_and_changes_none_of_them(name):
+def test_a_study_without_findings_has_the_same_values_and_another_key(name):
     spec = cfmkit.load(f"configs/{name}.yaml").replace({"analysis.points": 15, "requirements": ()})
-    own = {"beam": "strain_energy_max", "slider-crank": "energy_max"}[spec.family]
     known = cfmkit.analyze(spec)
-    metrics = metrics_of(spec, ["force_mean", "stress_max", "range_95_fraction"], known.curve)
-    full, lean = (Study(spec, (), metrics, lean=lean) for lean in (False, True))
-    assert lean.evaluate(()).values == full.evaluate(()).values
-    seen = lean.solve(spec)
-    assert (len(seen.values), seen.status) == (0, known.status)
-    assert own in known.values
-    (metric,) = metrics_of(spec, [own], known.curve)
-    looked = Study(spec, (), (metric,), lean=True)
-    assert looked.evaluate(()).values == (pytest.approx(known.values[own].value, rel=1e-12),)
-    assert full.key(()) != lean.key(())
+    own = {"beam": "strain_energy_max", "slider-crank": "energy_max"}[spec.family]
+    metrics = metrics_of(spec, ["force_mean", "stress_max", "range_95_fraction", own], known.curve)
+    full, bare = (Study(spec, (), metrics, findings=findings) for findings in (True, False))
+    assert bare.evaluate(()).values == full.evaluate(()).values
+    assert bare.evaluate(()).values[-1] == known.values[own].value
+    assert full.evaluate(()).warnings == tuple(sorted({one.name for one in known.warnings}))
+    assert bare.evaluate(()).warnings == ()
+    assert full.key(()) != bare.key(())
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "what", "column"),
+    [
+        ("beam_cantilever", "beam", "stress", "max_stress"),
+        ("slider_crank_strip", "slider_crank.printed", "energy", "energy"),
+    ],
+)
+def test_values_findings_and_columns_are_computed_when_they_are_read(name, module, what, column, monkeypatch):
+    spec = cfmkit.load(f"configs/{name}.yaml").replace({"analysis.points": 15})
+
+    def fail(_self):
+        raise AssertionError("somebody has asked for it")
+
+    monkeypatch.setattr(f"cfmkit.families.{module}.solution.Solution.{what}", property(fail))
+    result = family(spec.family).analyze(spec, Run())
+    assert result.values["allowable_stress"].definition
+    assert column in result.curve.extra
+    with pytest.raises(AssertionError, match="asked for it"):
+        result.curve.extra[column]
 
 
 def test_a_trim_by_the_force_of_one_branch_leaves_the_perfect_part_as_it_is():

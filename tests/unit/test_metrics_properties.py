@@ -212,7 +212,7 @@ def test_the_fast_cut_of_straight_branches_agrees_with_the_general_one(points, p
         motion, effort = motion[::-1], effort[::-1]
     span = motion.max() - motion.min()
     window = Window(motion.min() + part[0] * span, motion.min() + part[1] * span)
-    trace = BranchTrace("load", motion, effort, effort * 2)
+    trace = BranchTrace("load", motion, effort, lambda: effort * 2)
     fast, general = restrict(trace, window), _folded(trace, window, TOLERANCE * (window.hi - window.lo))
     for name in ("motion", "effort", "stress"):
         assert getattr(fast, name) == pytest.approx(getattr(general, name), rel=1e-12)

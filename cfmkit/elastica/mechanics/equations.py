@@ -236,7 +236,12 @@ class NumpyEquations:
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses (k, n) at places (k,) of the way; see `solve`."""
-        each = [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, way, strict=True)]
+        return self.collect(
+            [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, way, strict=True)]
+        )
+
+    def collect(self, each: Sequence[MarchState | None]) -> SolvedStates:
+        """Return single equilibria, None where there is none, as arrays."""
         nothing = MarchState(np.full(self.n, np.nan), np.nan, np.full(self.n, np.nan), 0, np.nan)
         states = [state or nothing for state in each]
         return SolvedStates(

@@ -12,6 +12,7 @@ the polynomial of the rotation between its ends. Of wide strips, whose law is no
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,6 +28,7 @@ from cfmkit.elastica.mechanics.polynomials import (
     shape_functions,
 )
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, cos_sin
 
@@ -91,6 +93,46 @@ def states_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fr
     return BeamStates(*map(_join_elements, by_element))
 
 
+def forces_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
+    """Return the same without x and y: stresses need none."""
+    given = np.asarray(fractions, float)
+    found = _forces(at, list(elements), given, _rest(net, at.mesh, elements, given)).states
+    return BeamStates(*map(_join_elements, found))
+
+
+def forces_of_designs(
+    networks: Sequence[Network], meshes: Sequence[Discretisation], at: Equilibria, row: Any, fractions: Any
+) -> tuple[BeamStates, Any]:
+    """Return section forces of some designs of one topology and degree at points of each, and widths at all places.
+
+    Parameters
+    ----------
+    networks, meshes : sequences
+        The designs and their arrays.
+    at : Equilibria
+        Points of all of them, (p, size), with the arrays of any.
+    row : (p,) int array
+        Which design each point is of.
+    fractions : (k,) array
+        Places on every element.
+
+    Returns
+    -------
+    states, widths : BeamStates, (p, e k) array
+        Without x and y; all of e elements one after the other.
+    """
+    given, elements = np.asarray(fractions, float), list(range(len(at.mesh.elements.length)))
+    names = ("length", "line", *(name for name in ON_POINTS if getattr(at.mesh.elements, name) is not None))
+    tables = {name: np.array([getattr(mesh.elements, name) for mesh in meshes])[row] for name in names}
+    units = np.array([mesh.scales for mesh in meshes]).T[:, row, None, None]
+    mesh = replace(at.mesh, elements=at.mesh.elements._replace(**tables), scales=MechanicsUnits(*units))
+    at_rest = zip(*(_rest(*pair, elements, given) for pair in zip(networks, meshes, strict=True)), strict=True)
+    rest = _BeamAtRest(*(np.array(column)[row] for column in at_rest))
+    found = _forces(replace(at, mesh=mesh), elements, given, rest).states
+    widths = np.array([[net.beams[name].section.width for name in at.mesh.elements.beam] for net in networks])
+    return BeamStates(*map(_join_elements, found)), np.repeat(widths, len(given), axis=1)[row]
+
+
 def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
     """Return states with their derivatives: dual arrays (p, m k), (m k) of those that do not change along the path.
 
@@ -110,6 +152,8 @@ def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequenc
 
 def _join_elements(values: Any) -> Any:
     """Return values (..., m, k) of one element after the other, (..., m k)."""
+    if values is None:
+        return None
     if isinstance(values, DualArray):
         return DualArray(_join_elements(values.value), _join_elements(values.all_slopes))
     return values.reshape(*values.shape[:-2], -1)
@@ -161,11 +205,29 @@ def _rest_of_designs(
 
 def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> BeamStates:
     """Return states at k fractions of m elements, (p, m, k); dual if the equilibria are."""
+    found, fields, speed, upto = _forces(at, elements, given, rest)
+    start = poses(at.mesh.attachments, at.z, at.mesh.elements.ends[elements, 0]).place
+    x = (start[..., :1] + (fields.slope_x * speed) @ upto) * at.mesh.scales.length
+    y = (start[..., 1:] + (fields.slope_y * speed) @ upto) * at.mesh.scales.length
+    return found._replace(x=x, y=y)
+
+
+class _Forces(NamedTuple):
+    """States without places, and what places are integrals of."""
+
+    states: BeamStates
+    fields: _Fields
+    speed: Any
+    upto: Any  # (q, k) integrals up to each place
+
+
+def _forces(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> _Forces:
+    """Return section forces and rotations at k fractions of m elements; tables may differ from point to point."""
     mesh, scales, whole = at.mesh, at.mesh.scales, at.mesh.elements
     rule, own = basis(mesh.degree), at.z[..., whole.unknowns[elements]]
     tables = {name: getattr(whole, name) for name in ON_POINTS}
-    picked = {name: table[elements] for name, table in tables.items() if table is not None}
-    e = whole._replace(**picked, length=whole.length[elements])
+    picked = {name: table[..., elements, :] for name, table in tables.items() if table is not None}
+    e = whole._replace(**picked, length=whole.length[..., elements])
     load = energy.line_load(mesh, at.drive)[..., elements, :]
     rotation, end = own[..., energy.rotation_columns(mesh.degree)], own[..., -2:]
     speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(given.tolist()))
@@ -182,11 +244,10 @@ def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
     else:
         turn = rotation @ reached.values.T
     ahead = e.length[..., None] - speed @ upto
-    start = poses(mesh.attachments, at.z, whole.ends[elements, 0]).place
-    return BeamStates(
+    states = BeamStates(
         rest.place,
-        (start[..., :1] + (fields.slope_x * speed) @ upto) * scales.length,
-        (start[..., 1:] + (fields.slope_y * speed) @ upto) * scales.length,
+        None,
+        None,
         turn,
         rest.angle,
         (end[..., :1] + load[..., :1] * ahead) * scales.force,
@@ -194,6 +255,7 @@ def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
         (moment - (fields.turning * speed) @ upto) * scales.moment,
         rest.thickness,
     )
+    return _Forces(states, fields, speed, upto)
 
 
 class _Fields(NamedTuple):

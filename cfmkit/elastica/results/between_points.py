@@ -5,8 +5,7 @@ solved from the polynomial through the nearest four, on the branch that these ar
 extremes and where it passes the allowable one; elsewhere the polynomial is taken, for each beam by itself. At a
 bifurcation, where the path has a corner, everything is parted.
 
-Under a load the place is the driven node's motion: it is held while the load is solved for, so that a force may have
-an extreme there.
+Under a load the place is the driven node's motion (`between_loads`).
 
 Assumes: a path on which the drive, or under a load the motion, does not turn back.
 """
@@ -23,12 +22,12 @@ from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
-from cfmkit.elastica.results.stress_between_points import insert_knots, solve_extremes, solve_passes
+from cfmkit.elastica.results.stress_between_points import insert_knots, largest_inside, solve_extremes, solve_passes
 from cfmkit.numerics.cubic_interpolation import crossing, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.equations import MarchState, NumpyEquations
+    from cfmkit.elastica.mechanics.equations import NumpyEquations, SolvedStates
     from cfmkit.elastica.results.path import EquilibriumPath
     from cfmkit.elastica.results.stress_between_points import Knots
 
@@ -105,12 +104,13 @@ class BetweenPoints(ShortRepr):
         return self.knots[0]
 
     @cached_property
-    def _points(self) -> FloatArray:
+    def own_points(self) -> FloatArray:
         """Places of the points of the path, increasing [m or rad]."""
         return read_only(self._motion[self._order])
 
     @cached_property
-    def _efforts(self) -> FloatArray:
+    def point_efforts(self) -> FloatArray:
+        """The effort at every point, by increasing places [N or N m]."""
         return read_only(self.unit * self._effort_on(self.path)[self._order])
 
     def _effort_on(self, path: EquilibriumPath) -> FloatArray:
@@ -121,7 +121,7 @@ class BetweenPoints(ShortRepr):
     def peaks(self) -> FloatArray:
         """Places of extremes of the effort between two points, and of corners, (m,) [m or rad]."""
         beside = {*self.beside_corners[:, [0, 2]].ravel().tolist()}
-        return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
+        return read_only(sorted({*self.knots[0].tolist()} - {*self.own_points.tolist()} - beside))
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -131,7 +131,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def beside_corners(self) -> FloatArray:
         """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
-        found, points = np.empty((len(self.corners), 3)), self._points
+        found, points = np.empty((len(self.corners), 3)), self.own_points
         for number, corner in enumerate(self.corners):
             before, behind = points[points < corner][-1:], points[points > corner][:1]
             room = 0.5 * float(np.abs(np.concatenate([before, behind]) - corner).min())
@@ -142,7 +142,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def knots(self) -> Several[FloatArray]:
         """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
-        x, effort = self._points, self._efforts
+        x, effort = self.own_points, self.point_efforts
         if len(self.corners):
             beside = np.setdiff1d(self.beside_corners, x)
             x, effort = insert_knots(x, effort, beside, self.effort("", beside))
@@ -165,7 +165,7 @@ class BetweenPoints(ShortRepr):
             return self._extremes
         numbers, found = self._stretch_numbers, []
         for number, (stretch, knots) in enumerate(self._extremes):
-            points = stretch.smooth(self._drive[numbers == number])
+            points = stretch.smooth(self.own_drive[numbers == number])
             solve = partial(self._solved_stress, stretch)
             found.append((stretch, solve_passes(knots, points, solve, self.allowed)))
         return tuple(found)
@@ -173,7 +173,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _stretch_numbers(self) -> Any:
         """Number of the stretch between corners that each point is on."""
-        return np.searchsorted([corner.drive for corner in self._corners.values()], self._drive)
+        return np.searchsorted([corner.drive for corner in self._corners.values()], self.own_drive)
 
     @cached_property
     def _extremes(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
@@ -189,7 +189,7 @@ class BetweenPoints(ShortRepr):
             low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
             stretch, own = SmoothStretch(low, high), numbers == number
             ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
-            x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
+            x, rows = stretch.with_ends(self.own_drive[own], at_points[:, own].T, *ends)
             solve = partial(self._solved_stress, stretch)
             found.append((stretch, solve_extremes(stretch.smooth(x), rows.T, solve)))
         return tuple(found)
@@ -206,7 +206,7 @@ class BetweenPoints(ShortRepr):
         if solved is None:
             there = self.at(flat)
             effort = self._effort_on(there)
-            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self._points, self._efforts))
+            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self.own_points, self.point_efforts))
             self._solved[flat.tobytes()] = solved
         return np.array(solved.reshape(np.shape(places)))
 
@@ -236,65 +236,69 @@ class BetweenPoints(ShortRepr):
                 return float(sense * (sense * places).min())
         return None
 
-    def largest_stress(self, branch: str, low: float, high: float, /) -> float:
-        """Return the largest stress in a window [Pa]."""
-        scale, ends = self._scale, np.array([low, high])
+    def largest_stress(self, branch: str, low: float, high: float, /) -> float | None:
+        """Return the largest stress in a window [Pa]; None of a path with corners."""
+        if len(self.corners):
+            return None
+        ends = np.array([low, high])
         there = self.at(ends)
         solved = there.beam_stresses(self.axial)[0].max(axis=0)
         if not there.accurate.all():
             solved = np.where(there.accurate, solved, self.stress(branch, ends))
-        tops = [
-            values[(places >= low) & (places <= high)]
-            for stretch, beams in self._extremes
-            for places, values in ((scale * stretch.drive(t), own) for t, own in beams)
-        ]
-        return float(np.max(np.concatenate([*tops, solved])))
+        inner = largest_inside(self.own_drive, self._point_stresses, self.solve_stress, ends / self._scale)
+        return float(max(inner, *solved))
+
+    def _point_stresses(self, points: Any) -> FloatArray:
+        """Return the stress of each beam at some of the points in their order, (b, n) [Pa]."""
+        known = self.path.known_beam_stresses(self.axial)
+        if known is None:
+            return self.path.take(self._numbers[points]).beam_stresses(self.axial)[0]
+        return known[:, self._order][:, points]
+
+    def solve_stress(self, drive: FloatArray) -> tuple[FloatArray, Any]:
+        """Return the stress of each beam at dimensionless places of a path without corners, and where it was solved."""
+        return self._solved_stress(SmoothStretch(None, None), drive)
 
     def at(self, places: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
-        drive = self._drive
+        drive = self.own_drive
         wanted = np.clip(places / self._scale, drive[0], drive[-1])
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
         near = self._nearest(wanted, left)
         y = self._guesses(wanted, near)
         loads = self._loads[near]
         known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
-        y[known] = self._y[near[known]]
+        y[known] = self.own_unknowns[near[known]]
         for corner in self._corners.values():
             here = np.abs(wanted - corner.drive) <= KNOWN * (drive[-1] - drive[0])
             y[here], loads[here], known = corner.y, corner.drive, known | here
-        found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
-        for number in np.flatnonzero(~known).tolist():
-            spot = self._spot(y[number], float(wanted[number]), float(loads[number]))
-            if spot is None or spot.unstable not in self._counts(near[number], left[number]):
-                continue
-            moved = float(self._poses((spot.free - y[number])[None])[0])
-            if moved <= max(LEAST, STRAY * float(changes[number])):
-                y[number], loads[number], found[number] = spot.free, spot.way, True
+        found, changes = known.copy(), self._poses(self.own_unknowns[left + 1] - self.own_unknowns[left])
+        asked = np.flatnonzero(~known)
+        if len(asked):
+            spots, ways = self._spots(y[asked], wanted[asked], loads[asked])
+            alike = (spots.unstable[:, None] == self._counts(near[asked], left[asked])).any(axis=1)
+            moved = self._poses(spots.free - y[asked])
+            good = spots.converged & alike & (moved <= np.maximum(LEAST, STRAY * changes[asked]))
+            chosen = asked[good]
+            y[chosen], loads[chosen], found[chosen] = spots.free[good], ways[good], True
         return self.path.with_states(self._numbers[near], y, loads, found)
 
-    def _spot(self, y: FloatArray, wanted: float, _near: float) -> MarchState | None:
-        """Return the equilibrium at a dimensionless place; `_near`: the drive at the nearest point."""
-        return self._solve(y, wanted)
+    def _spots(self, y: FloatArray, wanted: FloatArray, _near: FloatArray) -> tuple[SolvedStates, FloatArray]:
+        """Return the equilibria at dimensionless places and their drives; `_near`: the drive at the nearest points."""
+        return self._equations.solve_each(y, wanted), wanted
 
     @cached_property
     def _equations(self) -> NumpyEquations:
         return equations(self.path.mesh)
-
-    def _solve(
-        self, y: FloatArray, drive: float, row: FloatArray | None = None, goal: float = 0.0
-    ) -> MarchState | None:
-        """Return the equilibrium at a drive near some unknowns, or where row . (unknowns, drive) is a goal."""
-        return self._equations.solve(y, drive, row, goal)
 
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of a motion in each of some changes of the unknowns, (n,)."""
         mesh = self.path.mesh
         return np.asarray(np.abs(changes[:, mesh.free < mesh.n_motions]).max(axis=1, initial=0.0))
 
-    def _counts(self, near: int, _left: int) -> tuple[int, ...]:
-        """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
-        return (int(self._unstable[near]),)
+    def _counts(self, near: Any, _left: Any) -> Any:
+        """Return how many unstable directions equilibria may have, (n, k); `_left`: the points before them."""
+        return self._unstable[near][:, None]
 
     @cached_property
     def _numbers(self) -> Any:
@@ -305,11 +309,13 @@ class BetweenPoints(ShortRepr):
         return np.asarray(self.path.at.drive[self._order])
 
     @cached_property
-    def _drive(self) -> FloatArray:
+    def own_drive(self) -> FloatArray:
+        """Dimensionless places of the points, increasing."""
         return self._loads
 
     @cached_property
-    def _y(self) -> FloatArray:
+    def own_unknowns(self) -> FloatArray:
+        """Free unknowns at every point, by increasing places, (n, free)."""
         return np.asarray(self.path.free[self._order])
 
     @cached_property
@@ -321,7 +327,7 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _stretch(self) -> Any:
         """The number of the smooth stretch that each point is on: they are parted by bifurcations, (n,)."""
-        parted = np.zeros(len(self._drive), dtype=bool)
+        parted = np.zeros(len(self.own_drive), dtype=bool)
         branch = self.path.branch[self._order]
         parted[1:] = (branch[1:] != branch[:-1]) | (self._unstable[1:] != self._unstable[:-1])
         parted[self._contacts] = True
@@ -337,11 +343,11 @@ class BetweenPoints(ShortRepr):
     def _events(self) -> FloatArray:
         """Bifurcations of the path and changes of contacts, dimensionless, increasing."""
         places = [one.drive / self._scale for one in self.path.events if one.kind == "bifurcation"]
-        return np.sort([*places, *self._drive[self._contacts].tolist()])
+        return np.sort([*places, *self.own_drive[self._contacts].tolist()])
 
     def _nearest(self, wanted: FloatArray, left: Any) -> Any:
         """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
-        drive, events = self._drive, self._events
+        drive, events = self.own_drive, self._events
         near = left + (wanted - drive[left] > drive[left + 1] - wanted)
         for number in np.flatnonzero(self._stretch[left] != self._stretch[left + 1]).tolist():
             here = events[(events >= drive[left[number]]) & (events <= drive[left[number] + 1])]
@@ -352,12 +358,14 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _corners(self) -> dict[int, Corner]:
         """The corners of the path by the number of the stretch behind each, increasing."""
-        branch, stretches, drive = self.path.branch[self._order], self._stretch, self._drive
+        branch, stretches, drive = self.path.branch[self._order], self._stretch, self.own_drive
         names, found = list(dict.fromkeys(self.path.branch.tolist())), {}
         rounding = AT_POINT * (drive[-1] - drive[0])
         for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
             if right in self._contacts:
-                found[int(stretches[right])] = Corner(float(drive[right]), np.asarray(self._y[right]), False, False)
+                found[int(stretches[right])] = Corner(
+                    float(drive[right]), np.asarray(self.own_unknowns[right]), False, False
+                )
                 continue
             before, behind = drive[right - 1], drive[right]
             here = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
@@ -367,7 +375,7 @@ class BetweenPoints(ShortRepr):
             below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
             at = next((k for k in (right - 1, right) if abs(drive[k] - here[0]) <= rounding), None)
             place = float(here[0] if at is None else drive[at])
-            y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self._y[at])
+            y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self.own_unknowns[at])
             if y is not None:
                 found[int(stretches[right])] = Corner(place, y, below, above)
         return found
@@ -377,123 +385,27 @@ class BetweenPoints(ShortRepr):
 
         It is singular: ever nearer ones are solved for, and the polynomial taken on from there.
         """
-        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self._drive
-        x, y = drive[own], self._y[own]
+        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self.own_drive
+        x, y = drive[own], self.own_unknowns[own]
         for share in NEARER:
             near = place + share * (drive[point] - place)
-            spot = self._spot(values_at(x, y, np.array([near]))[0], near, near)
-            if spot is None or spot.unstable not in self._counts(point, point):
+            spots, _ = self._spots(values_at(x, y, np.array([near])), np.array([near]), np.array([near]))
+            beside = np.array([point])
+            if not spots.converged[0] or spots.unstable[0] not in self._counts(beside, beside):
                 if share == NEARER[0]:
                     return None
                 break  # of a bifurcation just behind the rest, the place is known less closely
             at = int(np.searchsorted(x, near))
-            x, y = np.insert(x, at, near), np.insert(y, at, spot.free, axis=0)
+            x, y = np.insert(x, at, near), np.insert(y, at, spots.free[0], axis=0)
         return np.asarray(values_at(x, y, np.array([place]))[0])
 
     def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
         """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
-        found = np.empty((len(wanted), self._y.shape[1]))
+        found = np.empty((len(wanted), self.own_unknowns.shape[1]))
         for number in distinct(self._stretch[near]).tolist():
             own, here = self._stretch == number, self._stretch[near] == number
             stretch = SmoothStretch(self._corners.get(number), self._corners.get(number + 1))
             ends = (None if corner is None else corner.y for corner in (stretch.low, stretch.high))
-            x, y = stretch.with_ends(self._drive[own], self._y[own], *ends)
+            x, y = stretch.with_ends(self.own_drive[own], self.own_unknowns[own], *ends)
             found[here] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[here]))
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class BetweenLoads(BetweenPoints):
-    """The same of a path under a load, over the motion of a node that the load goes along with."""
-
-    row: FloatArray  # (n + 1,) what the free unknowns and the drive count for in the dimensionless motion
-    unit_of_motion: float  # [m or rad]
-    rest: float  # the motion where all unknowns are zero [m or rad]
-
-    @property
-    def _motion(self) -> FloatArray:
-        return np.asarray(self.unit_of_motion * (self.path.free @ self.row[:-1]) + self.rest)
-
-    @property
-    def _scale(self) -> float:
-        return self.unit_of_motion
-
-    def _effort_on(self, path: EquilibriumPath) -> FloatArray:
-        return path.drive
-
-    def _spot(self, y: FloatArray, wanted: float, near: float) -> MarchState | None:
-        goal = wanted - self.rest / self.unit_of_motion
-        first = self._solve(y, near, self.row, goal)
-        # the solver watches poses and forces: once more, so that the load is as exact as they are
-        return None if first is None else self._solve(first.free, first.way, self.row, goal)
-
-    def _counts(self, near: int, left: int) -> tuple[int, ...]:
-        return int(self._unstable[left]), int(self._unstable[left + 1])  # a largest load is between two of each kind
-
-    @cached_property
-    def _drive(self) -> FloatArray:
-        return self._points / self.unit_of_motion
-
-    @cached_property
-    def _stretch(self) -> Any:
-        """Parted by other branches only: at a largest load a path is smooth."""
-        branch = self.path.branch[self._order]
-        parted = np.concatenate([[False], branch[1:] != branch[:-1]])
-        parted[self._contacts] = True
-        return np.cumsum(parted)
-
-    @cached_property
-    def _events(self) -> FloatArray:
-        return np.sort(self._drive[self._contacts])  # bifurcations are reported by loads: motions may be several
-
-
-def between_loads(
-    path: EquilibriumPath,
-    node: str,
-    along: float | None,
-    unit: float = 1.0,
-    axial: bool = True,
-    allowed: float | None = None,
-) -> BetweenLoads | None:
-    """Return a path under loads at every place of a node's motion.
-
-    None if the motion turns back, where a link with an arm moves the node, where points are too few, or miss the
-    tolerance.
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-        Under loads.
-    node : str
-        Whose motion it is over.
-    along : float or None
-        Direction of the motion [rad]; None: its rotation.
-    unit : float
-        What the load is multiplied by: parts side by side.
-    axial : bool
-        Whether the stress has its axial part.
-    allowed : float or None
-        Stress [Pa]; where it is passed is solved for.
-    """
-    mesh = path.mesh
-    if len(path) < FEWEST or not np.all(path.accurate) or (along is not None and node not in mesh.bodies):
-        return None
-    place = mesh.nodes[node]
-    unknowns, frame = mesh.attachments.unknowns[place], mesh.attachments.frame[place]
-    if along is None:
-        parts, scale = {int(unknowns[3]): 1.0}, 1.0
-    else:
-        cos, sin = np.cos(along), np.sin(along)
-        shares = cos * frame[0] + sin * frame[1], sin * frame[0] - cos * frame[1]
-        parts, scale = dict(zip(unknowns[:2].tolist(), shares, strict=True)), mesh.scales.length
-    row, slots = np.zeros(len(mesh.free) + 1), {unknown: k for k, unknown in enumerate(mesh.free.tolist())}
-    for unknown, share in parts.items():
-        if unknown in slots:
-            row[slots[unknown]] += share
-    moved = path.motion(node)
-    motion = moved[:, 2] if along is None else moved[:, 0] * np.cos(along) + moved[:, 1] * np.sin(along)
-    rest = motion - scale * (path.free @ row[:-1])
-    steps, least = np.diff(motion), KNOWN * float(np.ptp(motion))  # rounding may go one way, too
-    if not row.any() or np.ptp(rest) > least or not ((steps > least).all() or (steps < -least).all()):
-        return None
-    return BetweenLoads(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))

@@ -303,6 +303,11 @@ class EquilibriumPath(ShortRepr):
             self._beam_stresses[axial] = read_only(found[0]), read_only(found[1])
         return self._beam_stresses[axial]
 
+    def known_beam_stresses(self, axial: bool) -> FloatArray | None:
+        """Return the first of `beam_stresses`; None if they are not known yet."""
+        found = self._beam_stresses.get(axial)
+        return None if found is None else found[0]
+
     @cached_property
     def _beam_stresses(self) -> dict[bool, tuple[FloatArray, FloatArray]]:
         """Results of `beam_stresses`, of which curves, metrics between their points and findings are made."""

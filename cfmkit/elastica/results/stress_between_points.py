@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
+from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes_of_rows, values_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
 
@@ -25,8 +27,12 @@ ROUNDS = 3
 NEARLY = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
+N_FEW = 24  # points that are looked at first
+CLOSE = 0.95  # share of the largest stress at these from which on the largest of all may be near
+STENCIL = 4  # points on either side that a cubic, or the next one, may go through
 
-def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots, ...]:
+
+def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve, bound: float = 0.0) -> tuple[Knots, ...]:
     """Return places and stresses of each beam, with extremes that may be the largest of all.
 
     Parameters
@@ -35,15 +41,118 @@ def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve) -> tuple[Knots
         Places of points, increasing, and the stress of each of b beams there [Pa].
     solve : callable
         From places (m,) to stresses (b, m) and whether they were found, (m,).
+    bound : float
+        Beams that are stressed less at all points are left as they are [Pa].
     """
-    largest = rows.max(axis=0)
-    found = [(t, row) for row in rows]
+    return solve_all_extremes([(t, rows, bound)], lambda places: [solve(places[0])])[0]
+
+
+def solve_all_extremes(
+    curves: Sequence[tuple[FloatArray, FloatArray, float]],
+    solve: Callable[[list[FloatArray]], list[tuple[FloatArray, Any]]],
+) -> list[tuple[Knots, ...]]:
+    """Return the same of several curves; `solve` takes places of each of them, by chance none, in one call."""
+    found = [[(t, row) for row in rows] for t, rows, _ in curves]
+    largest = [rows.max(axis=0) for _, rows, _ in curves]
     for _ in range(ROUNDS):
-        more = [_find_tops(knots, t, largest) for knots in found]
-        if not any(map(len, more)):
+        stressed = [
+            [own if own[1].max() >= bound else (own[0][:0], own[1][:0]) for own in knots]
+            for knots, (_, _, bound) in zip(found, curves, strict=True)
+        ]
+        places = iter(inner_extremes_of_rows([own for knots in stressed for own in knots]))
+        more = [
+            [_keep_tops(own, next(places), t, top) for own in knots]
+            for knots, (t, _, _), top in zip(found, curves, largest, strict=True)
+        ]
+        if not any(len(places) for each in more for places in each):
             break
-        found = _add_solved(solve, found, found, more)
-    return tuple(found)
+        solved = solve([np.concatenate(each) for each in more])
+        found = [
+            _add_solved(knots, knots, each, *answer) if any(map(len, each)) else knots
+            for knots, each, answer in zip(found, more, solved, strict=True)
+        ]
+    return [tuple(knots) for knots in found]
+
+
+def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: FloatArray) -> float:
+    """Return the largest stress of all beams at and between points of a smooth path inside of a window [Pa].
+
+    The stress is computed at few points first; then at all of those near which it may be the largest.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Places of the points, increasing.
+    stresses : callable
+        From numbers of points to the stress of each of b beams there, (b, m) [Pa].
+    solve : callable
+        As of `solve_extremes`.
+    window : (2,) array
+        Minus infinity is returned if no point and no extreme between two is inside.
+    """
+    few = few_points(x, *window)
+    known = stresses(few)
+    more = near_largest(x, few, known, *window)
+    if len(more):
+        few = np.concatenate([few, more])
+        known = np.concatenate([known, stresses(more)], axis=1)
+        order = np.argsort(few, kind="stable")
+        few, known = few[order], known[:, order]
+    return largest_between(x, few, known, solve, window)
+
+
+def few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
+    """Return the numbers of points of a path that are looked at first, in a window and next to it."""
+    first = max(int(np.searchsorted(x, low)) - STENCIL, 0)
+    last = min(int(np.searchsorted(x, high, side="right")) + STENCIL, len(x)) - 1
+    return np.append(np.arange(first, last, max(1, (last - first) // N_FEW)), last)
+
+
+def near_largest(
+    x: FloatArray, few: NDArray[np.intp], stresses: FloatArray, low: float, high: float
+) -> NDArray[np.intp]:
+    """Return which other points are near the largest stress, from the stresses (b, m) at few of them."""
+    first, last = int(few[0]), int(few[-1])
+    inside = (x[few] >= low) & (x[few] <= high)
+    top = stresses[:, inside].max(initial=0.0)
+    guess = values_at(x[few], stresses.T, x[first : last + 1]).max(axis=1)
+    near = first + np.flatnonzero(guess >= CLOSE * top)
+    wanted = np.zeros(len(x), dtype=bool)
+    for step in range(-STENCIL, STENCIL + 1):
+        wanted[np.clip(near + step, first, last)] = True
+    wanted[few] = False
+    return np.flatnonzero(wanted)
+
+
+def largest_between(
+    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, solve: Solve, window: FloatArray
+) -> float:
+    """Return the largest stress at points in a window, and between neighbours among them, which is solved for [Pa]."""
+    runs = runs_of_points(x, points, stresses, window)
+    return largest_of_runs(
+        x, points, stresses, window, [solve_extremes(t, rows, solve, bound) for t, rows, bound in runs]
+    )
+
+
+def runs_of_points(
+    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, window: FloatArray
+) -> list[tuple[FloatArray, FloatArray, float]]:
+    """Return places and stresses (b, n) of neighbouring points between which the largest may be, and a bound to it."""
+    inside = (x[points] >= window[0]) & (x[points] <= window[1])
+    bound = CLOSE * stresses[:, inside].max(initial=-np.inf)
+    parts = np.split(np.arange(len(points)), np.flatnonzero(np.diff(points) > 1) + 1)
+    runs = [(x[points[own]], stresses[:, own], bound) for own in parts if len(own) > 3]
+    return [run for run in runs if run[1].max() >= bound]
+
+
+def largest_of_runs(
+    x: FloatArray, points: NDArray[np.intp], stresses: FloatArray, window: FloatArray, runs: Sequence[Sequence[Knots]]
+) -> float:
+    """Return the largest stress inside of a window, of points and of runs whose extremes are known [Pa]."""
+    at_points = [(x[points], row) for row in stresses]
+    every = [*at_points, *(knots for run in runs for knots in run)]
+    tops = (y[(t >= window[0]) & (t <= window[1])].max(initial=-np.inf) for t, y in every)
+    return float(max(tops))
 
 
 def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed: float) -> tuple[Knots, ...]:
@@ -56,14 +165,13 @@ def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed:
         more = [_find_passes(own, allowed, t) for own in found]
         if not any(map(len, more)):
             break
-        found = _add_solved(solve, found, list(knots), more)
+        found = _add_solved(found, list(knots), more, *solve(np.concatenate(more)))
     return tuple(found)
 
 
-def _find_tops(knots: Knots, t: FloatArray, largest: FloatArray) -> FloatArray:
-    """Return where the stress of a beam has an extreme that may be the largest of all."""
+def _keep_tops(knots: Knots, top: FloatArray, t: FloatArray, largest: FloatArray) -> FloatArray:
+    """Return those of the extremes of the stress of a beam that may be the largest of all."""
     own, values = knots
-    top = inner_extremes(own, values)
     beside = np.searchsorted(own, top)
     return top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
 
@@ -74,13 +182,9 @@ def _find_passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
 
 
 def _add_solved(
-    solve: Solve,
-    cubics: list[Knots],
-    knots: list[Knots],
-    more: list[FloatArray],
+    cubics: list[Knots], knots: list[Knots], more: list[FloatArray], stresses: FloatArray, accurate: Any
 ) -> list[Knots]:
-    """Return the knots of each beam with more places: stresses there are solved, or on its cubic where that fails."""
-    stresses, accurate = solve(np.concatenate(more))
+    """Return the knots of each beam with more places: stresses as solved, or on its cubic where that failed."""
     found: list[Knots] = []
     end = 0
     for own, cubic, places, row in zip(knots, cubics, more, stresses, strict=True):

@@ -14,14 +14,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from cfmkit.elastica.results.beam_states import elements_of, sections, sections_of_width, states_of_elements
+from cfmkit.elastica.results.beam_states import (
+    elements_of,
+    forces_of_designs,
+    forces_of_elements,
+    sections,
+    sections_of_width,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.results.beam_states import BeamSections
 
 N_MORE_PLACES = 8
 """Places on an element more than the degree of its rotation: sines of the angle, and tapers, are no polynomials."""
@@ -78,8 +86,29 @@ def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArr
         _on_elements(net, replace(at, z=at.z[k : k + together], drive=at.drive[k : k + together]), elements, signs)
         for k in range(0, max(1, len(at.z)), together)
     ]
+    return _highest(own, parts)
+
+
+def extremes_of_designs(
+    networks: Sequence[Network], meshes: Sequence[Discretisation], at: Equilibria, row: Any, signs: FloatArray
+) -> FloatArray:
+    """Return the highest combinations along all beams of some designs, (b, p, c); see `forces_of_designs`."""
+    fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
+    elements = len(at.mesh.elements.length)
+    together, parts = max(1, MAX_TOGETHER // (elements * len(signs) * N_GRID)), []
+    for k in range(0, len(at.z), together):
+        some = slice(k, k + together)
+        own = replace(at, z=at.z[some], drive=at.drive[some])
+        found, widths = forces_of_designs(networks, meshes, own, row[some], fractions)
+        arcs = found.place.reshape(len(own.z), elements, len(fractions))
+        parts.append(_tops(sections_of_width(widths, found), arcs, signs, to_series))
+    return np.asarray(_highest([elements_of(at.mesh, beam) for beam in networks[0].beams], parts)[0])
+
+
+def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any, Any]:
+    """Return the highest values of each beam from those of all elements, which are parts of the points."""
     value, place, fraction = (np.concatenate(column, axis=1) for column in zip(*parts, strict=True))
-    shape, end = (len(beams), *value.shape[1:]), 0
+    shape, end = (len(own), *value.shape[1:]), 0
     best, chosen = np.full(shape, -np.inf), np.zeros(shape, int)
     arc, where = np.zeros(shape), np.zeros(shape)
     for k, numbers in enumerate(own):
@@ -95,14 +124,20 @@ def _on_elements(net: Network, at: Equilibria, elements: list[int], signs: Float
     """Return the highest stresses on each of m elements, places on their beams and on them, (m, p, c) each."""
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
-    found = states_of_elements(net, at, elements, fractions)
-    seen = sections_of_width(np.repeat(widths, len(fractions)), found)
-    both = np.array([seen.bending_stress, seen.axial_stress]).reshape(2, len(at.z), len(elements), len(fractions))
+    found = forces_of_elements(net, at, elements, fractions)
+    arcs = found.place.reshape(1, len(elements), len(fractions))
+    return _tops(sections_of_width(np.repeat(widths, len(fractions)), found), arcs, signs, to_series)
+
+
+def _tops(seen: BeamSections, arcs: Any, signs: FloatArray, to_series: FloatArray) -> tuple[Any, Any, Any]:
+    """Return the highest stresses on elements, (m, p, c), from sections at their places, arc lengths (p or 1, m, k)."""
+    shape = len(seen.bending_stress), *arcs.shape[1:]
+    both = np.array([seen.bending_stress, seen.axial_stress]).reshape(2, *shape)
     series = np.einsum("cs,spmk->mpck", signs, both) @ to_series.T
     top, x = _top(series)
-    arcs = found.place.reshape(len(elements), len(fractions))
-    inner = np.einsum("mpck,mk->mpc", legendre.legvander(x, len(fractions) - 1), arcs @ to_series.T)
-    fraction, first, last = (1 + x) / 2, arcs[:, :1, None], arcs[:, -1:, None]
+    arcs = np.moveaxis(np.broadcast_to(arcs, shape), 0, 1)
+    inner = np.einsum("mpck,mpk->mpc", legendre.legvander(x, shape[-1] - 1), arcs @ to_series.T)
+    fraction, first, last = (1 + x) / 2, arcs[..., :1], arcs[..., -1:]
     place = np.where(fraction < AT_END, first, np.where(fraction > 1 - AT_END, last, inner))
     return top, place, fraction
 
@@ -149,10 +184,22 @@ def signed_extremes(net: Network, at: Equilibria, beam: str, axial: bool) -> Sid
 
 def largest_stresses(net: Network, at: Equilibria, beams: Sequence[str], axial: bool) -> tuple[FloatArray, FloatArray]:
     """Return the largest stress of each of b beams at every point, (b, p) [Pa], and its place on the arc length."""
-    signs = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] if axial else [(1.0, 0.0), (-1.0, 0.0)]
-    value, place, _, _ = extremes(net, at, beams, np.array(signs))
+    value, place, _, _ = extremes(net, at, beams, _signs(axial))
     best = value.argmax(axis=-1)[..., None]
     return np.take_along_axis(value, best, -1)[..., 0], np.take_along_axis(place, best, -1)[..., 0]
+
+
+def _signs(axial: bool) -> FloatArray:
+    """Return what bending and axial stress count for in the largest of all sides, (c, 2)."""
+    both = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
+    return np.array(both if axial else [(1.0, 0.0), (-1.0, 0.0)])
+
+
+def largest_stresses_of_designs(
+    networks: Sequence[Network], meshes: Sequence[Discretisation], at: Equilibria, row: Any, axial: bool
+) -> FloatArray:
+    """Return the largest stress of each of b beams at points of some designs, (b, p) [Pa]; see `forces_of_designs`."""
+    return np.asarray(extremes_of_designs(networks, meshes, at, row, _signs(axial)).max(axis=-1))
 
 
 def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: Any, axial: bool) -> Any:
@@ -174,7 +221,7 @@ def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: A
         here = element == number
         if not here.any():
             continue
-        seen = sections(net, beam, states_of_elements(net, at, [own], fractions))
+        seen = sections(net, beam, forces_of_elements(net, at, [own], fractions))
         bending, pull = (
             np.moveaxis(legendre.legvander(2 * fraction - 1, len(fractions) - 1), -1, 0)
             * np.moveaxis(values @ to_series.T, -1, 0)[:, :, None, None]

@@ -44,7 +44,7 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
     chosen, own = list(indices), path.at
-    problem, scales = NetworkProblem(finer), path.mesh.scales
+    problem, scales, some = NetworkProblem(finer), path.mesh.scales, path.take(chosen)
     n_bodies = int(path.mesh.elements.unknowns[:, 8].min())
     guesses, drives = embed(path.mesh, finer, own.z[chosen]), own.drive[chosen]
     solved = problem.equations.solve_each(guesses[:, finer.free], drives, NEXT_CORRECTION, quick=True)
@@ -57,7 +57,7 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
         known[row] = abs(float(problem.modes(at, 1)[0][0])) < CRITICAL
     fine = replace(path, at=Equilibria(finer, states, drives))
     efforts: Any = np.abs(fine.effort - path.effort[chosen])
-    forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[chosen, :n_bodies]).max(axis=1)
+    forces: Any = np.abs(fine.residual[:, :n_bodies] - some.residual[:, :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - own.z[chosen, :n_bodies]).max(axis=1)
     reach = float(np.abs(own.z[:, :n_bodies]).max())
     load = max(largest_force(fine.at), NO_FORCE * reach, ROUNDING)

@@ -15,7 +15,7 @@ from cfmkit.elastica.contact.follow import follow_in_contact
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
-from cfmkit.elastica.model.drive import Control
+from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
@@ -369,7 +369,7 @@ def _path(
     drives = np.array([point.at.drive for point in points])
     z: Any = arrays.base + drives[:, None] * arrays.rate
     z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
-    return Path(
+    path = Path(
         network, drive, Equilibria(arrays, z, drives),
         unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
         requested=read_only(np.array([point.target for point in points]), np.int64),
@@ -377,6 +377,10 @@ def _path(
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points)), np.bool_),
     )  # fmt: skip
+    efforts = np.array([point.at.effort for point in points])
+    if not isinstance(drive, Loading) and np.isfinite(efforts).all():  # the solver has them already
+        vars(path)["effort"] = read_only(efforts * (arrays.scales.moment / arrays.scales.drive))
+    return path
 
 
 def _tell(event: PathEvent, unit: float) -> Event:

@@ -21,6 +21,7 @@ FAMILY = Family(
     search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
+    rows=when_called("cfmkit.families.beam.beams_in_rows:solve_rows"),
     errors="cfmkit.families.beam.redesign_variables_and_process_errors:errors",
     free="cfmkit.families.beam.redesign_variables_and_process_errors:free",
     sampled="cfmkit.families.beam.force_at_few_poses:sampled",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import LazyMapping
 from cfmkit.curves import Column
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
@@ -21,14 +22,14 @@ from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
     from cfmkit.elastica.model.contact import Contact
     from cfmkit.elastica.results.path import ContactEvent
+    from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.solution import Solution
-    from cfmkit.families.run_control import Run
 
 DEFINITIONS = {
     "first_contact": ("length", "displacement of the driven node at which the first contact begins"),
@@ -74,11 +75,15 @@ def named_force(path: Path, name: str) -> FloatArray:
     return np.asarray(sum(signed_force(path, numbers) for numbers in found))
 
 
-def contact_columns(solution: Solution) -> dict[str, Column]:
-    """Return the force of each stop and each pad at every point of the curve, and what happens there."""
+def contact_columns(solution: Solution) -> LazyColumns:
+    """Return the force of each stop and each pad at every point of the curve, and what happens there; when read."""
+    known = LazyMapping(("all",), lambda _: _columns(solution))
+    names = [column for _, column in column_names(solution.spec.mechanism)] if solution.path.network.contacts else []
+    return {name: partial(lambda own: known["all"][own], name) for name in [*names, *(["event"] if names else [])]}
+
+
+def _columns(solution: Solution) -> dict[str, Column]:
     path, keep = solution.path, solution.keep
-    if not path.network.contacts:
-        return {}
     names = [column for _, column in column_names(solution.spec.mechanism)]
     columns = {}
     for column, numbers in zip(names, groups(path.network.contacts).values(), strict=True):
@@ -98,36 +103,44 @@ def _mark(path: Path, event: ContactEvent) -> str:
 
 
 # -- scalar results ----------------------------------------------------------------------------------------------------
-def contact_values(solution: Solution, run: Run) -> dict[str, Quantity]:
-    """Return the scalar results on contacts by name; none without contacts."""
+def contact_values(solution: Solution) -> Mapping[str, Quantity]:
+    """Return the scalar results on contacts by name, computed when they are read."""
+    pushing = [number for number, contact in enumerate(solution.path.network.contacts) if not contact.turns]
+    named = dict.fromkeys(solution.path.network.contacts[number].name for number in pushing)
+    several = (f"{plain}[{name}]" for name in named for plain in ("contact_force", "contact_force_ripple"))
+    names = ["first_contact", *(["contact_force_max"] if pushing else []), *several]
+    window = window_of(solution)
+
+    def compute(name: str) -> Quantity:
+        plain, _, contact = name.partition("[")
+        if plain == "first_contact":
+            return Quantity(_first_contact(solution), *DEFINITIONS[name])
+        if plain == "contact_force_max":
+            top = largest(solution, lambda there: np.array([there.contact_force(number) for number in pushing]), window)
+            return Quantity(top, "force", LARGEST_FORCE)
+        if plain == "contact_force":
+            mean = _mean(solution, contact.removesuffix("]"), window)
+            reason = "" if mean is not None else "the window is not on the curve, or the curve turns back"
+            return Quantity(mean, *DEFINITIONS["contact_force[contact]"], reason=reason)
+        ripple = _ripple(solution, contact.removesuffix("]"), window)
+        reason = "" if ripple is not None else "there is no contact in the window"
+        return Quantity(ripple, *DEFINITIONS["contact_force_ripple[contact]"], reason=reason)
+
+    return LazyMapping(names, compute)
+
+
+def _first_contact(solution: Solution) -> float | None:
+    """Return the motion at which the first contact begins [m]; None if there is none, or the drive turns."""
     path, contacts = solution.path, solution.path.network.contacts
-    turns = solution.spec.mechanism.drive.turns
     first = next((event for event in path.contact_events if event.kind == "begins"), None)
-    found = {"first_contact": Quantity(None, *DEFINITIONS["first_contact"])}
-    if not contacts:
-        return found
-    if first is not None and not turns:
+    if solution.spec.mechanism.drive.turns or not contacts:
+        return None
+    if first is not None:
         there = path.take(path.changes_contact)
         motion = replace(solution, path=there, keep=np.arange(len(there)), ends=()).motion
-        place = float(motion[int(np.abs(there.drive - first.drive).argmin())])
-        found["first_contact"] = Quantity(place, *DEFINITIONS["first_contact"])
-    elif not turns and any(path.contact_force(number)[0] > 0 for number in range(len(contacts))):
-        found["first_contact"] = Quantity(float(solution.motion[0]), *DEFINITIONS["first_contact"])
-    window = window_of(solution)
-    pushing = [number for number, contact in enumerate(contacts) if not contact.turns]
-    if pushing:
-        top = largest(solution, lambda there: np.array([there.contact_force(number) for number in pushing]), window)
-        found["contact_force_max"] = Quantity(top, "force", LARGEST_FORCE)
-    for name in dict.fromkeys(contacts[number].name for number in pushing):
-        wanted = [f"{plain}[{name}]" for plain in ("contact_force", "contact_force_ripple")]
-        if not run.wants(wanted):
-            continue
-        mean, ripple = _mean(solution, name, window), _ripple(solution, name, window)
-        found[wanted[0]] = Quantity(mean, *DEFINITIONS["contact_force[contact]"], reason="" if mean is not None else
-                                    "the window is not on the curve, or the curve turns back")  # fmt: skip
-        found[wanted[1]] = Quantity(ripple, *DEFINITIONS["contact_force_ripple[contact]"], reason="" if ripple
-                                    is not None else "there is no contact in the window")  # fmt: skip
-    return found
+        return float(motion[int(np.abs(there.drive - first.drive).argmin())])
+    closed = any(path.contact_force(number)[0] > 0 for number in range(len(contacts)))
+    return float(solution.motion[0]) if closed else None
 
 
 def _ripple(solution: Solution, name: str, window: tuple[float, float]) -> float | None:

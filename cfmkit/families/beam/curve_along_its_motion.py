@@ -8,15 +8,65 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cfmkit.elastica.results.folding_path_between_points import Observed
+from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.beam.solution import OnCurve
+    from cfmkit.elastica.results.between_points import BetweenPoints
+    from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.families.beam.spec import BeamSpec
+
+BAND = 0.05
+"""Share of F_d by which the force may differ from it: the range begins at 0.95 F_d [Lan, sec. 2]."""
+
+ROUNDS = 4
+"""Of putting a place right; Lan's mechanism (`configs/beam_lan2010.yaml`) needs three."""
+
+SETTLED = 1e-11  # of the travel: a place that moves by less is known
+
+BESIDE = 0.1 * np.arange(-2.0, 3.0)
+"""Where equilibria are solved for around an extreme, as shares of the way to the next point: wide enough that what the
+solver leaves does not move the place, close enough that a polynomial of degree four does not either."""
+
+
+class OnCurve(Observed, Protocol):
+    """Values of a solved mechanism of any model at the points of its curve; forces are those of all copies."""
+
+    @property
+    def spec(self) -> BeamSpec:
+        """The specification."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """The network and what is done to it."""
+
+    @property
+    def effort_error(self) -> float | None:
+        """Numerical error of the effort [N or N m]; None: not known."""
+
+    @property
+    def accurate(self) -> Any:
+        """Whether each point reaches the tolerance, (n,)."""
+
+    @property
+    def stable(self) -> Any:
+        """Whether each point is a stable equilibrium, (n,)."""
+
+    @property
+    def everywhere(self) -> BetweenPoints | None:
+        """The model between the points of the curve, where it is so cheap."""
+
+    @property
+    def along(self) -> AlongMotion:
+        """The curve along its motion."""
 
 
 def travel_of(solution: OnCurve) -> tuple[float, float]:
@@ -96,6 +146,124 @@ class AlongMotion:
         found = self.solution.everywhere.stress_reaches(level, self.sense)
         return None if found is None else self.sense * found
 
-    def back(self, value: float | None) -> float | None:
+    # -- the range that ends at d [Lan, sec. 2]; NaN where a value does not exist ------------------------------------
+    @cached_property
+    def nominal(self) -> float:
+        """Force at the end of the window [N]; NaN on a curve that turns back, ends before it, or has unknown forces."""
+        known = len(self.motion) and self.reaches_end and np.isfinite(self.effort).all()
+        return value_at(*self.knots, self.end) if known else np.nan
+
+    @cached_property
+    def start(self) -> float:
+        """Where the force first reaches 0.95 of that at the end [m]."""
+        if not abs(self.nominal) > (self.solution.effort_error or 0.0):  # else 95 % of it are rounding
+            return np.nan
+        place = self._settled(lambda x, force: crossing(x, force / self.nominal, 1 - BAND))
+        return place if place is not None and place <= self.end and self.end > 0 else np.nan
+
+    @cached_property
+    def strict_start(self) -> float:
+        """Smallest place from which on the force stays within 5 % of its maximum [m]."""
+        if np.isnan(self.start) or self.nominal <= 0:  # no band lies around the force there
+            return np.nan
+        return self._settled(lambda x, force: find_strict_start(x, force, self.end)) or 0.0
+
+    def fraction(self, start: float) -> float:
+        """Return the range that begins at a place, as a share of the travel."""
+        return (self.end - start) / self.end
+
+    @cached_property
+    def stress_at_end(self) -> float:
+        """Largest stress at the end of the window [Pa], beam by beam: the largest of all has kinks."""
+        if np.isnan(self.nominal):
+            return np.nan
+        if self.solution.everywhere is not None:
+            return float(self.stress_at(np.array([self.end]))[0])
+        return max(value_at(self.motion, value, self.end) for value, _ in self.solution.stresses.values())
+
+    @cached_property
+    def stress_limit(self) -> float:
+        """Where the largest stress first reaches the allowable one [m], beam by beam."""
+        allowable = self.solution.assembly.allowable_stress
+        if np.isnan(self.nominal) or allowable is None:
+            return np.nan
+        if self.solution.everywhere is not None:
+            found = self.stress_reaches(allowable)
+            return np.nan if found is None else found
+        reached = [crossing(self.motion, value, allowable) for value, _ in self.solution.stresses.values()]
+        return min((place for place in reached if place is not None), default=np.nan)
+
+    def _settled(self, find: Callable[[FloatArray, FloatArray], float | None]) -> float | None:
+        """Return a place that cubics tell, put right by the equilibrium solved there, if the model can do so."""
+        x, force = self.knots
+        place = find(x, force)
+        for _ in range(ROUNDS):
+            if self.corners is None or place is None or np.abs(x - place).min() <= SETTLED * (x[-1] - x[0]):
+                break
+            at = int(np.searchsorted(x, place))
+            x, force = np.insert(x, at, place), np.insert(force, at, self.effort_at(np.array([place])))
+            place = find(x, force)
+        return place
+
+    # -- extremes: place [m] and force [N]; NaN where there is none --------------------------------------------------
+    @cached_property
+    def peak(self) -> tuple[float, float]:
+        """The first local maximum of the force, on a curve that does not turn back."""
+        if not len(self.motion) or not (np.diff(self.motion) > 0).all() or not np.isfinite(self.effort).all():
+            return np.nan, np.nan
+        # before a contact begins there may be no force at all, but for rounding
+        x, force = self.knots
+        bearing = np.flatnonzero(np.abs(force) > (self.solution.effort_error or 0.0))
+        begin = float(x[bearing[0] - 1]) if len(bearing) and bearing[0] > 1 else -np.inf
+        return self._turn(first_extreme(x, force, after=begin, corners=self.corners))
+
+    @cached_property
+    def valley(self) -> tuple[float, float]:
+        """The first local minimum after that."""
+        if np.isnan(self.peak[0]):
+            return np.nan, np.nan
+        return self._turn(first_extreme(*self.knots, -1, after=self.peak[0], corners=self.corners))
+
+    def _turn(self, found: tuple[float, float] | None) -> tuple[float, float]:
+        """Return an extreme from equilibria around it, where the model can be asked; else as found."""
+        if found is None:
+            return np.nan, np.nan
+        if self.corners is None or found[0] in self.corners:
+            return found
+        place, value = found
+        clear = np.concatenate([self.motion[[0, -1]], self.corners])
+        step = min(float(np.abs(np.diff(self.motion)).max()), float(np.abs(clear - place).min()) / BESIDE[-1])
+        for _ in range(2):
+            powers = np.polynomial.polynomial.polyfit(BESIDE, self.effort_at(place + step * BESIDE), 4)
+            rates = np.polynomial.polynomial.polyder(powers)
+            turns = np.roots(rates[::-1])
+            real = turns.real[np.isreal(turns)]
+            if not len(real) or np.abs(real).min() > BESIDE[-1]:
+                return found
+            at = float(real[np.abs(real).argmin()])
+            place, value = place + step * at, float(np.polynomial.polynomial.polyval(at, powers))
+        return place, value
+
+    def back(self, value: float) -> float:
         """Return a place or a force as the specification has it."""
-        return value if value is None or self.sense > 0 else 0.0 - value  # not -0
+        return value if self.sense > 0 else 0.0 - value  # not -0
+
+
+def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float = BAND) -> float:
+    """Return the smallest c with (max - min) <= band max of the force on c ... end."""
+    before = x < end
+    values = np.append(force[before], value_at(x, force, end))
+    places = np.append(x[before], end)
+    tops = np.maximum.accumulate(values[::-1])[::-1]
+    bottoms = np.minimum.accumulate(values[::-1])[::-1]
+    bad = np.flatnonzero(tops - bottoms > band * tops)
+    if not len(bad):
+        return float(places[0])
+    last = int(bad[-1])
+    top, bottom = float(tops[last + 1]), float(bottoms[last + 1])
+
+    def inside(place: float) -> bool:
+        here = value_at(x, force, place)
+        return max(top, here) - min(bottom, here) <= band * max(top, here)
+
+    return bisect(inside, float(places[last]), float(places[last + 1]))

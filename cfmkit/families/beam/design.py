@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import InputError
-from cfmkit.families.beam.curve_along_its_motion import AlongMotion
-from cfmkit.families.beam.findings import ending_of, finding
+from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.network_from_spec import thickest
-from cfmkit.families.beam.scalar_results import force_at_end, ranges
+from cfmkit.families.beam.path_ending import ending_of
+from cfmkit.families.beam.scalar_results import force_at_end, number_of
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, TravelShare, format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -256,7 +256,7 @@ def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
         return (None, why) if why else (spec, "")
     end = _down(place)
     ended = _windowed(spec, 0.0, end)
-    start = ranges(solve(ended))["range_start"]
+    start = number_of("range_start", solve(ended))
     return (ended if start is None or abs(_up(start)) >= abs(end) else _windowed(ended, _up(start), end)), ""
 
 
@@ -275,7 +275,7 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
                 raise
             more = ", and a longer one would tear beams"
             break
-        if (place := ranges(solution)["stress_limit_displacement"]) is not None:
+        if (place := number_of("stress_limit_displacement", solution)) is not None:
             return place, ""
         if len(solution.keep) < 2:
             return None, ""
@@ -337,11 +337,10 @@ def _force_ratio(old: Mechanism, new: Mechanism) -> float:
 def _stress(spec: BeamSpec) -> list[Finding]:
     """Say where the travel is longer than the stress allows after the change."""
     solution = solve(spec)
-    values, allowable = ranges(solution), solution.assembly.allowable_stress
-    stress, place = values["stress_at_end"], values["stress_limit_displacement"]
+    allowable, along = solution.assembly.allowable_stress, solution.along
+    stress, place = (number_of(name, solution) for name in ("stress_at_end", "stress_limit_displacement"))
     if stress is None or allowable is None or place is None:
         return []
-    along = AlongMotion(solution)
     if stress <= allowable and along.sense * place >= along.end:
         return []
     return [

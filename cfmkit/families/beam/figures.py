@@ -12,7 +12,6 @@ from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import COARSE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
@@ -85,7 +84,7 @@ def curve(result: Result) -> Figure:
     solution: Solution = result.state
     regions, levels = [], []
     limit, start = (result.values[name].value for name in ("stress_limit_displacement", "range_start"))
-    along = AlongMotion(solution)
+    along = solution.along
     end, farthest = along.sense * along.end, float(along.motion.max())
     if limit is not None and along.sense * limit < farthest:
         low, high = sorted((limit, along.sense * farthest))

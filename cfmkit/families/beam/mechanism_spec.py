@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.beam.contact_spec import ObstacleSpec, StopSpec, contact_faults
@@ -32,15 +30,12 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import RoundedCorners, SafetyFactor
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
 
 Fault = tuple[tuple[str | int, ...], str]
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
-_CLOSED = 1e-9  # of the length; the engine cannot fit what is shorter
-# 20 places of the quadrature on each panel, of a turn below a radian on the average
-_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 
 def faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -100,8 +95,7 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
     driving = mechanism.drive.loads if isinstance(mechanism.drive, LoadsDrive) else ()
     for place, loads in ((("loads",), mechanism.loads), (("drive", "loads", "loads"), driving)):
         for index, load in enumerate(loads):
-            what = "node" if load.kind == "point" else "beam"
-            yield (*place, index, load.kind, what), what, getattr(load, what)
+            yield (*place, index, load.kind, load.acts_on), load.acts_on, getattr(load, load.acts_on)
     yield ("drive", mechanism.drive.kind, "node"), "node", mechanism.drive.node
 
 
@@ -121,27 +115,8 @@ def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
     if reach == 0:
         yield ("end",), f"the two ends of the beam are at the same place, at {beam.start!r}"
         return
-    shape = beam.shape
-    if shape.kind == "cosine" and shape.half and abs(shape.rise) >= reach:
-        yield ("shape", "cosine", "rise"), "the rise of half an arch must be less than the distance of its ends"
-    if shape.kind == "arc" and _returns((0.0, shape.sweep)):
-        yield ("shape", "arc", "sweep"), "an arc of whole turns returns to its start: it cannot be fitted"
-    if shape.kind == "polynomial" and _returns(shape.coefficients):
-        yield ("shape", "polynomial", "coefficients"), "the shape returns to its start: it cannot be fitted"
-    if shape.kind in ("polyline", "spline"):
-        points = shape.points
-        if any(one == other for one, other in itertools.pairwise(points)):
-            yield ("shape", shape.kind, "points"), "two neighbouring points are the same"
-        elif points[0] == points[-1]:
-            yield ("shape", shape.kind, "points"), "the shape returns to its start: it cannot be fitted"
-
-
-def _returns(coefficients: Sequence[float]) -> bool:
-    """Return True if a shape whose angle is a polynomial [rad] ends where it starts."""
-    panels = 8 + math.ceil(sum(map(abs, coefficients[1:])))
-    u = (np.arange(panels)[:, None] + 0.5 * (_PLACES + 1)) / panels
-    chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * _WEIGHTS).sum() / (2 * panels)
-    return bool(abs(chord) < _CLOSED)
+    for key, why in beam.shape.find_faults(reach):
+        yield ("shape", beam.shape.kind, key), why
 
 
 def _link_faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -185,7 +160,7 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
         if rotation:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}; 'pinned' lets it turn"
         return
-    if isinstance(drive, LoadsDrive) and not any(map(_acts, drive.loads)):
+    if isinstance(drive, LoadsDrive) and not any(load.acts for load in drive.loads):
         yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism"
     if along and across:
         way = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
@@ -197,12 +172,6 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
             f"{drive.node!r} slides along {own} only ('mechanism.nodes.{drive.node}.direction'), not along {way}: make "
             "both directions equal, or its support 'free'",
         )
-
-
-def _acts(load: LoadSpec) -> bool:
-    """Return True if a load is not zero."""
-    values = (load.fx, load.fy, load.moment) if load.kind == "point" else (load.wx, load.wy)
-    return any(value != 0 for value in values)
 
 
 def parallel(one: float, other: float) -> bool:

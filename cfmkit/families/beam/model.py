@@ -13,53 +13,51 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import LazyMapping, LazySequence, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
-from cfmkit.families.beam.contacts import contact_columns
+from cfmkit.families.beam.contacts import contact_columns, contact_values
 from cfmkit.families.beam.curve_along_its_motion import travel_of
-from cfmkit.families.beam.findings import ending_of, findings_of, in_units
+from cfmkit.families.beam.findings import findings_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
-from cfmkit.families.beam.requested_node_columns import output_columns
-from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, target_of, values_of
+from cfmkit.families.beam.path_ending import ending_of, in_units
+from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, output_columns
+from cfmkit.families.beam.scalar_results import QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
-from cfmkit.metrics.metric_definitions import ALL_STRESSES
+from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from cfmkit.curves import Kind
     from cfmkit.elastica.model.network import Network
+    from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.beam.tip_on_uneven_surface import Ride
     from cfmkit.families.run_control import Run
+    from cfmkit.results import Finding
 
 _TORN = 3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
 _ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
 @one_blas_thread
-def analyze(spec: BeamSpec, run: Run) -> Result:
+def analyze(spec: BeamSpec, _run: Run) -> Result:
     """Return the force-displacement path of a beam mechanism, with everything that is wrong with it.
-
-    Parameters
-    ----------
-    spec : BeamSpec
-        The mechanism and how far its drive goes.
-    run : Run
-        Which metrics are looked at: values, findings and columns that none of them needs are left out.
 
     Returns
     -------
@@ -69,16 +67,13 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     solution, resolved = solve(spec), resolve(spec)
     if len(solution.keep) < 2:
         message = f"no curve: {ending_of(solution).message}"
-        return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
+        return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=tuple(findings_of(solution)))
     status, message = _ending(solution)
-    all_of_it = run.wanted is None
-    values = values_of(solution, run) if run.wants(DEFINITIONS) else {}
-    warnings, along = findings_of(solution) if all_of_it else (), ride(solution)
-    stressed = run.columns or along is not None or not _finds_largest_stress(solution) or run.wants(ALL_STRESSES)
-    curves: tuple[Curve, ...] = (_curve(solution) if all_of_it else _plain_curve(solution, stressed),)
+    values, along = values_of_one(QUANTITIES, solution) | contact_values(solution), ride(solution)
+    curves: tuple[Curve, ...] = (_curve(solution),)
     if along is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()
-        values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
+        values |= values_along(along)
         if along.missing and status is Status.COMPLETE:
             status, message = Status.PARTIAL, along.missing
     return Result(
@@ -87,18 +82,24 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         message=message,
         curves=curves,
         values=values,
-        warnings=warnings,
+        warnings=LazySequence(partial(_findings, solution, along)),
         travel=travel_of(solution),
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
         closed=solution.everywhere,
         winding=solution.winding,
-        ends=_ends(solution, stressed),
+        ends=_ends(solution),
         effort_error=solution.effort_error,
         part_efforts=None if isinstance(spec.mechanism.drive, LoadsDrive) else solution.part_efforts,
         state=solution,
     )
+
+
+def _findings(solution: Solution, along: Ride | None) -> Iterator[Finding]:
+    yield from findings_of(solution)
+    if along is not None:
+        yield from findings_along(along)
 
 
 def solve(spec: BeamSpec) -> Solution:
@@ -188,78 +189,55 @@ def _ending(solution: Solution) -> tuple[Status, str]:
 
 def _curve(solution: Solution) -> Curve:
     """Return the curve with stresses and the forces of each beam."""
-    keep, path = solution.keep, solution.path
-    extra = {
-        "max_stress": Column(solution.stress, "stress"),
-        "stress_beam": Column(solution.stress_at[0], "text"),
-        "stress_place": Column(solution.stress_at[1], "ratio"),
-        "path": Column(_branches(solution), "text"),
+    path, outputs = solution.path, solution.spec.analysis.outputs
+    columns = {
+        "max_stress": lambda: Column(solution.stress, "stress"),
+        "stress_beam": lambda: Column(solution.stress_at[0], "text"),
+        "stress_place": lambda: Column(solution.stress_at[1], "ratio"),
+        "path": lambda: Column(_branches(solution), "text"),
     }
     for name in path.network.beams:
-        x, y, moment = solution.beam_force(name).T
-        extra |= {
-            f"{name}_force_x": Column(x, "force"),
-            f"{name}_force_y": Column(y, "force"),
-            f"{name}_moment": Column(moment, "torque"),
-        }
-    extra |= contact_columns(solution) | _outputs(solution) | _frequencies(solution)
-    return Curve(
-        solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, _kind(solution)
+        columns |= columns_of(name, solution.beam_force, END_FORCES)
+    columns |= output_columns(
+        outputs, lambda name: path.motion(name)[solution.keep], lambda name: path.reaction(name)[solution.keep]
     )
+    columns |= contact_columns(solution)
+    if outputs.cross_stiffness:
+        columns["cross_stiffness"] = lambda: Column(solution.cross_stiffness, "stiffness")
+    if isinstance(solution.spec.mechanism.drive, LoadsDrive):
+        columns["load_factor"] = lambda: Column(path.drive[solution.keep], "factor")
+    if solution.spec.analysis.modes and solution.assembly.masses() is not None:
+        columns |= _frequencies(solution)
+    return _curve_of(solution, columns, solution.stable)
 
 
-def _finds_largest_stress(solution: Solution) -> bool:
-    """Return whether the largest stress in a window is known without the stress at every point."""
-    law = solution.everywhere
-    return law is not None and not len(law.corners)
+def _curve_of(solution: Solution, columns: LazyColumns, stable: Any) -> Curve:
+    """Return a curve with columns that are computed when they are read."""
+    extra = LazyMapping(columns, lambda name: columns[name]())
+    return Curve(solution.motion, solution.effort, "load", stable, extra, kind_of(solution))  # type: ignore[arg-type]
 
 
-def _plain_curve(solution: Solution, stressed: bool) -> Curve:
-    """Return the curve with what metrics look at: with a column of stresses, or without one."""
-    extra = {"max_stress": Column(solution.stress, "stress")} if stressed else {}
-    return Curve(
-        solution.motion,
-        solution.effort,
-        np.repeat(["load"], len(solution.keep)),
-        solution.stable,
-        extra,
-        _kind(solution),
-    )
-
-
-def _kind(solution: Solution) -> Kind:
+def kind_of(solution: Solution) -> Kind:
+    """Return what the effort of a curve is."""
     return "torque" if solution.spec.mechanism.drive.turns else "force"
 
 
-def _ends(solution: Solution, stressed: bool) -> Curve | None:
+def _ends(solution: Solution) -> Curve | None:
     """Return the points at which windows end between those of the curve, with their stress; None without any."""
     if not len(solution.ends):
         return None
     there = replace(solution, keep=solution.ends)
-    stress = {"max_stress": Column(there.stress, "stress")} if stressed else {}
-    kind: Kind = "torque" if solution.motion_dimension == "angle" else "force"
-    names = np.repeat(["load"], len(there.keep))
-    return Curve(there.motion, there.effort, names, np.array(there.accurate), stress, kind)
+    return _curve_of(there, {"max_stress": lambda: Column(there.stress, "stress")}, np.array(there.accurate))
 
 
-def _outputs(solution: Solution) -> dict[str, Column]:
-    """Return the motions and reactions that the specification names, of one copy."""
-    keep, path, outputs = solution.keep, solution.path, solution.spec.analysis.outputs
-    columns = output_columns(outputs, lambda name: path.motion(name)[keep], lambda name: path.reaction(name)[keep])
-    if outputs.cross_stiffness:
-        columns["cross_stiffness"] = Column(solution.cross_stiffness, "stiffness")
-    if isinstance(solution.spec.mechanism.drive, LoadsDrive):
-        columns["load_factor"] = Column(path.drive[keep], "factor")
-    return columns
-
-
-def _frequencies(solution: Solution) -> dict[str, Column]:
+def _frequencies(solution: Solution) -> LazyColumns:
     """Return the natural frequencies that were requested: empty where a pose is not stable, or not accurate."""
-    found, columns = solution.frequencies, {}
-    for k in range(solution.spec.analysis.modes if found is not None else 0):
-        for name, values in natural(solution).items():
-            columns[f"frequency_{k + 1}_{name}"] = Column(values[:, k], "frequency")
-    return columns
+
+    def column(mode: int, hold: str) -> Column:
+        return Column(natural(solution)[hold][:, mode], "frequency")
+
+    modes = range(solution.spec.analysis.modes)
+    return {f"frequency_{k + 1}_{hold}": partial(column, k, hold) for k in modes for hold in ("held", "free")}
 
 
 def _branches(solution: Solution) -> Any:

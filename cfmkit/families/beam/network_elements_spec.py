@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from cfmkit.families.beam.shapes_spec import Point, ShapeSpec, Straight
 from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import (
     Angle,
@@ -25,7 +25,9 @@ from cfmkit.specs.units import (
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PaddedPart, material_input
 from cfmkit.stock.materials import material
 
-Point = tuple[Length, Length]
+if TYPE_CHECKING:
+    from cfmkit.elastica.model import network as engine
+
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
 
@@ -104,73 +106,6 @@ class NodeSpec(Model):
         return self
 
 
-MOST_WINDINGS = 1000
-"""Turns that the angle along one beam may make: a shape is sampled as densely as it winds."""
-_MOST_SWEEP = math.radians(360 * MOST_WINDINGS)
-
-
-class Straight(Model):
-    """A straight beam."""
-
-    kind: Literal["straight"] = "straight"
-
-
-class PolynomialShape(Model):
-    """The angle along the beam as a polynomial of the fraction u of its length: c0 + c1 u + c2 u^2 + ..."""
-
-    kind: Literal["polynomial"]
-    coefficients: tuple[Angle, ...] = Field(
-        min_length=1, max_length=10_000, description="[c0, c1, ...], angles from the x axis"
-    )
-    length: PositiveLength | None = Field(None, description="nominal length, for `closure` and its report")
-
-    @field_validator("coefficients")
-    @classmethod
-    def _winds_so_often(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        turns = sum(map(abs, values[1:])) / math.tau
-        if turns > MOST_WINDINGS:
-            raise ValueError(
-                f"the sizes of c1, c2, ... add up to {turns:.4g} turns: at most {MOST_WINDINGS} are supported"
-            )
-        return values
-
-
-class ArcShape(Model):
-    """A circular arc between the nodes."""
-
-    kind: Literal["arc"]
-    sweep: Annotated[Angle, Field(ge=-_MOST_SWEEP, le=_MOST_SWEEP)] = Field(
-        description="by how much the angle grows from start to end; positive bulges to the right"
-    )
-
-
-class CosineShape(Model):
-    """A cosine arch: rise (1 - cos(2 pi x / span)) / 2, to the left of the way from start to end."""
-
-    kind: Literal["cosine"]
-    rise: Length = Field(description="height of the arch")
-    half: bool = Field(False, description="half an arch, whose ends differ in height by the rise")
-
-
-class PolylineShape(Model):
-    """Straight pieces through points; corners are rigid. Turned and scaled to fit the nodes."""
-
-    kind: Literal["polyline"]
-    points: tuple[Point, ...] = Field(min_length=2, description="[[x, y], ...] in any frame")
-
-
-class SplineShape(Model):
-    """A smooth curve through points, a cubic spline. Turned and scaled to fit the nodes."""
-
-    kind: Literal["spline"]
-    points: tuple[Point, ...] = Field(min_length=3, description="[[x, y], ...] in any frame")
-
-
-ShapeSpec = Annotated[
-    Straight | PolynomialShape | ArcShape | CosineShape | PolylineShape | SplineShape, Field(discriminator="kind")
-]
-
-
 class MemberSpec(Model):
     """A beam between two nodes. What is left out is as for the whole mechanism."""
 
@@ -211,7 +146,15 @@ class LinkSpec(Model):
     node: str = Field(description="node that follows; without a support")
 
 
-class LineSpringSpec(Model):
+class SpringElement(Model):
+    """Base of the kinds of springs: a new one is a class here and its name in `SpringSpec`."""
+
+    def build(self) -> engine.Spring:
+        """Return the spring as the engine has it."""
+        raise NotImplementedError
+
+
+class LineSpringSpec(SpringElement):
     """A spring along the line between two nodes, or a node and a fixed point."""
 
     kind: Literal["line"]
@@ -227,8 +170,14 @@ class LineSpringSpec(Model):
             raise ValueError("give either 'end' (a node) or 'ground' (a point)")
         return self
 
+    def build(self) -> engine.Spring:
+        """Return the spring as the engine has it."""
+        from cfmkit.elastica.model.network import LineSpring
 
-class TorsionSpringSpec(Model):
+        return LineSpring(self.start, self.end, self.stiffness, self.free_length, self.ground or (0.0, 0.0))
+
+
+class TorsionSpringSpec(SpringElement):
     """A spring between the rotations of two nodes, or of a node and the ground."""
 
     kind: Literal["torsion"]
@@ -237,8 +186,14 @@ class TorsionSpringSpec(Model):
     stiffness: Annotated[RotationalStiffness, Field(gt=0)] = Field(description="moment per angle")
     free_angle: Angle = Field(0.0, description="rotation of end minus that of start at which it is relaxed")
 
+    def build(self) -> engine.Spring:
+        """Return the spring as the engine has it."""
+        from cfmkit.elastica.model.network import TorsionSpring
 
-class SlideSpringSpec(Model):
+        return TorsionSpring(self.start, self.end, self.stiffness, self.free_angle)
+
+
+class SlideSpringSpec(SpringElement):
     """A spring from the ground that resists the motion of a node along a fixed direction."""
 
     kind: Literal["slide"]
@@ -247,12 +202,36 @@ class SlideSpringSpec(Model):
     stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="force per displacement")
     free_displacement: Length = Field(0.0, description="displacement at which it is relaxed")
 
+    def build(self) -> engine.Spring:
+        """Return the spring as the engine has it."""
+        from cfmkit.elastica.model.network import SlideSpring
+
+        return SlideSpring(self.node, self.direction, self.stiffness, self.free_displacement)
+
 
 SpringSpec = Annotated[LineSpringSpec | TorsionSpringSpec | SlideSpringSpec, Field(discriminator="kind")]
 
 
-class PointLoadSpec(Model):
+class Load(Model):
+    """Base of the kinds of loads: a new one is a class here and its name in `LoadSpec`."""
+
+    acts_on: ClassVar[Literal["node", "beam"]]  # key of the name of that
+    sizes: ClassVar[tuple[str, ...]]  # keys of its components
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is not zero."""
+        return any(getattr(self, name) != 0 for name in self.sizes)
+
+    def build(self, share: float = 1.0) -> engine.LoadOn:
+        """Return a share of the load as the engine has it."""
+        raise NotImplementedError
+
+
+class PointLoadSpec(Load):
     """A constant force and moment at a node."""
+
+    acts_on, sizes = "node", ("fx", "fy", "moment")
 
     kind: Literal["point"]
     node: str = Field(description="node")
@@ -261,14 +240,28 @@ class PointLoadSpec(Model):
     moment: Torque = Field(0.0, description="counter-clockwise")
     follows: bool = Field(False, description="whether the force turns with the node")
 
+    def build(self, share: float = 1.0) -> engine.LoadOn:
+        """Return a share of the load as the engine has it."""
+        from cfmkit.elastica.model.network import PointLoad
 
-class LineLoadSpec(Model):
+        return PointLoad(self.node, share * self.fx, share * self.fy, share * self.moment, self.follows)
+
+
+class LineLoadSpec(Load):
     """A constant uniform load on a beam, per length before any load."""
+
+    acts_on, sizes = "beam", ("wx", "wy")
 
     kind: Literal["line"]
     beam: str = Field(description="beam")
     wx: LineLoad = Field(0.0, description="to the right")
     wy: LineLoad = Field(0.0, description="upwards")
+
+    def build(self, share: float = 1.0) -> engine.LoadOn:
+        """Return a share of the load as the engine has it."""
+        from cfmkit.elastica.model.network import LineLoad as LineLoadOn
+
+        return LineLoadOn(self.beam, share * self.wx, share * self.wy)
 
 
 LoadSpec = Annotated[PointLoadSpec | LineLoadSpec, Field(discriminator="kind")]

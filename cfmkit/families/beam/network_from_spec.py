@@ -19,7 +19,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, assert_never
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -43,16 +43,12 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
-    from cfmkit.elastica.model.network import LoadOn, Spring
-    from cfmkit.elastica.model.shapes import Shape
+    from cfmkit.elastica.model.network import LoadOn
     from cfmkit.elastica.vibration import NetworkMasses
     from cfmkit.families.beam.mechanism_spec import Mechanism
     from cfmkit.families.beam.network_elements_spec import (
-        LoadSpec,
         MemberSpec,
         NodeSpec,
-        ShapeSpec,
-        SpringSpec,
         Thickness,
     )
     from cfmkit.families.beam.spec import BeamSpec
@@ -115,7 +111,7 @@ class Assembly(ShortRepr):
             case RotationDrive():
                 return engine.Rotation(self.driven, points, self.growing(spec.extent))
             case LoadsDrive():
-                return engine.Loading((*map(_load, drive.loads), *self.growing(spec.extent)), points)
+                return engine.Loading((*(load.build() for load in drive.loads), *self.growing(spec.extent)), points)
             case MomentDrive():
                 own = engine.PointLoad(self.driven, moment=1.0)
             case ForceDrive():
@@ -151,7 +147,7 @@ class Assembly(ShortRepr):
         """Return the constant loads per unit of the drive, where they grow with it and are whole at its end."""
         if self.spec.analysis.loads_first:
             return ()
-        return tuple(_load(load, 1.0 / end) for load in self.spec.mechanism.loads)
+        return tuple(load.build(1.0 / end) for load in self.spec.mechanism.loads)
 
     def control(self) -> engine.Control:
         """Return how the path is followed."""
@@ -173,8 +169,8 @@ def assemble(spec: BeamSpec) -> Assembly:
         nodes={name: _node(node) for name, node in mechanism.nodes.items()},
         beams={name: _beam(spec, beam) for name, beam in mechanism.beams.items()},
         links=tuple(engine.Link(link.master, link.node) for link in mechanism.links),
-        springs=tuple(_spring(spring) for spring in mechanism.springs.values()),
-        loads=tuple(_load(load) for load in mechanism.loads) if spec.analysis.loads_first else (),
+        springs=tuple(spring.build() for spring in mechanism.springs.values()),
+        loads=tuple(load.build() for load in mechanism.loads) if spec.analysis.loads_first else (),
         contacts=contacts_of(mechanism),
     )
     if mechanism.closure == "chain":
@@ -276,7 +272,7 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
         beam.start,
         beam.end,
         section,
-        _shape(beam.shape),
+        beam.shape.build(),
         "raw" if mechanism.closure == "raw" and getattr(beam.shape, "length", None) else "rotscale",
         beam.start_joint,
         beam.end_joint,
@@ -292,46 +288,13 @@ def between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
     """
     ends = [mechanism.nodes[name] for name in (beam.start, beam.end)]
     held = all(all(HELD[node.support][:2]) and node.moved is None for node in ends)
-    return held and beam.shape.kind == "straight" and not (beam.start_offset or beam.end_offset)
+    return held and beam.shape.is_straight and not (beam.start_offset or beam.end_offset)
 
 
 def _thickness(given: Thickness) -> float | engine.Taper:
     if isinstance(given, tuple):
         return engine.Taper(np.array([place for place, _ in given]), np.array([value for _, value in given]))
     return given
-
-
-def _shape(shape: ShapeSpec) -> Shape:
-    if shape.kind == "straight":
-        return engine.STRAIGHT
-    if shape.kind == "polynomial":
-        return engine.Polynomial(shape.coefficients, shape.length)
-    if shape.kind == "arc":
-        return engine.arc(shape.sweep)
-    if shape.kind == "cosine":
-        return engine.CosineArch(shape.rise, 0.5 if shape.half else 1.0)
-    if shape.kind == "polyline":
-        return engine.Polyline(np.array(shape.points))
-    if shape.kind == "spline":
-        return engine.Spline(np.array(shape.points))
-    assert_never(shape)
-
-
-def _spring(spring: SpringSpec) -> Spring:
-    if spring.kind == "line":
-        return engine.LineSpring(
-            spring.start, spring.end, spring.stiffness, spring.free_length, spring.ground or (0.0, 0.0)
-        )
-    if spring.kind == "torsion":
-        return engine.TorsionSpring(spring.start, spring.end, spring.stiffness, spring.free_angle)
-    return engine.SlideSpring(spring.node, spring.direction, spring.stiffness, spring.free_displacement)
-
-
-def _load(load: LoadSpec, share: float = 1.0) -> LoadOn:
-    """Return a share of a load."""
-    if load.kind == "point":
-        return engine.PointLoad(load.node, share * load.fx, share * load.fy, share * load.moment, load.follows)
-    return engine.LineLoad(load.beam, share * load.wx, share * load.wy)
 
 
 def resolve(spec: BeamSpec) -> BeamSpec:

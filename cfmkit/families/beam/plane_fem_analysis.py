@@ -16,6 +16,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
+from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.network_from_spec import assemble, constant_load, mirror_axis, on_axis, resolve, thinnest_of
@@ -23,7 +24,7 @@ from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
-from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
+from cfmkit.families.beam.scalar_results import DEFINITIONS, EXTREMES, RANGES, number_of, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
@@ -102,6 +103,11 @@ class SolidSolution(ShortRepr):
         rising = np.argsort(self.fine.course.travel)
         cubics = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
         return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
+
+    @cached_property
+    def along(self) -> AlongMotion:
+        """The curve along its motion."""
+        return AlongMotion(self)
 
     @property
     def densely(self) -> SolidSolution:
@@ -404,11 +410,12 @@ def _curve(solution: SolidSolution) -> Curve:
 def _outputs(solution: SolidSolution) -> dict[str, Column]:
     """Return the motions and reactions that the specification names, of one copy."""
     nodes = SolidNodes(solution.assembly, solution.fine)
-    return output_columns(
+    columns = output_columns(
         solution.spec.analysis.outputs,
         lambda name: read_only(nodes.motion(name)(solution.motion)),
         lambda name: read_only(nodes.reaction(name)(solution.motion)),
     )
+    return {name: compute() for name, compute in columns.items()}
 
 
 def _fillet_table(solution: SolidSolution) -> Table:
@@ -424,8 +431,9 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not _turns(solution.spec):
-        numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | _limit(solution)
-        numbers |= ranges(solution) if solution.reached is None else {}
+        numbers |= {"travel_end": float(solution.motion[-1])} | _limit(solution)
+        names = (*EXTREMES, *(RANGES if solution.reached is None else ()))
+        numbers |= {name: number_of(name, solution) for name in names}
         if solution.solved.critical_points:
             first = solution.solved.critical_points[0]
             numbers |= {

@@ -1,22 +1,38 @@
-"""Columns that `analysis.outputs` asks for: motions and reactions of nodes, of beams and of solids alike."""
+"""Columns of nodes and beams: those that `analysis.outputs` asks for, of beams and of solids alike, and forces."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cfmkit.curves import Column
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.spec import Outputs
 
+    Read = Callable[[str], FloatArray]  # from a name to three values at each of n points, (n, 3)
+    LazyColumns = dict[str, Callable[[], Column]]
 
-def output_columns(
-    outputs: Outputs, motion: Callable[[str], FloatArray], reaction: Callable[[str], FloatArray]
-) -> dict[str, Column]:
-    """Return the columns of the nodes that are named.
+MOTIONS = {"x": "length", "y": "length", "rotation": "angle"}
+REACTIONS = {"fx": "force", "fy": "force", "m": "torque"}
+END_FORCES = {"force_x": "force", "force_y": "force", "moment": "torque"}
+"""What three columns of a node or a beam are called after its name, and their dimensions."""
+
+
+def columns_of(name: str, read: Read, endings: Mapping[str, str]) -> LazyColumns:
+    """Return three columns of a node or a beam, each as what computes it."""
+
+    def column(k: int, dimension: str) -> Column:
+        return Column(read(name)[:, k], dimension)
+
+    return {f"{name}_{end}": partial(column, k, dimension) for k, (end, dimension) in enumerate(endings.items())}
+
+
+def output_columns(outputs: Outputs, motion: Read, reaction: Read) -> LazyColumns:
+    """Return the columns of the nodes that are named, each as what computes it.
 
     Parameters
     ----------
@@ -27,13 +43,9 @@ def output_columns(
         From a node to the force x, y [N] and the moment [N m] that hold it, of support and of a drive by a motion, for
         one copy, (n, 3).
     """
-    columns: dict[str, Column] = {}
+    columns: LazyColumns = {}
     for name in outputs.nodes:
-        x, y, turn = motion(name).T
-        columns |= {f"{name}_x": Column(x, "length"), f"{name}_y": Column(y, "length")}
-        columns[f"{name}_rotation"] = Column(turn, "angle")
+        columns |= columns_of(name, motion, MOTIONS)
     for name in outputs.reactions:
-        x, y, moment = reaction(name).T
-        columns |= {f"{name}_fx": Column(x, "force"), f"{name}_fy": Column(y, "force")}
-        columns[f"{name}_m"] = Column(moment, "torque")
+        columns |= columns_of(name, reaction, REACTIONS)
     return columns

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
-from cfmkit.elastica.results.between_points import between_loads, between_points
-from cfmkit.elastica.results.folding_path_between_points import Observed, along_the_way
+from cfmkit.elastica.results.between_loads import between_loads
+from cfmkit.elastica.results.between_points import between_points
+from cfmkit.elastica.results.folding_path_between_points import along_the_way
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
+from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirrored, smallest_gap
 
@@ -80,6 +82,11 @@ class Solution(ShortRepr):
             along = None if drive.turns else self.assembly.direction
             return between_loads(self.path, self.assembly.driven, along, unit, axial, allowed)
         return between_points(self.path, unit, axial, allowed)
+
+    @cached_property
+    def along(self) -> AlongMotion:
+        """The curve along its motion."""
+        return AlongMotion(self)
 
     @cached_property
     def winding(self) -> AlongTheWay | None:
@@ -237,31 +244,3 @@ class Solution(ShortRepr):
     def beam_force(self, beam: str) -> FloatArray:
         """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
         return read_only(-self.path.end_force(beam, 1)[self.keep])
-
-
-class OnCurve(Observed, Protocol):
-    """Values of a solved mechanism of any model at the points of its curve; forces are those of all copies."""
-
-    @property
-    def spec(self) -> BeamSpec:
-        """The specification."""
-
-    @property
-    def assembly(self) -> Assembly:
-        """The network and what is done to it."""
-
-    @property
-    def effort_error(self) -> float | None:
-        """Numerical error of the effort [N or N m]; None: not known."""
-
-    @property
-    def accurate(self) -> Any:
-        """Whether each point reaches the tolerance, (n,)."""
-
-    @property
-    def stable(self) -> Any:
-        """Whether each point is a stable equilibrium, (n,)."""
-
-    @property
-    def everywhere(self) -> BetweenPoints | None:
-        """The model between the points of the curve, where it is so cheap."""

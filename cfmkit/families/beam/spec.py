@@ -394,7 +394,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         ("mechanism.loads", mechanism.loads and by_load, "they act on a part whose motion is given"),
         (
             "mechanism.loads",
-            any(load.kind == "line" or load.follows for load in mechanism.loads),
+            any(load.acts_on != "node" or getattr(load, "follows", False) for load in mechanism.loads),
             "constant loads act on nodes, and keep their direction",
         ),
         (

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.results.between_points import BetweenPoints
-    from cfmkit.families.beam.solution import OnCurve
+    from cfmkit.families.beam.curve_along_its_motion import OnCurve
     from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
     from cfmkit.results import Finding
 

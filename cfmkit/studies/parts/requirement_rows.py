@@ -303,7 +303,7 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, .
     found = quickly_sampled(spec, places)
     if found is not None:
         return found
-    return sampled_on_curves(family(spec.family).analyze(spec, replace(run, wanted=frozenset())), places, reached)
+    return sampled_on_curves(family(spec.family).analyze(spec, run), places, reached)
 
 
 def quickly_sampled(spec: Spec, places: FloatArray) -> Sampled | None:
@@ -388,7 +388,7 @@ def _numbers_in_rows(
     solve = family(parts.spec.family).rows
     if solve is None or not len(parts):
         return found
-    study = Study(parts.spec, tuple(parts.values), rows.metrics, lean=True)
+    study = Study(parts.spec, tuple(parts.values), rows.metrics, findings=False)
     try:
         for members, solved in solve(parts):
             known = SolvedVariants(study, parts, members, solved)
@@ -460,9 +460,9 @@ def _has_columns(found: Sampled | None, rows: RequirementRows) -> TypeGuard[Samp
 
 
 def _looked_at(spec: Spec, rows: RequirementRows, run: Run) -> Result:
-    """Return the analysis of a part, without values and findings that its rows do not look at."""
-    study = Study(spec, (), rows.metrics, lean=True)
-    return family(spec.family).analyze(spec, replace(run, wanted=study.wanted))
+    """Return the analysis of a part, with the sizes of its box if rows look at them."""
+    record = family(spec.family)
+    return record.with_envelope(record.analyze(spec, run), [one.name for one in rows.metrics])
 
 
 def metrics_of_part(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:

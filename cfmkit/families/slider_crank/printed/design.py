@@ -390,7 +390,7 @@ def _analysed(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> De
     window, limits = (task.start, task.stroke), _limits(spec)
     quick = {"points": min(spec.analysis.points, POINTS)}
     plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
-    reported = _reported(plain, window, replace(run, wanted=frozenset()))
+    reported = _reported(plain, window, run)
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
 
 

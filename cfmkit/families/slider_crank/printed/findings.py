@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica import hindered_curling
 from cfmkit.families.findings import at_most, mm, mpa, newton, too_soft
-from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.rows import FindingRule
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from numpy.typing import NDArray
 
     from cfmkit.families.slider_crank.printed.solution import Solution
-    from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.results import Finding
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 
 THINNEST_RATIO = 2.0
@@ -30,40 +29,34 @@ RUN_IN_SHARE = 0.1
 """Travel to 98 % of the force, as a share of all, above which the kink is called large."""
 
 
-def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...]:
-    """Return everything worth a warning, the gravest first."""
-    return tuple(
-        (
-            *_strength(solution),
-            *_signs(solution),
-            *_kink(spec, solution),
-            *_making(spec, solution),
-            *_width(spec, solution),
-            *_guide(solution),
-            *friction_left_out(spec),
-        )
+def left_out_friction(spec: SliderCrankSpec) -> str:
+    """Return what to say of specified friction: a part of one piece has no pins, and its guide is ideal here."""
+    stated = [f"'mechanism.{name}'" for name in ("pins", "guide") if getattr(spec.mechanism, name) is not None]
+    applies = "applies" if len(stated) == 1 else "apply"
+    if not stated:
+        return ""
+    return (
+        f"{' and '.join(stated)} {applies} only to the model with springs: the force of a one-piece part is computed "
+        "without friction"
     )
 
 
-def friction_left_out(spec: SliderCrankSpec) -> Iterator[Finding]:
-    """Yield what to say of friction that is specified: a part of one piece has no pins, and its guide is ideal here."""
-    stated = [f"'mechanism.{name}'" for name in ("pins", "guide") if getattr(spec.mechanism, name) is not None]
-    if stated:
-        yield finding(
-            "friction_left_out",
-            f"{' and '.join(stated)} {'applies' if len(stated) == 1 else 'apply'} only to the model with springs: the "
-            "force of a one-piece part is computed without friction",
-        )
+Sentence = tuple[Any, ...]  # message, then cures
 
 
-def _strength(solution: Solution) -> Iterator[Finding]:
-    limit = solution.material.allowable_stress
-    place, _ = stress_stroke(solution)
-    if limit is None or place is None or place >= solution.travel[-1]:
-        return
-    worst = int(np.argmax(solution.stress))
-    yield finding(
-        "overstressed",
+def _mechanism(solution: Solution) -> Mechanism:
+    assert solution.spec is not None
+    return solution.spec.mechanism
+
+
+def _is_overstressed(solution: Solution) -> bool:
+    return bool(stress_stroke(solution) < solution.travel[-1])
+
+
+def _too_large_stress(solution: Solution) -> Sentence:
+    limit, place, worst = solution.material.allowable_stress, stress_stroke(solution), int(solution.stress.argmax())
+    assert limit is not None
+    return (
         f"beyond {mm(place)} of travel the stress exceeds the allowable {mpa(limit)}; it reaches "
         f"{mpa(float(solution.stress[worst]))} at {mm(float(solution.travel[worst]))}, "
         f"{mm(float(solution.place[worst]))} along the part from its clamped end",
@@ -71,73 +64,129 @@ def _strength(solution: Solution) -> Iterator[Finding]:
     )
 
 
-def _signs(solution: Solution) -> Iterator[Finding]:
+def _pulls(solution: Solution) -> NDArray[np.bool_]:
+    """Return at which points the chain pulls the slider, (n,)."""
     moved = solution.travel > 0.01 * solution.travel[-1]
-    if (solution.force[moved] < 0).any():
-        first = float(solution.travel[moved][solution.force[moved] < 0][0])
-        yield finding("force_negative", f"from {mm(first)} on the chain pulls the slider towards the pivot")
+    return np.asarray(moved & (solution.force < 0))
 
 
-def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    off = abs(kink(solution.chain.pins))
-    if solution.chain.side == 0:
-        yield finding(
-            "straight_start",
-            f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it buckles, and a "
-            "deviation of 0.1 um determines the side; state a kink of 0.25 to 0.5 mm with "
-            "'mechanism.unloaded_offset'",
-        )
-        return
-    resolved = spec.mechanism.resolved[0]
-    if resolved is not None and off < resolved:
-        yield finding(
-            "kink_too_small",
-            f"the kink of {mm(off)} that determines the buckling side is smaller than the process can make "
-            f"({mm(resolved)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
-        )
-    run_in = solution.first_at(0.98 * solution.level)
-    if run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1] and off > 1e-3 * solution.chain.length:
-        yield finding(
-            "long_run_in",
-            f"with a kink of {mm(off)} the force needs {mm(run_in)} of travel to reach 98 % of its level; a smaller "
-            "kink shortens it",
-        )
+def _pulling_chain(solution: Solution) -> Sentence:
+    return (f"from {mm(float(solution.travel[_pulls(solution)][0]))} on the chain pulls the slider towards the pivot",)
 
 
-def _making(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    thinnest = spec.mechanism.resolved[1]
-    if thinnest is not None and solution.thinnest < thinnest:
-        yield finding(
-            "too_thin",
-            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(thinnest)}",
-        )
-    if solution.width_ratio < THINNEST_RATIO:
-        yield finding(
-            "lateral_buckling",
-            f"the width is {solution.width_ratio:.3g} times the largest thickness: out of its plane the part bends "
-            "nearly as easily as in it; guide it between plates, or make it wider",
-        )
+def _is_straight(solution: Solution) -> bool:
+    return solution.chain.side == 0
 
 
-def _width(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    """Say by how much strip or flexures are too soft that are solved as narrow ones."""
-    if spec.mechanism.wide_beams:
-        return
+def _straight_chain(solution: Solution) -> Sentence:
+    return (
+        f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it buckles, and a "
+        "deviation of 0.1 um determines the side; state a kink of 0.25 to 0.5 mm with 'mechanism.unloaded_offset'",
+    )
+
+
+def _offset(solution: Solution) -> float:
+    return abs(kink(solution.chain.pins))
+
+
+def _is_kink_too_small(solution: Solution) -> bool:
+    resolved = _mechanism(solution).resolved[0]
+    return not _is_straight(solution) and resolved is not None and _offset(solution) < resolved
+
+
+def _small_kink(solution: Solution) -> Sentence:
+    resolved = _mechanism(solution).resolved[0]
+    assert resolved is not None
+    return (
+        f"the kink of {mm(_offset(solution))} that determines the buckling side is smaller than the process can make "
+        f"({mm(resolved)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
+    )
+
+
+def _runs_in_long(solution: Solution) -> bool:
+    run_in, off = solution.run_in(0.98), _offset(solution)
+    is_long = run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1]
+    return not _is_straight(solution) and is_long and off > 1e-3 * solution.chain.length
+
+
+def _long_run_in(solution: Solution) -> Sentence:
+    return (
+        f"with a kink of {mm(_offset(solution))} the force needs {mm(solution.run_in(0.98) or 0.0)} of travel to reach "
+        "98 % of its level; a smaller kink shortens it",
+    )
+
+
+def _is_too_thin(solution: Solution) -> bool:
+    thinnest = _mechanism(solution).resolved[1]
+    return thinnest is not None and solution.thinnest < thinnest
+
+
+def _thin_place(solution: Solution) -> Sentence:
+    thinnest = _mechanism(solution).resolved[1]
+    assert thinnest is not None
+    return (f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(thinnest)}",)
+
+
+def _narrow_part(solution: Solution) -> Sentence:
+    return (
+        f"the width is {solution.width_ratio:.3g} times the largest thickness: out of its plane the part bends "
+        "nearly as easily as in it; guide it between plates, or make it wider",
+    )
+
+
+def _softness(solution: Solution) -> str:
+    """Return by how much strip or flexures are too soft that are solved as narrow ones; empty if they are not."""
+    if _mechanism(solution).wide_beams:
+        return ""
     share = hindered_curling(solution.pressed.path).share[solution.pressed.path.at_requested]
     worst = int(share.argmax())
-    if reported := too_soft(float(share[worst]), f"at {mm(float(solution.travel[worst]))}"):
-        yield finding("wide_beam", reported, "mechanism.wide_beams=true")
+    return too_soft(float(share[worst]), f"at {mm(float(solution.travel[worst]))}")
 
 
-def _guide(solution: Solution) -> Iterator[Finding]:
-    share = np.abs(solution.side_force) / np.maximum(np.abs(solution.force), 1e-300)
-    worst = int(np.argmax(np.abs(solution.side_force)))
-    if share[worst] > SIDE_SHARE and solution.travel[worst] > 0:
-        side = float(abs(solution.side_force[worst]))
-        yield finding(
-            "side_force",
-            f"the guide carries up to {newton(side)} across the travel, {100 * share[worst]:.0f} % of the "
-            f"force: friction of 0.1 there changes it by {newton(0.1 * side)}; a mirrored pair on one "
-            "slider cancels it",
-            "mechanism.copies=mirrored",
-        )
+def _side_share(solution: Solution) -> tuple[int, float]:
+    """Return the point with the largest side force, and its share of the force there."""
+    worst = int(np.abs(solution.side_force).argmax())
+    return worst, float(abs(solution.side_force[worst]) / max(abs(solution.force[worst]), 1e-300))
+
+
+def _burdens_guide(solution: Solution) -> bool:
+    worst, share = _side_share(solution)
+    return share > SIDE_SHARE and bool(solution.travel[worst] > 0)
+
+
+def _burdened_guide(solution: Solution) -> Sentence:
+    worst, share = _side_share(solution)
+    side = float(abs(solution.side_force[worst]))
+    return (
+        f"the guide carries up to {newton(side)} across the travel, {100 * share:.0f} % of the force: friction of 0.1 "
+        f"there changes it by {newton(0.1 * side)}; a mirrored pair on one slider cancels it",
+        "mechanism.copies=mirrored",
+    )
+
+
+def _left_out_friction(solution: Solution) -> str:
+    assert solution.spec is not None
+    return left_out_friction(solution.spec)
+
+
+RULES: tuple[FindingRule[Solution], ...] = (
+    FindingRule("overstressed", _is_overstressed, _too_large_stress),
+    FindingRule("force_negative", lambda solution: _pulls(solution).any(), _pulling_chain),
+    FindingRule("straight_start", _is_straight, _straight_chain),
+    FindingRule("kink_too_small", _is_kink_too_small, _small_kink),
+    FindingRule("long_run_in", _runs_in_long, _long_run_in),
+    FindingRule("too_thin", _is_too_thin, _thin_place),
+    FindingRule("lateral_buckling", lambda solution: solution.width_ratio < THINNEST_RATIO, _narrow_part),
+    FindingRule(
+        "wide_beam",
+        lambda solution: bool(_softness(solution)),
+        lambda solution: (_softness(solution), "mechanism.wide_beams=true"),
+    ),
+    FindingRule("side_force", _burdens_guide, _burdened_guide),
+    FindingRule(
+        "friction_left_out",
+        lambda solution: bool(_left_out_friction(solution)),
+        lambda solution: (_left_out_friction(solution),),
+    ),
+)
+"""Everything worth a warning, the gravest first."""

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import LazyMapping, LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica.results.between_points import between_points
 from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.rows import findings_of_one, values_of_one
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
@@ -26,17 +28,15 @@ from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     travel_direction,
 )
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, kept_clear
-from cfmkit.families.slider_crank.printed.findings import findings_of
-from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS, numbers
+from cfmkit.families.slider_crank.printed.findings import RULES
+from cfmkit.families.slider_crank.printed.scalar_results import QUANTITIES
 from cfmkit.families.slider_crank.printed.solution import Solution
-from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
-from cfmkit.results import Quantity, Result, Status
+from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
@@ -57,15 +57,13 @@ _NAMES = {
 }
 
 
-def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     """Return the force of a printed slider-crank over its slider's travel, with everything that is wrong with it.
 
     Parameters
     ----------
     spec : SliderCrankSpec
         With `mechanism.flexures` or `mechanism.beam`.
-    run : Run
-        Which metrics are looked at: values and findings that none of them needs are left out.
 
     Returns
     -------
@@ -106,14 +104,15 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         side,
         spec.analysis.accuracy,
         spec.mechanism.copies == "mirrored",
+        spec,
     )
     return Result(
         spec=spec,
         status=Status.PARTIAL if reported else Status.COMPLETE,
         message=reported[0].message if reported else "",
         curves=(_curve(solution),),
-        values=_values(solution) if run.wants(OF_SPRINGS | DEFINITIONS) else {},
-        warnings=(*reported, *findings_of(spec, solution)) if run.wanted is None else reported,
+        values=values_of_one(QUANTITIES, solution),
+        warnings=LazySequence(lambda: (*reported, *findings_of_one(RULES, finding, solution))),
         travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
@@ -155,26 +154,12 @@ def as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCr
 
 
 def _curve(solution: Solution) -> Curve:
-    stress: FloatArray = solution.stress
-    extra = {
-        "max_stress": Column(stress, "stress"),
-        "stress_place": Column(solution.place, "length"),
-        "side_force": Column(solution.side_force, "force"),
-        "guide_moment": Column(solution.guide_moment, "torque"),
-        "energy": Column(solution.energy, "energy"),
+    columns: dict[str, Callable[[], Column]] = {
+        "max_stress": lambda: Column(solution.stress, "stress"),
+        "stress_place": lambda: Column(solution.place, "length"),
+        "side_force": lambda: Column(solution.side_force, "force"),
+        "guide_moment": lambda: Column(solution.guide_moment, "torque"),
+        "energy": lambda: Column(solution.energy, "energy"),
     }
+    extra = LazyMapping(columns, lambda name: columns[name]())
     return Curve(solution.travel, solution.force, stable=solution.stable, extra=extra)
-
-
-def _values(solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results; those of springs and pins are there without a value."""
-    found = {
-        name: Quantity(value, *_about(name), why if value is None else "") for name, value, why in numbers(solution)
-    }
-    for name in ("stiffness_class", "crank_pin_rotation_max"):
-        found[name] = Quantity(None, *OF_SPRINGS[name], "it belongs to springs at pins: see fidelity 'prb'")
-    return found
-
-
-def _about(name: str) -> tuple[str, str]:
-    return DEFINITIONS[name] if name in DEFINITIONS else OF_SPRINGS[name]

@@ -24,13 +24,12 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
 from cfmkit.families.slider_crank.printed.fem_stress_in_each_fillet import fillets
-from cfmkit.families.slider_crank.printed.findings import friction_left_out
+from cfmkit.families.slider_crank.printed.findings import left_out_friction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
-from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.material_and_part_spec import usual_fillet
@@ -134,7 +133,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
     solution = SolidSolution(spec, solved, reached, chain_of(spec, linkage, unloaded))
     complete = course.ending is PathEnd.COMPLETE
-    found = (*_findings(solution), *friction_left_out(spec))
+    found = tuple(_findings(solution))
     return Result(
         spec=spec,
         status=Status.COMPLETE if complete else Status.PARTIAL,
@@ -238,10 +237,9 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
         **solution.error.values(),
     }
-    names = [*DEFINITIONS, "energy_max", "stiffness_class", "crank_pin_rotation_max"]
-    about = OF_SPRINGS | DEFINITIONS
     found = {
-        name: Quantity(known.get(name), *about[name], ELSEWHERE if known.get(name) is None else "") for name in names
+        name: Quantity(known.get(name), *about, ELSEWHERE if known.get(name) is None else "")
+        for name, about in DEFINITIONS.items()
     }
     return found | largest_concentration(solution.fillets)
 
@@ -274,3 +272,5 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
             f"of the drawing, at {format_short(float(course.travel[worst]), 'length')} of travel; "
             f"the allowable stress is {format_short(limit, 'stress')}",
         )
+    if reported := left_out_friction(solution.spec):
+        yield finding("friction_left_out", reported)

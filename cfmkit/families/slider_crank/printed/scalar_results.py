@@ -2,64 +2,94 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.rows import ScalarQuantity
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.solution import Solution
 
+NO_STRENGTH = "the material has no 'yield_strength'"
+OF_PINS = "it belongs to springs at pins: see fidelity 'prb'"
 
-DEFINITIONS = {
-    "kink": (
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _absent(dimension: str, definition: str, reason: str) -> ScalarQuantity[Solution]:
+    return ScalarQuantity(dimension, definition, lambda _: math.nan, reason)
+
+
+def _run_in(share: float) -> ScalarQuantity[Solution]:
+    return ScalarQuantity(
         "length",
-        "offset of the crank pin from the line between pivot and slider pin, unloaded; left is positive",
-    ),
-    "run_in_95": ("length", "travel at which the force first reaches 95 % of its mean in the window"),
-    "run_in_98": ("length", "travel at which the force first reaches 98 % of its mean in the window"),
-    "side_force_max": ("force", "largest transverse force of the slider on its guide"),
-    "guide_moment_max": ("torque", "largest moment of the slider on its guide"),
-    "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`"),
-    "stress_place": ("length", "position of the largest stress along the centre line from the clamped end"),
-    "stress_stroke": ("length", "travel at which the allowable stress is reached"),
-    "width_ratio": ("factor", "smallest width over thickness"),
-    **OF_SOLIDS,
-}
-
-
-def numbers(solution: Solution) -> Iterator[tuple[str, float | None, str]]:
-    """Yield name, value and, where there is none, the reason."""
-    yield "kink", kink(solution.chain.pins), ""
-    level = solution.level
-    for name, share in (("run_in_95", 0.95), ("run_in_98", 0.98)):
-        place = solution.first_at(share * level)
-        yield name, place, "" if place is not None else "the force does not reach it"
-    yield "side_force_max", _largest(solution.side_force), ""
-    yield "guide_moment_max", _largest(solution.guide_moment), ""
-    last = int(np.argmax(solution.stress))
-    yield "allowable_stress", solution.material.allowable_stress, "the material has no 'yield_strength'"
-    yield "stress_place", float(solution.place[last]), ""
-    yield "stress_stroke", *stress_stroke(solution)
-    yield "width_ratio", solution.width_ratio, ""
-    yield "energy_max", float(solution.energy.max()), ""
-    for name in OF_SOLIDS:
-        yield name, None, "only the model of the part as a solid has it"
-
-
-def stress_stroke(solution: Solution) -> tuple[float | None, str]:
-    """Return the travel at which the allowable stress is reached [m]; None with the reason."""
-    limit = solution.material.allowable_stress
-    if limit is None:
-        return None, "the material has no 'yield_strength'"
-    place = solution.first_at(limit, stress=True)
-    return place, "" if place is not None else "the stress stays below the allowable one"
+        f"travel at which the force first reaches {100 * share:.0f} % of its mean in the window",
+        lambda solution: _or_nan(solution.run_in(share)),
+        "the force does not reach it",
+    )
 
 
 def _largest(values: FloatArray) -> float:
     return float(np.abs(values).max())
+
+
+def stress_stroke(solution: Solution) -> float:
+    """Return the travel at which the allowable stress is reached [m]; NaN if it is not, or not known."""
+    limit = solution.material.allowable_stress
+    return math.nan if limit is None else _or_nan(solution.first_at(limit, stress=True))
+
+
+def _why_no_stroke(solution: Solution) -> str:
+    return NO_STRENGTH if solution.material.allowable_stress is None else "the stress stays below the allowable one"
+
+
+QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+    "kink": ScalarQuantity(
+        "length",
+        "offset of the crank pin from the line between pivot and slider pin, unloaded; left is positive",
+        lambda solution: kink(solution.chain.pins),
+    ),
+    "run_in_95": _run_in(0.95),
+    "run_in_98": _run_in(0.98),
+    "side_force_max": ScalarQuantity(
+        "force",
+        "largest transverse force of the slider on its guide",
+        lambda solution: _largest(solution.side_force),
+    ),
+    "guide_moment_max": ScalarQuantity(
+        "torque", "largest moment of the slider on its guide", lambda solution: _largest(solution.guide_moment)
+    ),
+    "allowable_stress": ScalarQuantity(
+        "stress",
+        "yield strength over `mechanism.safety_factor`",
+        lambda solution: _or_nan(solution.material.allowable_stress),
+        NO_STRENGTH,
+    ),
+    "stress_place": ScalarQuantity(
+        "length",
+        "position of the largest stress along the centre line from the clamped end",
+        lambda solution: solution.place[solution.stress.argmax()],
+    ),
+    "stress_stroke": ScalarQuantity(
+        "length", "travel at which the allowable stress is reached", stress_stroke, _why_no_stroke
+    ),
+    "width_ratio": ScalarQuantity("factor", "smallest width over thickness", lambda solution: solution.width_ratio),
+    "energy_max": ScalarQuantity(*OF_SPRINGS["energy_max"], lambda solution: solution.energy.max()),
+    **{name: _absent(*about, "only the model of the part as a solid has it") for name, about in OF_SOLIDS.items()},
+    "stiffness_class": _absent(*OF_SPRINGS["stiffness_class"], OF_PINS),
+    "crank_pin_rotation_max": _absent(*OF_SPRINGS["crank_pin_rotation_max"], OF_PINS),
+}
+"""Every scalar result of the model, in the order in which they are shown."""
+
+DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()}
+"""Name -> dimension and definition."""

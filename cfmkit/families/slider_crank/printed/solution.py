@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, Pressed
     from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.numerics.chebyshev_panels import ChebyshevPanels
 
 
@@ -152,6 +153,7 @@ class Solution(ShortRepr):
     side: int = 0  # to which it was to bend, as `Chain.press` takes it
     accuracy: float = 1e-7  # of the path, relative
     mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
+    spec: SliderCrankSpec | None = None  # None in a search, which has no findings
 
     @cached_property
     def _at(self) -> Any:
@@ -255,6 +257,10 @@ class Solution(ShortRepr):
         if self.course is not None:
             return self.course.first_at(level, int(stress))
         return first_at(self.travel, self.stress if stress else self.force, level)
+
+    def run_in(self, share: float) -> float | None:
+        """Return the travel at which the force first reaches a share of its mean [m]; None if nowhere."""
+        return self.first_at(share * self.level)
 
     @cached_property
     def width_ratio(self) -> float:

@@ -1,0 +1,132 @@
+"""Why a path of equilibria ends, and what the engine says of it, in the units of a user: the engine knows SI only."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica import PathStatus
+from cfmkit.elastica.mechanics.discretise import discretise, without_floor
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.families.beam.taut_beams import taut_beams
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.beam.spec import BeamSpec
+
+_NUMBER = r"(-?\d[\d.]*(?:e[+-]?\d+)?)"
+_PLACE = re.compile(rf"\b(at|near) {_NUMBER}(?![\d.e]| of )")  # not a share: "lost at 0.4 of the constant loads"
+_LENGTH = re.compile(rf"{_NUMBER} m\b")
+
+
+def drive_text(assembly: Assembly, value: float) -> str:
+    """Return a value of the drive [SI, of one copy] as the user reads it, of all copies together."""
+    return assembly.spec.mechanism.drive.text(value, assembly.parallel)
+
+
+def in_units(assembly: Assembly, text: str) -> str:
+    """Return a sentence of the engine with units."""
+    text = _LENGTH.sub(lambda found: format_short(float(found[1]), "length"), text)
+    return _PLACE.sub(lambda found: f"{found[1]} {drive_text(assembly, float(found[2]))}", text)
+
+
+STRETCH = "analysis.fidelity=extensible"
+
+_PARALLEL = 1e-9  # of its length a beam may leave the line of the drive: angles are read in degrees and rounded
+
+
+@dataclass(frozen=True)
+class PathEnding:
+    """One sentence, and what would change it, as ``--set`` takes it."""
+
+    message: str
+    cures: tuple[str, ...] = ()
+
+
+def ending_of(solution: Solution) -> PathEnding:
+    """Return why a path ended; a path that is complete has nothing to say."""
+    path = solution.path
+    said = in_units(solution.assembly, path.message or path.status.value)
+    rigid = solution.spec.fidelity == "inextensible"
+    taut: list[str] = []
+    kept = len(solution.keep) > 1
+    if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) and len(path):
+        taut = taut_beams(path, int(solution.keep[-1])) if kept else []
+        # points of the curve may be so far apart that they are pulled straight after the last of them, or the first
+        if not taut:
+            taut, kept = taut_beams(path, len(path) - 1), False
+    if not taut and len(solution.keep) < 2:
+        return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
+    if not taut:
+        return PathEnding(said)
+    if kept:
+        where = format_short(float(solution.motion[-1]), solution.motion_dimension)
+    else:
+        where = drive_text(solution.assembly, float(path.drive[-1]))
+    return PathEnding(
+        f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams cannot follow: allow stretching "
+        "('mechanism.axial: true')",
+        (STRETCH,),
+    )
+
+
+def _in_the_way(solution: Solution) -> str:
+    """Return the keys that may keep a mechanism from having a first pose."""
+    spec = solution.spec
+    mechanism = spec.mechanism
+    moved = [f"mechanism.nodes.{name}.moved" for name, node in mechanism.nodes.items() if node.moved is not None]
+    acting = [f"mechanism.{what}" for what in ("loads", "springs") if getattr(mechanism, what)]
+    keys = [*moved, *acting] or ["mechanism.drive", *(f"mechanism.nodes.{name}.support" for name in mechanism.nodes)]
+    said = f"check {', '.join(keys)}"
+    if spec.fidelity != "inextensible":
+        return said
+    along, tied = list(_along_the_drive(spec)), _over_determined(solution)
+    if tied and not set(tied) <= set(along):
+        reported = f"inextensible beams between places that do not move ({', '.join(tied)}) hold the network rigid"
+        return f"{said}; {reported}: leave one out, or set 'mechanism.axial: true'"
+    if along:
+        held = f"inextensible beams lie straight along the drive ({', '.join(along)})"
+        return f"{said}; {held}: let them stretch by 'mechanism.axial: true'"
+    return f"{said}; beams are inextensible: 'mechanism.axial: true' lets them stretch"
+
+
+def _over_determined(solution: Solution) -> list[str]:
+    """Return the beams whose forces equilibrium leaves open before any load: the network is held by more than it needs.
+
+    They are what the null vectors of the tangent have, where these move nothing.
+    """
+    arrays = discretise(solution.path.network, solution.path.load_case)
+    arrays = without_floor(arrays, np.flatnonzero(arrays.floored))
+    tangent = equations(arrays).linearise(np.zeros(len(arrays.free)), 0.0).tangent
+    _, sizes, rows = np.linalg.svd(tangent)
+    null = np.zeros((len(rows), arrays.size))
+    null[:, arrays.free] = rows
+    null = null[sizes <= _SINGULAR * sizes[0]]
+    if not len(null) or np.abs(null[:, : arrays.n_motions]).max(initial=0.0) > _STILL:
+        return []
+    forces = np.abs(null[:, arrays.elements.unknowns[:, -2:]]).max(axis=(0, 2))
+    names = [name for name, force in zip(arrays.elements.beam, forces.tolist(), strict=True) if force > _STILL]
+    return list(dict.fromkeys(names))
+
+
+_SINGULAR, _STILL = 1e-10, 1e-6  # of the largest singular value; motion or force of a null vector of length 1
+
+
+def _along_the_drive(spec: BeamSpec) -> Iterator[str]:
+    """Yield the straight beams whose ends lie one behind the other as seen along a force or a displacement."""
+    mechanism = spec.mechanism
+    direction = getattr(mechanism.drive, "direction", None)
+    if direction is None:
+        return
+    for name, beam in mechanism.beams.items():
+        way = np.subtract(mechanism.nodes[beam.end].at, mechanism.nodes[beam.start].at)
+        across = abs(way @ (-np.sin(direction), np.cos(direction)))
+        if beam.shape.is_straight and across <= _PARALLEL * np.hypot(*way):
+            yield name
