@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
@@ -224,6 +225,8 @@ def brief(value: Any) -> str:
     elif is_dataclass(value) and not isinstance(value, ShortRepr):
         is_short = all(isinstance(getattr(value, item.name), PLAIN) for item in fields(value))
         text = str(value) if is_short or type(value).__str__ is not object.__str__ else f"<{type(value).__name__}>"
+    elif isinstance(value, partial):  # its text has the arrays that it is called with
+        text = f"partial of {value.func.__name__}"
     else:
         text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= LONGEST_ITEM else text[: LONGEST_ITEM - 1] + "…"

@@ -62,7 +62,7 @@ def test_a_slider_moves_and_the_curve_and_the_badges_follow(page, tmp_path):
     expect(page.locator("#curve path.before").first).to_be_attached()
     expect(curve).not_to_have_attribute("d", before)
     page.keyboard.press("End")
-    expect(page.locator("#verdict strong")).to_have_text("a requirement is missed")
+    expect(page.locator("#verdict strong")).to_have_text("1 of 3 requirements missed")
     assert page.locator("#badges li.bad").count() > 0
     expect(page.locator("#mechanism svg")).to_be_visible()
     styled = "e => [...e.querySelectorAll('[data-style]')].every((part) => part.style.length > 0)"
@@ -77,7 +77,7 @@ def test_a_slider_moves_and_the_curve_and_the_badges_follow(page, tmp_path):
     page.locator("#save").click()
     expect(page.locator("#said")).to_contain_text("in the way")
     page.locator("#reset").click()
-    expect(page.locator("#verdict strong")).to_have_text("all requirements are met")
+    expect(page.locator("#verdict strong")).to_have_text("all 3 requirements met")
 
 
 def test_a_value_that_is_not_allowed_says_why_and_keys_can_be_found(page):

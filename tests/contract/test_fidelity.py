@@ -127,7 +127,7 @@ RANGE = np.linspace(0.0, 0.1, 11)
 def test_a_constant_offset_is_the_rms_the_mean_and_the_largest_of_the_difference():
     window = np.linspace(0.05, 0.3, 7)
     found = outcome(("coarse", result(curve(RANGE, 0.5))), ("fine", result(curve(window, 0.0))))
-    spans = found.windows["coarse"]
+    spans = found.differences(found.compared[0]).window
     assert (spans.lo, spans.hi) == (0.05, 0.1)
     metrics = found.metrics()
     assert {name: item.value for name, item in metrics.items()} == {

@@ -34,6 +34,9 @@ class Plan:
     def point(self, index):
         return tuple(self.values[index].tolist())
 
+    def block(self, start, stop):
+        return tuple(self.values[start:stop].T)
+
 
 def config(stem, **changes):
     return cfmkit.load(CONFIGS / f"{stem}.yaml").replace({"analysis.points": 25, **changes})

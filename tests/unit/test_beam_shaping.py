@@ -346,16 +346,11 @@ class Recorder:
     def __init__(self) -> None:
         self.keys: dict[str, Any] = {}
 
-    def find(self, key: str) -> int:
-        return list(self.keys).index(key) if key in self.keys else -1
+    def find(self, key: str) -> Any:
+        return self.keys.get(key)
 
-    def read(self, place: int, key: str) -> Any:
-        assert list(self.keys)[place] == key
-        return self.keys[key]
-
-    def add(self, key: str, record: Any) -> int:
+    def add(self, key: str, record: Any) -> None:
         self.keys[key] = record
-        return len(self.keys) - 1
 
 
 def test_finished_starts_are_noted_and_used_again() -> None:

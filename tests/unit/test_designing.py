@@ -114,16 +114,11 @@ class Recorder:
 
     keys: dict[str, Any] = field(default_factory=dict)
 
-    def find(self, key: str) -> int:
-        return list(self.keys).index(key) if key in self.keys else -1
+    def find(self, key: str) -> Any:
+        return self.keys.get(key)
 
-    def read(self, place: int, key: str) -> Any:
-        assert list(self.keys)[place] == key
-        return self.keys[key]
-
-    def add(self, key: str, record: Any) -> int:
+    def add(self, key: str, record: Any) -> None:
         self.keys[key] = record
-        return len(self.keys) - 1
 
 
 def test_what_a_start_found_is_the_same_read_from_its_record() -> None:

@@ -124,9 +124,7 @@ def test_a_truss_that_ends_without_force_misses_its_range(tmp_path, monkeypatch,
     monkeypatch.chdir(tmp_path)
     (tmp_path / "t.yaml").write_text(TRUSS, encoding="utf-8")
     assert main(["analyze", "t.yaml", "--no-plots"]) == ExitCode.REQUIREMENT_MISSED
-    assert "no value: the force at the end is zero within its numerical error" in " ".join(
-        capsys.readouterr().out.split()
-    )
+    assert "the force at the end is zero within" in " ".join(capsys.readouterr().out.split())
     found = cfmkit.analyze(cfmkit.load("t.yaml"))
     assert found.metrics["half_band"].value is None
     assert found.metrics["range_fraction"].value is None

@@ -212,7 +212,7 @@ def remedies_of_rules():
         for rule in nodes(path):
             if not (isinstance(rule, ast.Call) and isinstance(rule.func, ast.Name) and rule.func.id == "FindingRule"):
                 continue
-            name, _, sentence = rule.args
+            name, _, sentence, *_ = rule.args
             if isinstance(sentence, ast.Name) and isinstance(name, ast.Constant):
                 before = [one for one in functions if one.name == sentence.id and one.lineno < rule.lineno]
                 returned = (
@@ -248,7 +248,7 @@ def test_a_warning_that_states_a_key_with_its_value_has_it_as_a_command():
 
 def run(capsys, *words):
     """Return exit code, page and warnings of a command."""
-    code = main([*words, "-o", "out", "--no-plots"])
+    code = main([*words, "-v", "-o", "out", "--no-plots"])
     found = json.loads(Path("out/metrics.json").read_text(encoding="utf-8"))
     return code, capsys.readouterr().out, [item["name"] for item in found["warnings"]]
 
@@ -256,8 +256,8 @@ def run(capsys, *words):
 def commands_below(page, warning):
     """Return the commands that a page prints below a warning, or below the reason for which a run failed."""
     lines = page.splitlines()
-    heads = (f"warning  {warning}:", "failed ", "partial ")
-    start = next(k for head in heads for k, line in enumerate(lines) if line.startswith(head))
+    heads = (["warning", f"{warning}:"], ["failed"], ["partial"])
+    start = next(k for head in heads for k, line in enumerate(lines) if line.split()[: len(head)] == head)
     rest = itertools.takewhile(lambda line: line.startswith(" "), lines[start + 1 :])
     return [line.strip() for line in rest if line.strip().startswith("cfmkit ")]
 

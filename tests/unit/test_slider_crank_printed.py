@@ -545,15 +545,11 @@ def test_finished_starts_are_noted_and_a_second_run_begins_none(monkeypatch: pyt
     notes: dict[str, Any] = {}
 
     class Recorder:
-        def find(self, key: str) -> int:
-            return list(notes).index(key) if key in notes else -1
+        def find(self, key: str) -> Any:
+            return json.loads(notes[key]) if key in notes else None
 
-        def read(self, place: int, key: str) -> Any:
-            return json.loads(notes[key])
-
-        def add(self, key: str, record: Any) -> int:
+        def add(self, key: str, record: Any) -> None:
             notes[key] = json.dumps(record)
-            return len(notes) - 1
 
     task = StripTask(corners(), np.pi, ABS, 1.5, 1 * MM, 15 * MM, 0.05, "stroke", 15 * MM)
     wanted = task, Form(2, width=WIDTH), Ranges(np.tile([0.5, 2.0], (2, 1)), 15 * MM), 2, Run(notes=Recorder()), "x"

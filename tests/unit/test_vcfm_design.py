@@ -47,7 +47,7 @@ BARE = {
     "cfmkit": 1,
     "family": "vcfm",
     "mechanism": {
-        "material": {"youngs_modulus": "1477 MPa", "allowable_stress": "30 MPa"},
+        "material": {"youngs_modulus": "1477 MPa", "yield_strength": "30 MPa"},
         "positive": {"length": "27 mm", "angle": "7 deg", "thickness": "1.5 mm", "width": "10 mm"},
         "bistable": {"half_beams": 4, "length": "30 mm", "angle": "8 deg", "thickness": "1 mm", "width": "3.6 mm"},
     },

@@ -154,7 +154,7 @@ def test_beams_that_lie_on_each_other_bend_as_one_and_the_solid_says_so():
 def test_export_prints_the_warning_and_has_it_in_its_document(tmp_path, capsys):
     (tmp_path / "own.yaml").write_text(api.dumps(JOINED["crossing"][0]))
     assert main(["export", str(tmp_path / "own.yaml"), "-o", str(tmp_path / "out")]) == 0
-    assert "warning  joined_away_from_nodes: " in capsys.readouterr().out
+    assert "joined_away_from_nodes: drawn as one piece" in capsys.readouterr().out
     assert main(["export", str(tmp_path / "own.yaml"), "-o", str(tmp_path / "out"), "--json"]) == 0
     (warning,) = json.loads(capsys.readouterr().out)["warnings"]
     assert warning["name"] == "joined_away_from_nodes"

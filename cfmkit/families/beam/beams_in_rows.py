@@ -15,12 +15,14 @@ import numpy as np
 from cfmkit.elastica import PathStatus
 from cfmkit.elastica.results.paths_of_designs import PathsOfDesigns
 from cfmkit.errors import CfmError
+from cfmkit.families.beam.contacts import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.beam.findings import rules_of
 from cfmkit.families.beam.model import kind_of, solve
 from cfmkit.families.beam.scalar_results import QUANTITIES, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as OF_SURFACES
 from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule
+from cfmkit.metrics import split_name
 from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.numerics.one_blas_thread import one_blas_thread
@@ -38,13 +40,14 @@ ROWS_TOGETHER = 64
 """Mechanisms that are looked at together: their unknowns at 200 points take 20 MB."""
 
 COLUMNS = {name: each_quantity(quantity) for name, quantity in QUANTITIES.items()} | {
-    name: ScalarQuantity[SeveralSolutions[Solution]](*about, lambda _: np.nan) for name, about in OF_SURFACES.items()
+    split_name(name)[0]: ScalarQuantity[SeveralSolutions[Solution]](*about, lambda _: np.nan)
+    for name, about in (OF_SURFACES | OF_CONTACTS).items()
 }
-"""What studies may ask of rows; mechanisms that follow a surface are none."""
+"""What studies may ask of rows; mechanisms that follow a surface, or that may touch something, are none."""
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedBeams:
+class BeamRows:
     """Mechanisms of one kind (`cfmkit.families.rows.RowsSolution`)."""
 
     each: Sequence[Solution]
@@ -137,13 +140,13 @@ def _kind(solution: Solution) -> Hashable:
     return *arrays, kind_of(solution), solution.spec.stress, *stated
 
 
-def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[SolvedBeams]]]:
+def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[BeamRows]]]:
     """Yield (indices, mechanisms that are looked at together) of those whose paths go straight on."""
     for start in range(0, len(specs), ROWS_TOGETHER):
         alike: dict[Hashable, dict[int, Solution]] = {}
         for index, solution in _solutions(specs, range(start, min(start + ROWS_TOGETHER, len(specs)))).items():
             alike.setdefault(_kind(solution), {})[index] = solution
         for members in alike.values():
-            solved = SolvedBeams(tuple(members.values()))
+            solved = BeamRows(tuple(members.values()))
             rules = [each_rule(rule) for rule in rules_of(solved.each[0])]
             yield np.array(list(members)), SolvedRows(solved, COLUMNS, rules, np.ones(len(members), bool), traced=True)

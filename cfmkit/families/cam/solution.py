@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
+from cfmkit.arrays import Several, ShortRepr
 from cfmkit.families.cam.assembly import CLOSE, constant_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
@@ -227,9 +227,9 @@ class Solution(ShortRepr):
         places, stated = self.travel + self.origin, self.assembly.spec.analysis.window
         low, high = places[..., :1], places[..., -1:]
         if stated is None:
-            return low, high
+            return Several((low, high))
         ends = [between(stated, pair) for pair in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)]
-        return tuple(np.array(ends).T[..., None] if low.ndim > 1 else np.array(ends[0])[:, None])
+        return Several(np.array(ends).T[..., None] if low.ndim > 1 else np.array(ends[0])[:, None])
 
     @property
     def requested(self) -> Any:
@@ -327,8 +327,8 @@ class Solution(ShortRepr):
         return StressRows(read, at, self.column(np.nan if allowable is None else allowable))
 
 
-@dataclass(frozen=True, eq=False)
-class FlankSamples:
+@dataclass(frozen=True, eq=False, repr=False)
+class FlankSamples(ShortRepr):
     """Contacts on the flank: the samples there, and before them the place at which the roller leaves the corner."""
 
     solution: Solution  # the mechanisms
@@ -383,10 +383,11 @@ class FlankSamples:
 
 
 def _forces_behind(first: Forces, rest: Forces) -> Forces:
-    def inside() -> tuple[FloatArray, FloatArray]:
-        return _behind(first.contact, rest.contact), _behind(first.brace, rest.brace)
+    return Forces(_behind(first.slider, rest.slider), partial(_inside_behind, first, rest))
 
-    return Forces(_behind(first.slider, rest.slider), inside)
+
+def _inside_behind(first: Forces, rest: Forces) -> tuple[FloatArray, FloatArray]:
+    return _behind(first.contact, rest.contact), _behind(first.brace, rest.brace)
 
 
 def _behind(first: Any, rest: Any) -> Any:

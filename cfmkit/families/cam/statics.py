@@ -189,14 +189,27 @@ def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -
         with np.errstate(divide="ignore", invalid="ignore"):
             pull = np.where(idle, at_dead_point(slope, states.bend, parts, friction), pull)
 
-    def inside() -> tuple[FloatArray, FloatArray]:
-        contact = over(load_on_contact(slope, tangent, spring, weight), lever)
-        if is_limit:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                contact = np.where(idle, load_on_contact(slope, tangent, 0.5 * pull) / turn, contact)
-        return contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent)
+    limit = (idle, turn) if is_limit else None
+    return Forces(
+        pull + loads.slider_weight, partial(_inside, (slope, tangent, spring, weight), lever, 0.5 * pull, limit)
+    )
 
-    return Forces(pull + loads.slider_weight, inside)
+
+def _inside(
+    loaded: tuple[Any, ...], lever: FloatArray, half_pull: FloatArray, limit: tuple[Any, Any] | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the forces at a contact and in a brace [N].
+
+    `loaded`: the arguments of `load_on_contact`; `half_pull`: half of what the slider is pulled with [N]; `limit`:
+    where forces are those of the dead point, and 1 + mu f.
+    """
+    slope, tangent, *_ = loaded
+    contact = over(load_on_contact(*loaded), lever)
+    if limit is not None:
+        idle, turn = limit
+        with np.errstate(divide="ignore", invalid="ignore"):
+            contact = np.where(idle, load_on_contact(slope, tangent, half_pull) / turn, contact)
+    return contact, half_pull * np.sqrt(1.0 + tangent * tangent)
 
 
 def over(load: FloatArray, lever: FloatArray) -> FloatArray:
