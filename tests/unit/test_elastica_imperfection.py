@@ -71,7 +71,8 @@ def test_the_sign_chooses_the_side_and_the_size_is_the_deviation_of_the_shape() 
 def test_a_path_without_bifurcation_gets_no_imperfection_and_says_so() -> None:
     path, plain = pressed(1e-5, thickness=1.4e-3), pressed(thickness=1.4e-3)
     assert path.imperfection == "none: the perfect path has no bifurcation"
-    np.testing.assert_array_equal(path.effort, plain.effort)
+    np.testing.assert_array_equal(path.at.z, plain.at.z)
+    np.testing.assert_allclose(path.effort, plain.effort, rtol=1e-14)
 
 
 def test_an_imperfection_must_be_finite() -> None:
