@@ -24,13 +24,13 @@ from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
+from cfmkit.studies.parts.outcomes import analyze_parts
+from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Metric, Row, Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
 from cfmkit.studies.varied_axes import axes, wish
-from cfmkit.studies.yield_of_drawn_parts import judge
 
 ROOT = Path(__file__).parents[1]
 SPEC = cfmkit.load(ROOT / "configs" / "cam.yaml").replace({"requirements": ()})
@@ -136,10 +136,10 @@ def main() -> None:
 def made_parts(count: int = 192) -> None:
     """Judge parts of the beams of Lan as a yield does: half band, largest stress, mean force."""
     spec = cfmkit.load(ROOT / "configs" / "studies" / "beam_lan2010_yield.yaml")
-    nominal, made = cfmkit.analyze(spec), tolerances_of(spec, spec.design, 0)
-    values = made.drawn(count, 5)
+    nominal, made = cfmkit.analyze(spec), Parts.of_design(spec, spec.design, 0)
+    values = made.draw(count, 5)
     start = time.process_time()
-    judge(made, values, nominal, Run())
+    analyze_parts(made, values, nominal, Run())
     print(f"a made part of Lan's     {1e3 * (time.process_time() - start) / count:.1f} ms   (allowed 12.5)")
 
 

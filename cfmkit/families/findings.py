@@ -110,6 +110,11 @@ def too_soft(share: float, where: str) -> str:
     )
 
 
+def stiffer(share: float) -> str:
+    """Return the same in short."""
+    return f"force at least {percent(share)} larger: beams cannot curl across their width"
+
+
 def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bool) -> str:
     """Return what the finding `wide_beam` says of a part that is solved in plane stress; nothing of a narrow one.
 

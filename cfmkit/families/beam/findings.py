@@ -18,7 +18,7 @@ from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
 from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units
 from cfmkit.families.beam.scalar_results import within
-from cfmkit.families.findings import finder, too_soft
+from cfmkit.families.findings import finder, stiffer, too_soft
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
 
@@ -319,20 +319,20 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
     return FindingRule("thick_beam", is_short, sentence)
 
 
-def _softness(solution: Solution) -> str:
-    """Return by how much beams are too soft that are solved as narrow ones; empty if they are not."""
+def _hindered(solution: Solution) -> tuple[float, str]:
+    """Return by what share of their energy beams that are solved as narrow ones are too soft, and where."""
     if not _has_curve(solution) or solution.spec.mechanism.wide_beams:
-        return ""
+        return 0.0, ""
     found = hindered_curling(solution.path)
     share, beam = found.share[solution.keep], found.beam[solution.keep]
     worst = int(share.argmax())
     place = format_short(float(solution.motion[worst]), solution.motion_dimension)
-    return too_soft(float(share[worst]), f"at {place}, most of it in beam {beam[worst]}")
+    return float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"
 
 
 def _wide_beams(solution: Solution) -> Sentence:
     wide, narrow = "mechanism.wide_beams=true", solution.spec.analysis.modes  # frequencies are of narrow beams only
-    return _softness(solution), (wide, "analysis.modes=0") if narrow else wide
+    return too_soft(*_hindered(solution)), (wide, "analysis.modes=0") if narrow else wide
 
 
 def _gap_of(solution: Solution, moving: bool) -> BeamGap | None:
@@ -420,12 +420,25 @@ RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("flutter", _flutters, _growing_oscillations),
     FindingRule("inaccurate", lambda solution: (~solution.accurate).any(), _inaccurate_points),
     FindingRule("imperfection", lambda solution: bool(solution.path.imperfection), _bent_beams),
-    FindingRule("overstressed", _is_overstressed, _too_large_stress),
+    FindingRule(
+        "overstressed",
+        _is_overstressed,
+        _too_large_stress,
+        lambda solution: (
+            f"{format_short(_largest_stress(solution), 'stress')} in the window, "
+            f"{format_short(_least_allowable_stress(solution), 'stress')} allowed"
+        ),
+    ),
 )
 """Of all mechanisms, in the order in which they are shown."""
 
 LAST_RULES: tuple[FindingRule[Solution], ...] = (
-    FindingRule("wide_beam", lambda solution: bool(_softness(solution)), _wide_beams),
+    FindingRule(
+        "wide_beam",
+        lambda solution: bool(too_soft(*_hindered(solution))),
+        _wide_beams,
+        lambda solution: stiffer(_hindered(solution)[0]),
+    ),
     FindingRule("beams_touch", _touches, _touching_beams),
     FindingRule("gap_small", _has_small_gap, _small_gap),
 )

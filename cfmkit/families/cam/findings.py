@@ -184,7 +184,8 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
 
 def _undercut_in_short(solution: Solution) -> str:
     law = solution.assembly.track.profile.path.law
-    return f"force not {'constant' if law.constant else 'as cut for'} over the first {mm(solution.corner_travel)}"
+    what = "no constant force" if law.constant else "force not as cut"
+    return f"{what} for the first {mm(solution.corner_travel)}"
 
 
 def _two_contacts(solution: Solution) -> tuple[str, ...]:
@@ -352,7 +353,12 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     number = max(map(len, solution.all_jams))
     return (
         FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
-        FindingRule("contact_not_single_valued", _is_undercut, _two_contacts),
+        FindingRule(
+            "contact_not_single_valued",
+            _is_undercut,
+            _two_contacts,
+            lambda one: f"contact on a corner for the first {mm(one.corner_travel)}",
+        ),
         FindingRule(
             "corner_pressure",
             lambda one: one.mechanism.contact is not None and _is_undercut(one),

@@ -222,8 +222,8 @@ class Solution(ShortRepr):
     # --- as metrics see it ------------------------------------------------------------------------------------------
 
     @property
-    def window(self) -> tuple[Any, Any]:
-        """Ends of the window of the analysis, else of the travel [m], numbers or (m, 1)."""
+    def window(self) -> Several[Any]:
+        """Both ends of the window of the analysis, else of the travel [m], numbers or (m, 1)."""
         places, stated = self.travel + self.origin, self.assembly.spec.analysis.window
         low, high = places[..., :1], places[..., -1:]
         if stated is None:

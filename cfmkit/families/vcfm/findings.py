@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton, percent, rate, too_soft
+from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton, percent, rate, stiffer, too_soft
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
 from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
@@ -21,6 +21,7 @@ from cfmkit.families.vcfm.range_of_closed_forms import (
     is_stocky,
     leaves_out_of_range,
     range_of_leaves,
+    range_of_leaves_in_short,
     range_of_spring,
     spring_out_of_range,
     stocky_leaves,
@@ -351,6 +352,13 @@ def _overstress(solution: Solution) -> Sentence:
     )
 
 
+def _overstress_in_short(solution: Solution) -> str:
+    (leaves, spring), allowed = _shares_of_stress(solution), float(solution.allowable_stress[0])
+    if leaves[0] > spring[0].max():
+        return f"{mpa(float(solution.travel_leaf_stress[0]))} in the leaves, {mpa(allowed)} allowed"
+    return f"{mpa(float(solution.travel_spring_stress[0].max()))} in the spring, {mpa(allowed)} allowed"
+
+
 def _turning_shuttle(solution: Solution) -> Sentence:
     hint = "" if solution.fidelity in TRACED else "; only 'analysis.fidelity: exact' shows it"
     return (
@@ -387,7 +395,9 @@ def _wide(name: str) -> FindingRule[Solution]:
         cure = wide if exact else (wide, "analysis.fidelity=exact")
         return too_soft(share, f"in the {name} at {mm(place)}") + hint, cure
 
-    return FindingRule("wide_beam", holds, sentence)
+    return FindingRule(
+        "wide_beam", holds, sentence, lambda solution: stiffer(float(solution.hindered_curling[name][0][0]))
+    )
 
 
 def _is_wavy(solution: Solution) -> Any:
@@ -425,7 +435,15 @@ RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _truss),
     FindingRule("no_negative_stiffness", _only_rises, _rising_force),
     FindingRule("no_linear_region", _is_rounded, _rounded_force),
-    FindingRule("not_flat", _is_not_flat, _uneven_force),
+    FindingRule(
+        "not_flat",
+        _is_not_flat,
+        _uneven_force,
+        lambda solution: (
+            f"force varies by {percent(ripple_inside(solution, solution.window))}, "
+            f"{percent(solution.spec.analysis.flatness)} allowed"
+        ),
+    ),
     FindingRule("bistable", _stays, _second_position),
     FindingRule("force_reversal", _reverses, _reversal),
     FindingRule("overload", _is_overloaded, _overload),
@@ -437,7 +455,7 @@ RULES: tuple[FindingRule[Solution], ...] = (
         lambda solution: (_least_preload(solution) < 0) & (solution.spec.mechanism.springs is not None),
         _slack,
     ),
-    FindingRule("overstressed", _is_overstressed, _overstress),
+    FindingRule("overstressed", _is_overstressed, _overstress, _overstress_in_short),
     FindingRule(
         "asymmetric_buckling",
         lambda solution: solution.column(lambda spec: not spec.mechanism.bistable.guided) > 0,
@@ -449,7 +467,7 @@ RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("imperfection", _is_wavy, _imperfection),
     FindingRule("unstable_branch", _is_unstable, _unstable_branch),
     FindingRule("theory_range", is_stocky, stocky_leaves),
-    FindingRule("theory_range", leaves_out_of_range, range_of_leaves),
+    FindingRule("theory_range", leaves_out_of_range, range_of_leaves, range_of_leaves_in_short),
     FindingRule("theory_range", spring_out_of_range, range_of_spring),
 )
 """Every finding of an analysis, the gravest first."""

@@ -65,6 +65,17 @@ def range_of_leaves(solution: Solution) -> Sentence:
     )
 
 
+def range_of_leaves_in_short(solution: Solution) -> str:
+    """Return the same in short; empty where the sentence is short enough."""
+    if (
+        solution.leaf_kind.shortcoming is not None
+        or _slimness(solution)[0] > THICK
+        or float(solution.parts.strip.angle) > STEEP
+    ):
+        return ""
+    return f"closed forms are off by several per cent beyond {mm(RELIABLE * float(solution.parts.balance))} of travel"
+
+
 def _worst_compression(solution: Solution, limits: tuple[float, float]) -> FloatArray:
     """Return by how much the spring is compressed, or negative stretched, where that matters most, (m,) [m]."""
     pressed, stretched = limits

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import hindered_curling
-from cfmkit.families.findings import at_most, mm, mpa, newton, too_soft
+from cfmkit.families.findings import at_most, mm, mpa, newton, stiffer, too_soft
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
@@ -134,13 +134,13 @@ def _narrow_part(solution: Solution) -> Sentence:
     )
 
 
-def _softness(solution: Solution) -> str:
-    """Return by how much strip or flexures are too soft that are solved as narrow ones; empty if they are not."""
+def _hindered(solution: Solution) -> tuple[float, str]:
+    """Return by what share of its energy a part that is solved as a narrow one is too soft, and where."""
     if _mechanism(solution).wide_beams:
-        return ""
+        return 0.0, ""
     share = hindered_curling(solution.pressed.path).share[solution.pressed.path.at_requested]
     worst = int(share.argmax())
-    return too_soft(float(share[worst]), f"at {mm(float(solution.travel[worst]))}")
+    return float(share[worst]), f"at {mm(float(solution.travel[worst]))}"
 
 
 def _side_share(solution: Solution) -> tuple[int, float]:
@@ -164,25 +164,41 @@ def _burdened_guide(solution: Solution) -> Sentence:
     )
 
 
+def _burden(solution: Solution) -> str:
+    worst, share = _side_share(solution)
+    return f"{newton(float(abs(solution.side_force[worst])))} on the guide, {100 * share:.0f} % of the force"
+
+
 def _left_out_friction(solution: Solution) -> str:
     assert solution.spec is not None
     return left_out_friction(solution.spec)
 
 
 RULES: tuple[FindingRule[Solution], ...] = (
-    FindingRule("overstressed", _is_overstressed, _too_large_stress),
+    FindingRule(
+        "overstressed",
+        _is_overstressed,
+        _too_large_stress,
+        lambda solution: f"{mpa(float(solution.stress.max()))} beyond {mm(stress_stroke(solution))} of travel",
+    ),
     FindingRule("force_negative", lambda solution: _pulls(solution).any(), _pulling_chain),
     FindingRule("straight_start", _is_straight, _straight_chain),
-    FindingRule("kink_too_small", _is_kink_too_small, _small_kink),
+    FindingRule(
+        "kink_too_small",
+        _is_kink_too_small,
+        _small_kink,
+        lambda solution: f"kink of {mm(_offset(solution))}, {mm(_mechanism(solution).resolved[0] or 0.0)} can be made",
+    ),
     FindingRule("long_run_in", _runs_in_long, _long_run_in),
     FindingRule("too_thin", _is_too_thin, _thin_place),
     FindingRule("lateral_buckling", lambda solution: solution.width_ratio < THINNEST_RATIO, _narrow_part),
     FindingRule(
         "wide_beam",
-        lambda solution: bool(_softness(solution)),
-        lambda solution: (_softness(solution), "mechanism.wide_beams=true"),
+        lambda solution: bool(too_soft(*_hindered(solution))),
+        lambda solution: (too_soft(*_hindered(solution)), "mechanism.wide_beams=true"),
+        lambda solution: stiffer(_hindered(solution)[0]),
     ),
-    FindingRule("side_force", _burdens_guide, _burdened_guide),
+    FindingRule("side_force", _burdens_guide, _burdened_guide, _burden),
     FindingRule(
         "friction_left_out",
         lambda solution: bool(_left_out_friction(solution)),
