@@ -220,6 +220,7 @@ class Note(NamedTuple):
     tone: str = LABEL
     whole: bool = False  # whether a short page has all of it, too: how a run ended
     short: str = ""  # what a short page has instead; empty: the clauses of the text that fit
+    is_command: bool = False  # whether the text is a command: it is copied, and never broken
 
 
 class WarningEntry(NamedTuple):

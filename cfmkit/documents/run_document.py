@@ -153,7 +153,7 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
         cures = dict.fromkeys(cure for item in _reasons(report) for cure in item.cures)
         for cure in cures:
             text = command.with_remedy(cure) if command else command_line(*_settings(cure))
-            yield Note("remedy", text, whole=True)
+            yield Note("remedy", text, is_command=True)
     elif design is not None and design.message != design.status.value:
         yield Note("design", design.message)
     if design is not None and design.nearest_feasible:

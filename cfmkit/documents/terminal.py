@@ -131,6 +131,8 @@ def _word(word: str, tone: str = LABEL) -> Span:
 
 def _note_lines(note: Note, width: int) -> list[TextLine]:
     room = width - INDENT - WORDS
+    if note.is_command:
+        return [whole_line(_word(note.word, note.tone), note.text)]
     if note.whole:
         lines = textwrap.wrap(note.text, room, break_long_words=False, break_on_hyphens=False) or [""]
         return [whole_line(_word(note.word if not at else "", note.tone), text) for at, text in enumerate(lines)]
@@ -290,7 +292,10 @@ def _whole_page(document: Document) -> Iterator[Block]:
         yield _grid(table, table.rows)
         yield BLANK
     for note in document.notes:
-        yield Paragraph(note.word, note.text + (f": {note.remedy}" if note.remedy else ""), note.tone)
+        if note.is_command:
+            yield whole_line(Span(f"{note.word:<{MARGIN}}", note.tone), note.text)
+        else:
+            yield Paragraph(note.word, note.text + (f": {note.remedy}" if note.remedy else ""), note.tone)
     for one in document.warnings:
         yield Paragraph("warning", f"{one.name}: {one.text}" + (":" if one.commands else ""), BAD)
         yield from (whole_line(" " * MARGIN + command) for command in one.commands)

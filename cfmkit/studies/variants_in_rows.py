@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.rows import Variants
+from cfmkit.families.rows import Variants, valid
 from cfmkit.metrics import other_name, split_name
 from cfmkit.metrics.branches_cut_to_window import TOLERANCE
 from cfmkit.metrics.metric_values import worst_branch
@@ -201,11 +201,10 @@ def are_solved_together(study: Study, plan: Plan) -> int:
     indices = sorted({0, len(plan) // 2, len(plan) - 1})
     try:
         variants = _variants(study, plan, indices)
-        for index in range(len(variants)):
-            variants[index]  # raises where one is not valid
+        known = sum(1 for _ in valid(variants))  # of those that are not valid each says so by itself
         found = [(members, SolvedVariants(study, variants, members, part)) for members, part in solve(variants)]
         traced = any(part.solved.traced for _, part in found)
-        together = sum(len(members) for members, _ in found) == len(variants) and all(part.known for _, part in found)
+        together = 0 < sum(len(members) for members, _ in found) == known and all(part.known for _, part in found)
     except CfmError:
         return 0
     if not together or (study.curves and traced):

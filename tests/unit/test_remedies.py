@@ -259,7 +259,9 @@ def commands_below(page, warning):
     heads = (["warning", f"{warning}:"], ["failed"], ["partial"])
     start = next(k for head in heads for k, line in enumerate(lines) if line.split()[: len(head)] == head)
     rest = itertools.takewhile(lambda line: line.startswith(" "), lines[start + 1 :])
-    return [line.strip() for line in rest if line.strip().startswith("cfmkit ")]
+    said = [line.strip() for line in rest]
+    remedies = [line.removeprefix("remedy").strip() for line in lines if line.startswith("remedy ")]
+    return [line for line in said if line.startswith("cfmkit ")] or remedies
 
 
 @pytest.mark.parametrize("name", EVERY)
