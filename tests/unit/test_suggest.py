@@ -370,12 +370,12 @@ def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next
     monkeypatch.setattr("cfmkit.studies.suggest.proposal_making_and_judging.LONGEST", 0.0)
     asked = wish()
     offer = function_named(family("slider-crank").propose)(asked, Run())
-    designed = next(one for one in offer.candidates if one.design)
+    designed = next(one for one in offer.candidates if one.variant == "tapered strip")
     assert made(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
     kept = []
     monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY))
     monkeypatch.setattr(search, "nearest", lambda *_: {})
-    notes = SimpleNamespace(find=lambda _key: -1, add=lambda _key, record: kept.append(record))
+    notes = SimpleNamespace(find=lambda _key: None, add=lambda _key, record: kept.append(record))
     assert not suggest(wish(), Run(notes=notes)).proposals
     assert not any("variant" in record for record in kept)
 

@@ -53,8 +53,8 @@ STRESS = 0.95
 RIPPLES = (0.95, 1.02)
 """Shares of the ripple wished that the scaled curve may have: the second where no window has the first."""
 
-DEEPER = 1.02
-"""Width over the depth that may seem to be needed: stretch and shear make beams softer or stiffer by as much."""
+DEEPER = 0.99
+"""Width over the depth that may seem to be needed: stretch and shear make beams softer or stiffer by a per cent."""
 
 STOUT = 1.15
 """Largest thickness over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do."""
@@ -202,6 +202,8 @@ def _sized(
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
     promise = area if wish.good_parts is None else -thicker * thin
     strain = wish.strength_used * strength / material.modulus
+    layers = 1 if kept.spec.mechanism.copies is None else kept.spec.mechanism.copies.layers
+    promise += layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(wish, wide, thicker * thin, strain)
     variant = called(f"shape {kept.name}", wish, block)
     here = "cfmkit.families.beam.proposals_for_wish"

@@ -424,6 +424,8 @@ def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, known: 
         with np.errstate(all="ignore"):
             columns.append(curves.all_at(places))
         if curves.stress is not None:
+            if not curves.stress.samples:  # traced paths: a part alone is solved at these places
+                return None
             # between the points of its curve, as of a part alone
             points = curves.stress.samples[0]
             each = zip(points.motion, points.values, points.count.tolist(), strict=True)
