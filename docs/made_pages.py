@@ -169,7 +169,7 @@ def _commands() -> str:
 def _printed(main: Any, arguments: Sequence[str]) -> str:
     """Return what a command prints on a page of 84 columns, which a page of the site has room for, without colours."""
     before = dict(os.environ)
-    os.environ |= {"COLUMNS": "84", "TERMINAL_WIDTH": "84", "NO_COLOR": "1"}
+    os.environ |= {"COLUMNS": "84", "NO_COLOR": "1"}  # typer keeps a TERMINAL_WIDTH for good
     into = io.StringIO()
     try:
         with contextlib.redirect_stdout(into):
