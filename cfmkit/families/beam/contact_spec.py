@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -94,9 +95,9 @@ class ObstacleBase(Model):
         None, description="of the obstacle at a pad; default: it is rigid"
     )
 
+    @abstractmethod
     def outline(self) -> ObstacleEdge:
         """Return its edge, the free side to the left."""
-        raise NotImplementedError
 
 
 class LineObstacle(ObstacleBase):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -149,9 +150,9 @@ class LinkSpec(Model):
 class SpringElement(Model):
     """Base of the kinds of springs: a new one is a class here and its name in `SpringSpec`."""
 
+    @abstractmethod
     def build(self) -> engine.Spring:
         """Return the spring as the engine has it."""
-        raise NotImplementedError
 
 
 class LineSpringSpec(SpringElement):
@@ -223,9 +224,9 @@ class Load(Model):
         """Whether it is not zero."""
         return any(getattr(self, name) != 0 for name in self.sizes)
 
+    @abstractmethod
     def build(self, share: float = 1.0) -> engine.LoadOn:
         """Return a share of the load as the engine has it."""
-        raise NotImplementedError
 
 
 class PointLoadSpec(Load):

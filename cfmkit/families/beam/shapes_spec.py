@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
@@ -47,9 +48,9 @@ class Shape(Model):
 
     is_straight: ClassVar[bool] = False
 
+    @abstractmethod
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        raise NotImplementedError
 
     def find_faults(self, reach: float) -> Iterator[tuple[str, str]]:
         """Yield the keys and the reasons why it cannot be fitted between ends so far apart [m]."""
