@@ -213,7 +213,7 @@ def _supports(solution: Solution, ax: Axes) -> None:
 
 
 def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, float], poses: list[int]) -> None:
-    """Draw obstacles, the bars of stops at the ends of their gaps, and a dot where a pad touches in a pose."""
+    """Draw obstacles, bars of stops at the ends of their gaps, and node and rim of each pad that touches in a pose."""
     path, size = solution.path, max(box[2] - box[0], box[3] - box[1])
     outlines = {
         contact.name: contact.outline for contact in path.network.contacts if isinstance(contact, NodeOnObstacle)
@@ -238,6 +238,12 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
             for at_pad in _both(solution, [place]):
                 ax.plot(*parts.mm(at_pad[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
                         gid=f"touch-{number}-{pose}")  # fmt: skip
+            if isinstance(contact, Stop):
+                continue
+            turn = np.linspace(0.0, 2.0 * np.pi, 61)
+            rim = contact.radius * np.column_stack([np.cos(turn), np.sin(turn)])
+            for image, line in enumerate(_both(solution, [place + rim])):
+                parts.edge(ax, line, f"pad-{number}-{pose}-{image}", color=color, linewidth=0.8, zorder=4.4)
 
 
 def reactions(result: Result) -> Figure:
