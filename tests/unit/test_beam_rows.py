@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from given_points import GivenPoints
 
 import cfmkit
 from cfmkit.elastica.results.paths_of_designs import PathsOfDesigns
@@ -20,22 +21,6 @@ BEAMS = sorted(path.stem for path in CONFIGS.glob("beam_*.yaml"))
 LAN = "beam_lan2010"
 EXTREMES = {"peak_force", "peak_displacement", "valley_force", "valley_displacement"}
 """Places of flat extremes: of what is left in the last digits of forces they keep the root."""
-
-
-class Plan:
-    """Points of a study, one a row."""
-
-    def __init__(self, values):
-        self.paths, self.values = tuple(values), np.stack(list(values.values()), axis=1)
-
-    def __len__(self):
-        return len(self.values)
-
-    def point(self, index):
-        return tuple(self.values[index].tolist())
-
-    def block(self, start, stop):
-        return tuple(self.values[start:stop].T)
 
 
 def config(stem, **changes):
@@ -55,7 +40,7 @@ def varied(spec, draw, count):
 
 def check_rows_against_single_runs(spec, values, names=()):
     """Compare the rows of a study with a run of each of its points; return whether they were solved together."""
-    plan = Plan(values)
+    plan = GivenPoints(values)
     metrics = metrics_of(spec, names, cfmkit.analyze(spec).curves[0])
     study = Study(spec, plan.paths, metrics)
     together = evaluate_rows(study, plan, 0, len(plan))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from given_points import GivenPoints
 
 import cfmkit
 from cfmkit.families.cam.cams_in_rows import solve_rows
@@ -66,23 +67,9 @@ class Listed(Work):
     """Points of a study, given one by one."""
 
     def __init__(self, spec, values):
-        super().__init__(Study(spec, tuple(values), metrics_of(spec, (), cfmkit.analyze(spec).curve)), Points(values))
-
-
-class Points:
-    """A plan of given points."""
-
-    def __init__(self, values):
-        self.paths, self.columns = tuple(values), tuple(np.array(column) for column in values.values())
-
-    def __len__(self):
-        return len(self.columns[0])
-
-    def point(self, index):
-        return tuple(column[index].item() for column in self.columns)
-
-    def block(self, start, stop):
-        return tuple(column[start:stop] for column in self.columns)
+        super().__init__(
+            Study(spec, tuple(values), metrics_of(spec, (), cfmkit.analyze(spec).curve)), GivenPoints(values)
+        )
 
 
 def members(many):
@@ -227,7 +214,7 @@ def test_a_sweep_over_any_number_with_the_requirements_of_its_own_is_solved_in_r
     spec = config(stem)
     for path, value in spec.leaves():
         if path.startswith("mechanism.") and isinstance(value, float) and value and ".wound." not in path:
-            plan = Points({path: np.array([value, value * (1 + 1e-4 if "_factor" in path else 1 - 1e-4)])})
+            plan = GivenPoints({path: np.array([value, value * (1 + 1e-4 if "_factor" in path else 1 - 1e-4)])})
             assert are_solved_together(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan), path
 
 

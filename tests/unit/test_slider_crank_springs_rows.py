@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from given_points import GivenPoints
 from slider_crank import config
 
 import cfmkit
@@ -29,22 +30,6 @@ SPRUNG = (
 """Configurations with springs at joints."""
 
 
-class Plan:
-    """Points of a study, one a row."""
-
-    def __init__(self, values):
-        self.paths, self.values = tuple(values), np.stack(list(values.values()), axis=1)
-
-    def __len__(self):
-        return len(self.values)
-
-    def point(self, index):
-        return tuple(self.values[index].tolist())
-
-    def block(self, start, stop):
-        return tuple(self.values[start:stop].T)
-
-
 def varied(spec, draw, count):
     """Return some numbers of a specification at random, up to three of them: path -> values around its own."""
     own = {
@@ -58,7 +43,7 @@ def varied(spec, draw, count):
 
 def check_rows_against_single_runs(spec, values):
     """Compare the rows of a study with a run of each of its points; return its metrics and what is wrong where."""
-    plan = Plan(values)
+    plan = GivenPoints(values)
     study = Study(spec, plan.paths, metrics_of(spec, (), cfmkit.analyze(spec).curves[0]))
     together = evaluate_rows(study, plan, 0, len(plan))
     sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
@@ -114,7 +99,7 @@ def test_a_sweep_with_every_column_is_solved_in_rows(stem):
     lengths = spec.mechanism.crank_length * np.array([0.99, 1.0, 1.01])
     names = [one for one in metrics_of(spec, (), cfmkit.analyze(spec).curves[0]) if one.name not in SINGLE]
     assert len(names) > 40
-    plan = Plan({"mechanism.crank_length": lengths})
+    plan = GivenPoints({"mechanism.crank_length": lengths})
     assert are_solved_together(Study(spec, plan.paths, tuple(names)), plan)
 
 
