@@ -18,6 +18,43 @@ SLACK = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
 
 
+TOPICS = {
+    "ripple": "ripple", "safety": "stress", "life": "life", "hysteresis": "hysteresis", "adjusted": "adjustment",
+    "link_turn": "stiffness",
+}  # fmt: skip
+"""Parts of names of metrics, and what a requirement on them is about; all others are about the force."""
+
+DISQUALIFYING = {
+    "stress": ("overstressed", "surface_stress_exceeded", "bearing_overloaded"),
+    "springs": (
+        "spring_overstretched", "spring_buckles", "spring_binds_on_pin", "spring_slack", "spring_closed",
+        "joint_overrotated",
+    ),
+    "force": ("lift_off", "tip_jams", "tip_lifts_off", "force_negative"),
+    "stability": ("unstable", "unstable_branch", "asymmetric_buckling", "out_of_plane_buckling"),
+    "clearance": ("parts_touch", "rollers_collide", "flanks_collide", "beams_touch", "meets_itself"),
+    "drawing": ("part_not_drawn", "joined_away_from_nodes"),
+}  # fmt: skip
+"""Warnings of an analysis with which a mechanism is no proposal, whatever its numbers say, by what they are about."""
+
+
+def topic_of(metric: str) -> str:
+    """Return what a requirement on a metric is about, in a word.
+
+    Examples
+    --------
+    >>> topic_of("force_ripple"), topic_of("link_safety_factor"), topic_of("force_mean")
+    ('ripple', 'stress', 'force')
+    """
+    return next((topic for part, topic in TOPICS.items() if part in metric), "force")
+
+
+def disqualifying(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield topic and sentence of every warning with which a mechanism is no proposal."""
+    for topic, names in DISQUALIFYING.items():
+        yield from ((topic, f"{one.name}: {one.message}") for one in result.warnings if one.name in names)
+
+
 def largest_force(request: Request, result: Result) -> float:
     """Return the largest mean of all branches, or of a band the largest force [N or N m]."""
     name = f"{request.kind}_{'max' if request.banded else 'mean'}"

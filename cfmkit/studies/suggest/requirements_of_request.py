@@ -38,7 +38,7 @@ def windows_of(spec: Spec, request: Request) -> tuple[dict[str, Any], ...]:
 
     Solids are solved at the ends of the windows of all requirements: with this one they are those of the finished file.
     """
-    return ({"metric": "safety_factor", "min": "1", "over": pressed(request, spec)},)
+    return ({"metric": "safety_factor", "min": f"{request.safety:.12g}", "over": pressed(request, spec)},)
 
 
 def demanded(
@@ -118,10 +118,11 @@ def _of_effort(request: Request) -> Iterator[dict[str, Any]]:
 
 
 def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+    least = f"{request.safety:.12g}"
     if _known(found, "safety_factor") is not None:
-        yield {"metric": "safety_factor", "min": "1", "over": pressed(request, result.spec)}
+        yield {"metric": "safety_factor", "min": least, "over": pressed(request, result.spec)}
     if _known(found, "link_safety_factor") is not None:
-        yield {"metric": "link_safety_factor", "min": "1"}
+        yield {"metric": "link_safety_factor", "min": least}
         yield {"metric": "link_turn_share_max", "max": STRAIGHT_LINKS}
 
 
