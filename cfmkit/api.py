@@ -297,7 +297,7 @@ def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
         Processes.
     **block
         As in the specification's block `sensitivity`, whose values they replace: `method`, `parameters`,
-        `samples`, `metrics`, `on_failure`, `seed`, ...
+        `samples`, `metrics`, `seed`, ...
 
     Raises
     ------
