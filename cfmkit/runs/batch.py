@@ -16,7 +16,7 @@ from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, li
 from cfmkit.metrics.compare import TOLERANCE
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.runs import batch_output_files
-from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
+from cfmkit.runs.run import FinishedRun, RunTask, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, gone
@@ -46,7 +46,7 @@ class BatchJob:
 class BatchWork:
     """What a worker needs to do any job of a batch."""
 
-    common: Request  # what holds for every specification; its folder is that of the batch
+    common: RunTask  # what holds for every specification; its folder is that of the batch
     verb: str | None  # ``design`` or ``analyze``; None: design what has a block `design`
     arguments: tuple[str, ...]  # the command line, for the manifests
     fresh: bool = False  # whether searches begin anew, too, where an earlier one was ended
@@ -425,7 +425,7 @@ def batch(
         addressed(change)
     named = _named(specs)
     files = sources(named, place)
-    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
+    common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)

@@ -111,7 +111,7 @@ class RunRequest(Protocol):
 
 
 @dataclass(frozen=True)
-class Request:
+class RunTask:
     """What a run is to do."""
 
     spec: str  # the file; ``-`` is standard input
@@ -127,7 +127,7 @@ class Request:
 
 
 def carry_out(
-    verb: Verb, wanted: Request, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
+    verb: Verb, wanted: RunTask, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
 ) -> FinishedRun:
     """Return what a run found, after writing its folder.
 
@@ -135,7 +135,7 @@ def carry_out(
     ----------
     verb : Verb
         What to compute.
-    wanted : Request
+    wanted : RunTask
         Of what, and where to.
     arguments : sequence of str
         The command line, for the manifest.
