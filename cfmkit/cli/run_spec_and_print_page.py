@@ -1,4 +1,4 @@
-"""What `design`, `analyze` and `calibrate` share: options in, the document of a run out."""
+"""Common part of `design`, `analyze` and `calibrate`: options in, the document of a run out."""
 
 from __future__ import annotations
 
