@@ -60,17 +60,17 @@ def page(name: str) -> GuidePage:
     cfmkit.errors.UsageError
         If there is none of that name.
     """
-    known = {each.name: each for each in pages()}
+    by_name = {guide_page.name: guide_page for guide_page in pages()}
     wanted = name.removeprefix("docs/").partition("#")[0].removesuffix(".md").replace("-", "_")
-    if wanted in known:
-        return known[wanted]
-    near = difflib.get_close_matches(wanted, known, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"`cfmkit docs --search {wanted}` searches them"
+    if wanted in by_name:
+        return by_name[wanted]
+    similar = difflib.get_close_matches(wanted, by_name, n=1)
+    hint = f"did you mean {similar[0]!r}?" if similar else f"`cfmkit docs --search {wanted}` searches them"
     raise UsageError(f"there is no page {visible(name)!r}; {hint}")
 
 
 @cache
-def glossary_rows(heading: str) -> tuple[tuple[tuple[str, ...], str], ...]:
+def read_glossary(heading: str) -> tuple[tuple[tuple[str, ...], str], ...]:
     """Return the rows of the glossary's tables whose first column is called `heading`: words, and the other cell."""
     rows: list[tuple[tuple[str, ...], str]] = []
     inside = False
@@ -85,52 +85,54 @@ def glossary_rows(heading: str) -> tuple[tuple[tuple[str, ...], str], ...]:
     return tuple(rows)
 
 
-def terms() -> dict[str, str]:
+def read_terms() -> dict[str, str]:
     """Return the meaning of every word of the glossary, without what stands in brackets behind a word.
 
     Examples
     --------
-    >>> terms()["ripple"]
+    >>> read_terms()["ripple"]
     '(max - min)/max of the effort in the window'
     """
     meanings: dict[str, str] = {}
-    for words, meaning in glossary_rows("word"):
+    for words, meaning in read_glossary("word"):
         for word in words:
             name = re.sub(r" \(.*\)", "", word)
             meanings[name] = f"{meanings[name]}; {meaning}" if name in meanings else meaning
     return meanings
 
 
-def term_records() -> dict[str, list[dict[str, str]]]:
+def list_terms() -> dict[str, list[dict[str, str]]]:
     """Return the words of the glossary as `cfmkit show` lists names: by word, its records."""
-    return {name: [{"name": name, "meaning": meaning}] for name, meaning in terms().items()}
+    return {name: [{"name": name, "meaning": meaning}] for name, meaning in read_terms().items()}
 
 
 def look_for(word: str) -> tuple[str, ...]:
-    """Return what the glossary says to look for instead of a synonym; empty if it is none.
+    """Return the words and names that the glossary gives for a synonym; empty if it is none.
 
     Examples
     --------
     >>> look_for("bill of materials")
     ('parts.csv', 'bought spring', 'catalogue')
     """
-    wanted = pattern((word,))
+    wanted = compile_phrases((word,))
     rows = (
         targets
-        for words, targets in glossary_rows("synonym")
-        if any(wanted.fullmatch(synonym) or pattern((synonym,)).fullmatch(word.strip()) for synonym in words)
+        for words, targets in read_glossary("synonym")
+        if any(wanted.fullmatch(synonym) or compile_phrases((synonym,)).fullmatch(word.strip()) for synonym in words)
     )
     return tuple(target for targets in rows for target in targets.split(", "))
 
 
-def pattern(phrases: Iterable[str]) -> re.Pattern[str]:
-    """Return what finds phrases as whole words: in any case, in the plural, with blanks, hyphens or underscores.
+def compile_phrases(phrases: Iterable[str]) -> re.Pattern[str]:
+    """Return a pattern for phrases as whole words: in any case, in the plural, with blanks, hyphens or underscores.
 
     Examples
     --------
-    >>> bool(pattern(["test plan"]).search("the Test-plans of parts")), bool(pattern(["bom"]).search("a bomb"))
-    (True, False)
-    >>> bool(pattern(["natural frequency"]).fullmatch("natural frequencies"))
+    >>> bool(compile_phrases(["test plan"]).search("the Test-plans of parts"))
+    True
+    >>> bool(compile_phrases(["bom"]).search("a bomb"))
+    False
+    >>> bool(compile_phrases(["natural frequency"]).fullmatch("natural frequencies"))
     True
     """
     parts = (r"[\s_-]+".join(map(re.escape, re.split(r"[\s_-]+", phrase.strip()))) for phrase in phrases)
@@ -160,30 +162,35 @@ NAVIGATION = ("index", "glossary")
 
 def search(word: str) -> list[PageSection]:
     """Return the sections that name a word or what the glossary says to look for instead, the best first."""
-    wanted = [(pattern([word]), 1.0), *((pattern([target]), SYNONYM_WEIGHT) for target in look_for(word))]
-    scored = (_scored(name, heading, text, wanted) for name, heading, text in _all_sections())
-    sections = [section for section in scored if section.score > 0]
+    wanted = [
+        (compile_phrases([word]), 1.0),
+        *((compile_phrases([target]), SYNONYM_WEIGHT) for target in look_for(word)),
+    ]
+    rated = (_score(name, heading, text, wanted) for name, heading, text in _read_sections())
+    sections = [section for section in rated if section.score > 0]
     return sorted(sections, key=lambda section: -section.score)
 
 
 @cache
-def _all_sections() -> tuple[tuple[str, str, str], ...]:
+def _read_sections() -> tuple[tuple[str, str, str], ...]:
     """Return the page, heading and text of every section, but for those of `NAVIGATION`."""
-    subjects = (each for each in pages() if each.name not in NAVIGATION)
-    return tuple((each.name, heading, text) for each in subjects for heading, text in _sections(each.text))
+    subjects = (subject for subject in pages() if subject.name not in NAVIGATION)
+    return tuple(
+        (subject.name, heading, text) for subject in subjects for heading, text in _split_into_sections(subject.text)
+    )
 
 
-def _sections(text: str) -> Iterator[tuple[str, str]]:
+def _split_into_sections(text: str) -> Iterator[tuple[str, str]]:
     """Yield the headings of a page with the text below each; comments in code are no headings."""
-    parts = re.split(r"^#{1,4} (.*)$", re.sub(r"^```.*?^```", _without_headings, text, flags=re.M | re.S), flags=re.M)
+    parts = re.split(r"^#{1,4} (.*)$", re.sub(r"^```.*?^```", _mask_comments, text, flags=re.M | re.S), flags=re.M)
     yield from zip(parts[1::2], parts[2::2], strict=True)
 
 
-def _without_headings(block: re.Match[str]) -> str:
+def _mask_comments(block: re.Match[str]) -> str:
     return re.sub(r"^#", " #", block[0], flags=re.M)
 
 
-def _scored(name: str, heading: str, text: str, wanted: Sequence[tuple[re.Pattern[str], float]]) -> PageSection:
+def _score(name: str, heading: str, text: str, wanted: Sequence[tuple[re.Pattern[str], float]]) -> PageSection:
     score, shown = 0.0, ""
     for phrase, weight in wanted:
         count = len(phrase.findall(text))

@@ -1,4 +1,4 @@
-"""What `cfmkit show` says of a word that is no name: terms and names that mean it, and pages on it."""
+"""Answers of `cfmkit show` to a word that is no name: terms and names that mean it, and pages on it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from functools import cache
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cfmkit.cli.guide import look_for, pattern, search, terms
+from cfmkit.cli.guide import compile_phrases, look_for, read_terms, search
 from cfmkit.cli.show_topics import KINDS
 from cfmkit.documents.document import Document, Paragraph, field, listed
 
@@ -36,11 +36,11 @@ def explain_by_meaning(word: str) -> Document | None:
     """Return what there is on a word that is a term, a synonym, or part of a definition; None if there is nothing."""
     targets = look_for(word)
     named = _names(word, targets) if word.strip() else []
-    known = [name for name in terms() if name == word or name in targets]
-    if not (known or targets or named):
+    matching_terms = [name for name in read_terms() if name == word or name in targets]
+    if not (matching_terms or targets or named):
         return None
-    meanings = [{"name": name, "meaning": terms()[name]} for name in known]
-    names = [{"name": each.name, "kind": each.kind, "meaning": each.meaning} for each in named]
+    meanings = [{"name": name, "meaning": read_terms()[name]} for name in matching_terms]
+    names = [{"name": entry.name, "kind": entry.kind, "meaning": entry.meaning} for entry in named]
     headings: dict[str, str] = {}
     for section in search(word):
         headings.setdefault(section.page, section.heading)
@@ -64,17 +64,17 @@ def _names(word: str, targets: Sequence[str]) -> list[NamedMeaning]:
 
     Of keys that have one name and meaning in several blocks the shortest path stands for all.
     """
-    by_target, by_word = pattern(targets or (word,)), pattern((word,))
+    by_target, by_word = compile_phrases(targets or (word,)), compile_phrases((word,))
     named: dict[tuple[str, str, str], NamedMeaning] = {}
     for kind, path, meaning in _named_texts():
         last = path.rpartition(".")[2].removesuffix("[]")
         ranks = (by_target.fullmatch(last), _is_part(by_word, last), by_word.search(meaning))
         rank = next((rank for rank, match in enumerate(ranks) if match), None)
         if rank is not None:
-            other = named.get((kind, last, meaning))
-            if other is None or len(path) < len(other.name):
+            present = named.get((kind, last, meaning))
+            if present is None or len(path) < len(present.name):
                 named[kind, last, meaning] = NamedMeaning(rank, path, kind, meaning)
-    return sorted(named.values(), key=lambda each: each.rank)
+    return sorted(named.values(), key=lambda entry: entry.rank)
 
 
 def _is_part(word: re.Pattern[str], name: str) -> bool:

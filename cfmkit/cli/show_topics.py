@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
-from cfmkit.cli.guide import term_records
+from cfmkit.cli.guide import list_terms
 from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.errors import UsageError
 
@@ -452,7 +452,7 @@ def _property(item: Mapping[str, Any]) -> str:
 
 _ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
 KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
-    "terms": (term_records, (field("name", "word"), field("meaning", wraps=True))),
+    "terms": (list_terms, (field("name", "word"), field("meaning", wraps=True))),
     "materials": (
         _materials,
         (field("name", "material"), Field("properties", _property, wraps=True), field("source", wraps=True)),

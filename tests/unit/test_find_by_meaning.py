@@ -43,17 +43,17 @@ def test_a_common_word_leads_to_the_name_and_the_page(word, name, page):
 
 def test_every_target_of_a_synonym_is_explained():
     """It is a term, a name that `show` knows, a verb, a word of a verb's options, or a file of the reference."""
-    targets = {target for _, cell in guide.glossary_rows("synonym") for target in cell.split(", ")}
-    known = {*guide.terms(), *show_topics.names(), *verbs(), "contact_force", "tare", "solid"}
+    targets = {target for _, cell in guide.read_glossary("synonym") for target in cell.split(", ")}
+    known = {*guide.read_terms(), *show_topics.names(), *verbs(), "contact_force", "tare", "solid"}
     assert len(targets) > 60
     assert {target for target in targets - known if f"`{target}`" not in REFERENCE} == set()
 
 
 def test_no_synonym_is_stated_twice_or_hides_a_term():
-    synonyms = [word.lower() for words, _ in guide.glossary_rows("synonym") for word in words]
+    synonyms = [word.lower() for words, _ in guide.read_glossary("synonym") for word in words]
     assert len(synonyms) > 120
     assert sorted({word for word in synonyms if synonyms.count(word) > 1}) == []
-    assert {word for word in synonyms if word in guide.terms()} == set()
+    assert {word for word in synonyms if word in guide.read_terms()} == set()
 
 
 def test_a_term_is_explained_with_the_names_that_have_it():

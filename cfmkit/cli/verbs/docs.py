@@ -44,10 +44,10 @@ def run(options: DocsOptions, terminal: Terminal) -> Document:
         shown = page(options.name)
         record = {"name": shown.name, "title": shown.title, "path": str(shown.path), "text": shown.text}
         return Document(record, (Verbatim(shown.text),))
-    known = pages()
-    records = [{"name": each.name, "title": each.title, "path": str(each.path)} for each in known]
+    listing = pages()
+    records = [{"name": item.name, "title": item.title, "path": str(item.path)} for item in listing]
     fields = (field("name"), field("title", wraps=True))
-    where = Paragraph("files", f"{known[0].path.parent}; a link to FILE.md in a page is `cfmkit docs FILE`")
+    where = Paragraph("files", f"{listing[0].path.parent}; a link to FILE.md in a page is `cfmkit docs FILE`")
     return Document({"pages": records}, (*listed("pages", records, fields), where))
 
 
@@ -61,7 +61,7 @@ def _search(word: str) -> Document:
     """
     if not (sections := search(word) if word.strip() else []):
         raise UsageError(f"no page names {visible(word)!r}; `cfmkit docs` lists all pages")
-    records = [{"page": each.page, "section": each.heading, "line": each.line} for each in sections]
+    records = [{"page": section.page, "section": section.heading, "line": section.line} for section in sections]
 
     def blocks() -> Iterator[Block]:
         if targets := look_for(word):
