@@ -1,4 +1,4 @@
-"""STEP: bodies whose sides are planes and cylinders, by build123d (the extra ``cfmkit[step]``).
+"""STEP: bodies whose sides are planes and cylinders, by build123d (the extra ``step``).
 
 Lines and arcs of the outlines stay what they are: a CAD program can measure the radius of a fillet.
 """
@@ -66,7 +66,7 @@ def _kernel() -> ModuleType:
     try:
         import build123d
     except ImportError:
-        raise UsageError("--format step needs build123d: pip install 'cfmkit[step]'") from None
+        raise UsageError("--format step needs build123d: pip install build123d") from None
     module: ModuleType = build123d
     return module
 

@@ -174,7 +174,7 @@ def _client(address: str, workers: int) -> Iterator[Any]:
         import dask
         import distributed
     except ImportError:
-        raise UsageError("--cluster needs Dask: pip install 'cfmkit[cluster]'") from None
+        raise UsageError("--cluster needs Dask: pip install distributed") from None
     settings = {"distributed.scheduler.allowed-failures": RETRIES, "distributed.comm.timeouts.connect": CONNECT_WITHIN}
     library: Any = distributed
     with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""Libraries that only some users need: imported when they are used, and named with the extra that brings them."""
+"""Libraries that only some users need: imported when they are used, and named with the command that installs them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ from importlib import import_module
 from typing import Any
 
 from cfmkit.errors import UsageError
-
-EXTRAS = {"pandas": "xarray", "xarray": "xarray", "pyarrow": "table"}
-"""Library -> the extra of this package that installs it."""
 
 
 def library(name: str, purpose: str) -> Any:
@@ -29,4 +26,4 @@ def library(name: str, purpose: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
-        raise UsageError(f"{purpose} needs {name}: pip install 'cfmkit[{EXTRAS[name]}]'") from None
+        raise UsageError(f"{purpose} needs {name}: pip install {name}") from None

@@ -1,6 +1,6 @@
 """Tables as Parquet, for studies with more points than a spreadsheet opens: a tenth of the bytes, and types kept.
 
-Needs pyarrow (``pip install 'cfmkit[table]'``).
+Needs pyarrow (``pip install pyarrow``).
 """
 
 from __future__ import annotations

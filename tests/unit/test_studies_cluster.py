@@ -24,7 +24,7 @@ from cfmkit.studies.serial_and_cluster_executors import Cluster, stamp_of
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
 from cfmkit.studies.varied_axes import axes, parse_variation
 
-distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cfmkit[cluster]'")
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 2001})
@@ -231,7 +231,7 @@ def test_what_is_no_address_is_refused_before_dask_tries(address, monkeypatch):
 
 def test_without_dask_the_cure_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(UsageError, match=r"pip install 'cfmkit\[cluster\]'"):
+    with pytest.raises(UsageError, match=r"pip install distributed"):
         run(work(2), Cluster("local"))
 
 

@@ -80,11 +80,11 @@ def test_an_unknown_format_or_a_missing_package_is_told_first(tmp_path, monkeypa
     assert "there are csv, parquet" in capsys.readouterr().err
     for name in ("pyarrow", "pandas", "xarray"):
         monkeypatch.setitem(sys.modules, name, None)  # as where it is not installed
-    with pytest.raises(UsageError, match=r"pip install 'cfmkit\[table\]'"):
+    with pytest.raises(UsageError, match=r"pip install pyarrow"):
         parquet(Table(()))
     assert not (tmp_path / "out").exists()
     result = cfmkit.analyze("configs/cam.yaml")
-    with pytest.raises(UsageError, match=r"^to_pandas needs pandas: pip install 'cfmkit\[xarray\]'$"):
+    with pytest.raises(UsageError, match=r"^to_pandas needs pandas: pip install pandas$"):
         result.to_pandas()
-    with pytest.raises(UsageError, match=r"^to_xarray needs xarray: pip install 'cfmkit\[xarray\]'$"):
+    with pytest.raises(UsageError, match=r"^to_xarray needs xarray: pip install xarray$"):
         result.to_xarray()

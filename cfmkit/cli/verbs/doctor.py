@@ -190,5 +190,5 @@ def _engine(solver: Mapping[str, Any]) -> str:
 
 
 def _version(package: Mapping[str, Any]) -> str:
-    wanted = f"not installed; only for cfmkit[{package['extra']}]" if package["extra"] else "missing"
+    wanted = f"not installed; only for the extra {package['extra']}" if package["extra"] else "missing"
     return str(package["version"] or wanted)
