@@ -230,7 +230,9 @@ _WRITTEN_OUT = tuple(
 def _columns(cams: tuple[Assembly, ...], variants: Variants, chosen: Rows) -> Assembly:
     """Return mechanisms side by side as one, whose numbers are columns."""
     first = cams[0]
-    numbers = [path for path, values in variants.values.items() if values.dtype != object]
+    # what all have in common stays a plain number: among it are those that are no columns, as numbers of points
+    varied = {path: values[chosen] for path, values in variants.values.items() if values.dtype != object}
+    numbers = [path for path, values in varied.items() if (values != values[0]).any()]
     columns = {path: variants.values[path][chosen].astype(np.float64)[:, None] for path in numbers}
     columns |= {path: stacked([one.spec.at(path) for one in cams]) for path in _WRITTEN_OUT}
     track, profile = TrackRows([one.track for one in cams]), profiles_in_rows([one.profile for one in cams])
