@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
+from cfmkit.cli.show_stock import stock_page_parts
 from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.errors import UsageError
 
@@ -55,7 +56,7 @@ def explain(name: str | None) -> Document:
 
 def skipped(name: str | None) -> tuple[str, ...]:
     """Return the families of other packages that are missing from a page on all families; none for other pages."""
-    whole = name not in {*families.names(), "units", "metrics", "materials"}
+    whole = name not in {*families.names(), "units", "metrics", "materials", "stock"}
     return families.skipped() if whole else ()
 
 
@@ -493,5 +494,6 @@ TOPICS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
     "materials": ("the named materials, with scatter and source", materials_page),
+    "stock": ("sizes of sheets, wire, pins, bearings and screws that are sold", lambda: _page(*stock_page_parts())),
     "references": ("the papers behind the families", references_page),
 }

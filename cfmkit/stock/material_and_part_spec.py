@@ -20,9 +20,12 @@ from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
 from cfmkit.specs.units.fields import described
 from cfmkit.stock.materials import UnknownMaterial, material
 from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
+from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.stock.stock_series import StockSize
 
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
@@ -297,6 +300,11 @@ class PartProcess(Model):
         return PROCESSES[self.name].least_radius if self.name else None
 
     @property
+    def prints(self) -> bool:
+        """True if it builds a part up: its width is no sheet's."""
+        return self.name in ("fdm", "sls")
+
+    @property
     def thinnest(self) -> float | None:
         """Thinnest wall [m]; None if neither a name nor a value says it."""
         if self.least_feature is not None:
@@ -356,6 +364,11 @@ class CutPart(Model):
         description="radius of inside corners, at least that of the cutter; 0: sharp, the stress there has no "
         "value; default: the smallest radius of `process` if stated, or half of the smallest thickness",
     )
+    stock: System | None = Field(
+        None,
+        description="metric or inch: sheets, pins and wire are of sizes that are sold (`show stock`); a design takes "
+        "the nearest sheet and is repeated for it, and stated sizes that are not sold are refused",
+    )
     sheet: AboveZero | None = Field(
         None,
         description="thickness of the sheet that everything is cut from: every width must be equal to it, and a design "
@@ -413,6 +426,12 @@ def usual_fillet(thinnest: float) -> str:
 def sheet_of(part: CutPart | None) -> float | None:
     """Return the thickness of the sheet that everything is cut from [m]; None if none is stated."""
     return None if part is None else part.sheet
+
+
+def stated_sheet(part: CutPart | None) -> Iterator[StockSize]:
+    """Yield the sheet that a part is cut from, unless it is printed."""
+    if part is not None and (part.process is None or not part.process.prints):
+        yield ("part", "sheet"), "sheet", part.sheet
 
 
 def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> dict[tuple[str | int, ...], str]:

@@ -1,5 +1,8 @@
 """A design as it is delivered: what the family makes of a specification, moved for its yield, verified as a solid.
 
+At the end its widths are those of a sheet that is sold, where that is wanted, and its dimensions have the digits that
+its process can hold.
+
 `cfmkit design` and the points of a study that designs take the same way.
 """
 
@@ -29,6 +32,15 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
         that for its margins what is left. A part from a sheet is designed again for its solid, with the whole budget:
         with what is left, the finished design could be lost.
     """
+    from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet
+
+    found = _finished(spec, designer, run)
+    found = with_stock_sheet(spec, found, lambda other: _finished(other, designer, run), run)
+    return with_digits_of_process(spec, found, run)
+
+
+def _finished(spec: Spec, designer: Designer, run: Run) -> Design:
+    """Return the design of a specification with its margins, verified."""
     asked = getattr(spec, "design", None)
     plain = getattr(asked, "yield", None) is None
     found = designer(spec, run) if plain else _with_yield(spec, designer, run)

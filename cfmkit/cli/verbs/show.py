@@ -25,8 +25,8 @@ class ShowOptions(Common):
         str | None,
         argument(
             "NAME",
-            "What to explain: a family, units, metrics, materials, references, or anything by its name: brace_length, "
-            "pla, MPa; default: list all.",
+            "What to explain: a family, units, metrics, materials, stock, references, or anything by its name: "
+            "brace_length, pla, MPa; default: list all.",
             shell_completion.topics,
         ),
     ] = None
@@ -41,7 +41,7 @@ class ShowOptions(Common):
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Document:
-    """Explain a family with every key of its spec; list units, metrics, materials or papers; or explain one by name."""
+    """Explain a family with every key of its spec; list units, metrics, materials, stock, papers; or explain a name."""
     from cfmkit.cli.show_topics import explain, skipped
 
     if options.figure is not None:

@@ -26,6 +26,7 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
+from cfmkit.stock.stock_series import ALL_SERIES
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -149,8 +150,10 @@ def allowable_of(spec: SliderCrankSpec) -> float | None:
     return None if material is None else material.allowable(spec.mechanism.safety_factor)
 
 
-PIN_DIAMETERS = tuple(1e-3 * d for d in (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30))
-"""Dowel pins that are made [m]: the diameters of ISO 2338."""
+PIN_DIAMETERS = tuple(
+    one for series in ALL_SERIES if series.standard == "ISO 2338" for one in series.sizes if one >= 1e-3
+)
+"""Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
 
 PIN_STRENGTH = 235e6
 """Yield strength of pins [Pa]: plain carbon steel, EN 10025-2 S235; hardened ones bear more."""
