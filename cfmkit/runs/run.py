@@ -301,11 +301,12 @@ def designed(spec: Spec, run: Run) -> Report:
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
+    from cfmkit.studies.assumed_friction import friction_note
     from cfmkit.studies.parts.expected_forces import expected_forces
 
     found = _with_yield(found, nominal, given, run)
-    reported = expected_forces(nominal, run)
-    return found.beside({}, run_outcome.Supplement(lines=(("test plan", reported),))) if reported else found
+    lines = ("test plan", expected_forces(nominal, run)), ("friction", friction_note(nominal, run))
+    return found.beside({}, run_outcome.Supplement(lines=tuple((word, text) for word, text in lines if text)))
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:

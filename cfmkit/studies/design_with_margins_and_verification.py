@@ -35,8 +35,11 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
     from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet
 
     found = _finished(spec, designer, run)
-    found = with_stock_sheet(spec, found, lambda other: _finished(other, designer, run), run)
-    return with_digits_of_process(spec, found, run)
+
+    def finish(other: Spec) -> Design:
+        return _finished(other, designer, run)
+
+    return with_digits_of_process(spec, with_stock_sheet(spec, found, finish, run), finish, run)
 
 
 def _finished(spec: Spec, designer: Designer, run: Run) -> Design:

@@ -133,10 +133,11 @@ def decimals_of(accuracy: ProcessAccuracy) -> int:
     return max(0, math.ceil(-math.log10(1e3 * SHARE_OF_DEVIATION * deviation) - 1e-9))
 
 
-def with_digits_of_process(given: Spec, found: Design, run: Run) -> Design:
+def with_digits_of_process(given: Spec, found: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
     """Return a design whose chosen lengths and angles have the digits that its process can hold.
 
-    Where the rounded design would miss a requirement that it meets unrounded, its digits are refined.
+    Where the rounded design would miss a requirement that it meets unrounded, its digits are refined. Where rates of
+    springs are chosen, they are chosen again for the rounded lengths: `finish` designs a specification.
     """
     if found.spec is None:
         return found
@@ -151,6 +152,8 @@ def with_digits_of_process(given: Spec, found: Design, run: Run) -> Design:
             return found
         try:
             spec = found.spec.replace(changes)
+            if _has_chosen_rates(given, found.spec) and (again := finish(spec)).spec is not None:
+                spec = again.spec.replace(changes)
         except SpecError:  # values that must agree with others to more digits
             continue
         outcomes = _outcomes(spec, run)
@@ -159,6 +162,13 @@ def with_digits_of_process(given: Spec, found: Design, run: Run) -> Design:
         if all(now or not then for now, then in zip(outcomes, before or outcomes, strict=True)):
             return replace(found, spec=spec)
     return found
+
+
+def _has_chosen_rates(given: Spec, designed: Spec) -> bool:
+    """Return True if a design has changed the rate of a spring."""
+    springs = [dict(one.leaves()) for one in (given, designed)]
+    paths = [path for path in springs[1] if path.startswith("mechanism.springs.") and "wound" not in path]
+    return any(springs[0].get(path) != springs[1][path] for path in paths)
 
 
 def _texts(value: Any, path: str = "") -> Iterator[tuple[str, str]]:

@@ -88,8 +88,11 @@ def result_of(solution: Solution) -> Result:
         closed=dense,
         effort_error=float(solution.effort_error[0]),
         part_efforts=dense.part_efforts,
-        tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)}
-        | listed(parts_of(spec)),
+        tables={
+            "adjustability": partial(adjustability, solution),
+            "readings": partial(readings, solution),
+            **listed(partial(parts_of, spec)),
+        },
         state=solution,
     )
 

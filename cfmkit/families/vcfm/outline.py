@@ -124,7 +124,7 @@ def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
     """Yield what both parts are made of, and their leaves."""
     leaves, spring = spec.mechanism.bistable, spec.mechanism.positive
     yield "material", spec.mechanism.material.words
-    for part in parts_of(spec):
+    for part in (one for one in parts_of(spec) if one.source == "buy"):
         yield "springs", f"{part.count} x {f'{part.name}, ' if part.name else ''}{part.data}"
     for word, one, count in (("leaves", leaves, leaves.half_beams), ("spring", spring, None)):
         if one is None:
