@@ -25,8 +25,8 @@ MIRROR = np.array([-1.0, 1.0])
 
 N_CIRCLE_POINTS = 73
 
-N_PLACES, N_COVERING = 26, 24
-"""Places of a screw along half an edge that are tried, and poses, or some more, that they must be clear of."""
+N_PLACES, N_COVERING = 26, 41
+"""Places of a screw along half an edge that are tried, and poses that they must be clear of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +176,8 @@ def clear_places(ground: FloatArray, moving: Sequence[PosedBody], head: float) -
     """
     from shapely import Point
 
-    covered = swept([replace(body, core=body.core[:: max(1, len(body.core) // N_COVERING)]) for body in moving])
+    few = [np.unique(np.linspace(0, len(body.core) - 1, N_COVERING).astype(int)) for body in moving]
+    covered = swept([replace(body, core=body.core[poses]) for body, poses in zip(moving, few, strict=True)])
     (x0, y0), (x1, y1) = (ground.min(axis=0) + head).tolist(), (ground.max(axis=0) - head).tolist()
     shares = np.linspace(0.0, 0.5, N_PLACES).tolist()
     found = []

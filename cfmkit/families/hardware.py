@@ -52,7 +52,7 @@ LEAST_SCREW = 3e-3
 
 
 @dataclass(frozen=True)
-class Strength:
+class PartStrength:
     """Material of links and plates, and the stresses that parts may have."""
 
     name: str
@@ -62,7 +62,7 @@ class Strength:
     assumed: bool  # whether the material is not stated
 
     @classmethod
-    def of(cls, material: MaterialSpec | None, safety_factor: float) -> Strength:
+    def of(cls, material: MaterialSpec | None, safety_factor: float) -> PartStrength:
         """Return that of a stated material, or of the default one where none with a strength is stated."""
         safety = safety_factor if safety_factor > 1.0 else DEFAULT_SAFETY
         allowable = None if material is None else material.allowable(safety)
@@ -91,13 +91,13 @@ def with_faults(parts: Iterable[ListedPart], faults: Mapping[str, str]) -> tuple
 
 
 def series_sizes(kind: str, system: System | None) -> tuple[float, ...]:
-    """Return the diameters of a series of pins or dowels [m], metric ones unless inches are asked for."""
+    """Return the diameters of a series of pins or dowels [m], metric ones unless inches are requested."""
     found = series_of("dowel" if kind == "dowel" else "pin", system or "metric")
     return () if found is None else tuple(size for size in found.sizes if size >= 1e-3)
 
 
 def pin_for(
-    force: float, arm: float, thickness: float, strength: Strength, system: System | None
+    force: float, arm: float, thickness: float, strength: PartStrength, system: System | None
 ) -> tuple[float, bool]:
     """Return the pin that bears a load at an arm [m], and whether there is one: where not, the thickest."""
     sizes = series_sizes("pin", system)
@@ -105,13 +105,13 @@ def pin_for(
     return (sizes[-1], False) if found is None else (found, True)
 
 
-def link_width(force: float, thickness: float, hole: float, strength: Strength) -> float:
+def link_width(force: float, thickness: float, hole: float, strength: PartStrength) -> float:
     """Return the width of a link that bears a tension around its holes, in whole millimetres [m]."""
     width = eye_that_bears(force, thickness, hole, strength.allowable, LEAST_WALL * hole)
     return 1e-3 * math.ceil(1e3 * width - 1e-9)
 
 
-def screw_for(load: float, thickness: float, count: int, strength: Strength) -> Screw:
+def screw_for(load: float, thickness: float, count: int, strength: PartStrength) -> Screw:
     """Return the smallest screw that a plate bears when so many share a load: bearing, and shear of the screw."""
     each = load / count
     for screw in (one for one in SCREWS if one.diameter >= LEAST_SCREW):
@@ -139,7 +139,7 @@ def guide_rod(
     bush: float,
     guide: Guide | None,
     system: System | None,
-    strength: Strength,
+    strength: PartStrength,
 ) -> GuideRod:
     """Return the rod for a load across it, at least a share of the force along it, over a travel.
 
@@ -153,7 +153,7 @@ def guide_rod(
         As stated.
     system : {"metric", "inch"} or None
         Of its diameter.
-    strength : Strength
+    strength : PartStrength
         Of the rod.
     """
     length = bush if guide is None or guide.length is None else guide.length

@@ -32,7 +32,7 @@ WORDS: Mapping[Kind, str] = {
 
 
 @dataclass(frozen=True)
-class Series:
+class StockSeries:
     """Sizes of one kind of stock."""
 
     kind: Kind
@@ -118,46 +118,46 @@ SCREWS = tuple(
 MARKET = "sellers' list"
 
 ALL_SERIES = (
-    Series("sheet", "metric", MARKET, "aluminiumplatesupplier.com, how to choose aluminum plate thickness (6061)",
+    StockSeries("sheet", "metric", MARKET, "aluminiumplatesupplier.com, how to choose aluminum plate thickness (6061)",
            _mm(0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.5, 1.8, 2, 2.3, 2.5, 2.8, 3, 3.5, 4, 5, 6, 7, 8, 9, 10, 12,
                14, 16, 18, 20, 22, 25, 30), ("aluminium-6061-t6",)),
-    Series("sheet", "metric", MARKET, "pandasmetal.github.io, aluminium sheet 1 mm thickness (6061, 7075 and others)",
+    StockSeries("sheet", "metric", MARKET, "pandasmetal.github.io, aluminium sheet 1 mm thickness (6061, 7075)",
            _mm(0.3, 0.5, 0.8, 1, 1.2, 1.5, 2, 2.5, 3, 4, 5), ("aluminium-7075-t6",)),
-    Series("sheet", "metric", MARKET, "machinemfg.com, 304 and 316 stainless steel plate weight chart, up to 3 mm",
+    StockSeries("sheet", "metric", MARKET, "machinemfg.com, 304 and 316 stainless steel plate weight chart, up to 3 mm",
            _mm(0.5, 0.8, 1, 1.2, 1.5, 2, 2.5, 3), ("steel-304",)),
-    Series("sheet", "metric", MARKET, "usisteels.com, standard mild steel plate thickness chart",
+    StockSeries("sheet", "metric", MARKET, "usisteels.com, standard mild steel plate thickness chart",
            _mm(1.6, 2, 3, 5, 6, 8, 10, 12, 16, 20, 25), ("steel-s235",)),
-    Series("sheet", "inch", MARKET, "pandasmetal.github.io, cutting 6mm aluminium sheet (6061, inch)",
+    StockSeries("sheet", "inch", MARKET, "pandasmetal.github.io, cutting 6mm aluminium sheet (6061, inch)",
            _inches(0.025, 0.032, 0.040, 0.050, 0.063, 0.080, 0.090, 0.100, 0.125, 0.160, 0.190, 0.25, 0.3125, 0.375,
                    0.4375, 0.5, 0.625, 0.75, 0.875, 1), ("aluminium-6061-t6",)),
-    Series("sheet", "inch", MARKET, "github.com/machineagency/jubilee, wiki, Parts to Laser Cut (Delrin)",
+    StockSeries("sheet", "inch", MARKET, "github.com/machineagency/jubilee, wiki, Parts to Laser Cut (Delrin)",
            _inches(0.0625, 0.09375, 0.125), ("pom",)),
-    Series("wire", "metric", "EN 10270-1 up to 0.5 mm; above, preferred numbers of ISO 3, R10",
+    StockSeries("wire", "metric", "EN 10270-1 up to 0.5 mm; above, preferred numbers of ISO 3, R10",
            "springwire.net, spring wire sizes and tolerances; durofer.ch, spring wire",
            _mm(0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.11, 0.12, 0.14, 0.16, 0.18, 0.2, 0.22, 0.25, 0.28, 0.3, 0.32, 0.34,
                0.36, 0.38, 0.4, 0.45, 0.5, 0.63, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8, 10)),
-    Series("wire", "inch", "ASTM A228", "interwiregroup.com, tinned coated music wire",
+    StockSeries("wire", "inch", "ASTM A228", "interwiregroup.com, tinned coated music wire",
            _inches(0.004, 0.005, 0.006, 0.007, 0.008, 0.009, 0.010, 0.011, 0.012, 0.013, 0.014, 0.015, 0.016, 0.018,
                    0.020, 0.022, 0.024, 0.026, 0.028, 0.030, 0.032, 0.034, 0.036, 0.038, 0.040, 0.042, 0.045, 0.048,
                    0.051, 0.055, 0.059, 0.063, 0.067, 0.072, 0.076, 0.080, 0.085, 0.090, 0.095, 0.100, 0.102, 0.107,
                    0.110, 0.112, 0.121, 0.125, 0.130, 0.135, 0.140, 0.145, 0.150, 0.156, 0.162, 0.177, 0.192, 0.207,
                    0.225, 0.250)),
-    Series("pin", "metric", "ISO 2338", f"{FASTENERS}, iso2338def.csv",
+    StockSeries("pin", "metric", "ISO 2338", f"{FASTENERS}, iso2338def.csv",
            _mm(0.6, 0.8, 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30, 40, 50)),
-    Series("pin", "inch", "ASME B18.8.2", "hdw.com.tw, ANSI dowel pins chart",
+    StockSeries("pin", "inch", "ASME B18.8.2", "hdw.com.tw, ANSI dowel pins chart",
            _inches(0.0625, 0.078125, 0.09375, 0.125, 0.15625, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.5, 0.625, 0.75,
                    0.875, 1)),
-    Series("dowel", "metric", "ISO 8734", f"{FASTENERS}, iso8734def.csv",
+    StockSeries("dowel", "metric", "ISO 8734", f"{FASTENERS}, iso8734def.csv",
            _mm(1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20)),
-    Series("bearing", "metric", "DIN 625-1", BOLTS, tuple(sorted({one.bore for one in BEARINGS}))),
-    Series("screw", "metric", "ISO 4762, holes ISO 273 medium",
+    StockSeries("bearing", "metric", "DIN 625-1", BOLTS, tuple(sorted({one.bore for one in BEARINGS}))),
+    StockSeries("screw", "metric", "ISO 4762, holes ISO 273 medium",
            f"{FASTENERS}, iso4762def.csv; engineeringhardware.com, clearance hole sizes",
            tuple(one.diameter for one in SCREWS)),
 )  # fmt: skip
 """All series that a text is known for: no inch series of bearings, dowels and screws, and few of sheets."""
 
 
-def series_of(kind: Kind, system: System, material: str | None = None) -> Series | None:
+def series_of(kind: Kind, system: System, material: str | None = None) -> StockSeries | None:
     """Return the series of one kind of stock, of sheets that of a material by its name; None if none is known."""
     return next(
         (

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.stock.processes import ProcessAccuracy
-    from cfmkit.stock.stock_series import Series
+    from cfmkit.stock.stock_series import StockSeries
 
 MAX_SHEETS = 4
 """Sheets for which a design is tried, the nearest first: farther ones would be another mechanism."""
@@ -99,7 +99,7 @@ def _widths(spec: Spec) -> dict[str, float]:
     return {f"mechanism.{key}": float(width) for key, width in stated if width is not None}
 
 
-def _change(before: Spec, after: Spec, series: Series, sheet: float, widths: Mapping[str, float], run: Run) -> str:
+def _change(before: Spec, after: Spec, series: StockSeries, sheet: float, widths: Mapping[str, float], run: Run) -> str:
     """Return which sheet was taken instead of which widths, and what that does to the force."""
     old = ", ".join(format_short(width, "length") for width in dict.fromkeys(widths.values()))
     begun = f"sheet {format_short(sheet, 'length', 6)} ({series.system}, {series.standard}) instead of {old}"

@@ -20,7 +20,7 @@ from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
     Hardware,
-    Strength,
+    PartStrength,
     guide_part,
     guide_rod,
     link_width,
@@ -50,7 +50,7 @@ def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
     mechanism = solution.assembly.spec.mechanism
     plate, system = mechanism.plate, mechanism.plate.stock
-    strength = Strength.of(mechanism.contact.material if mechanism.contact else None, mechanism.safety_factor)
+    strength = PartStrength.of(mechanism.contact.material if mechanism.contact else None, mechanism.safety_factor)
     thick = plate.thickness or (mechanism.contact.width if mechanism.contact else PLATE)
     brace, arm = min(thick, BRACE), 0.5 * (thick + min(thick, BRACE))
     pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))
@@ -99,7 +99,7 @@ def _plate(solution: Solution) -> tuple[Any, ...]:
 
 
 def _shaft(
-    solution: Solution, press: float, arm: float, thick: float, strength: Strength
+    solution: Solution, press: float, arm: float, thick: float, strength: PartStrength
 ) -> tuple[float, Bearing | None]:
     """Return the diameter of a roller's shaft [m] and its bearing: of the stated bore, or the smallest that bears."""
     mechanism = solution.assembly.spec.mechanism
@@ -114,7 +114,7 @@ def _shaft(
 
 def _parts(
     solution: Solution,
-    strength: Strength,
+    strength: PartStrength,
     sizes: tuple[float, float, float],
     pins: tuple[float, float, Bearing | None],
     loads: tuple[float, float],

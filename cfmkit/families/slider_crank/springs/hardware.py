@@ -16,7 +16,7 @@ from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
     DEFAULT_MATERIAL,
     Hardware,
-    Strength,
+    PartStrength,
     guide_part,
     guide_rod,
     mm,
@@ -52,7 +52,7 @@ N_SCREWS = 4
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism, of all legs together."""
     mechanism, legs = spec.mechanism, spec.mechanism.sets
-    strength = Strength.of(mechanism.material, mechanism.safety_factor)
+    strength = PartStrength.of(mechanism.material, mechanism.safety_factor)
     motion = np.linspace(float(solution.motion[0, 0]), float(solution.motion[0, -1]), N_LOADS)
     loads = link_loads(solution.assembly, motion, solution.legs[:1, 0])
     eye, hole = eye_and_hole(spec)
@@ -110,7 +110,7 @@ def _joints(solution: Solution) -> list[Any]:
     return [np.zeros_like(crank), crank, np.column_stack([slid, np.full(slid.size, link.offset)])]
 
 
-def _sheet(loads: LinkLoads, width: float, hole: float, strength: Strength, system: Any) -> float:
+def _sheet(loads: LinkLoads, width: float, hole: float, strength: PartStrength, system: Any) -> float:
     """Return the thinnest sheet of links as wide as drawn that bears tension and bending [m]."""
     series = series_of("sheet", system or "metric", strength.name) or series_of("sheet", "metric", DEFAULT_MATERIAL)
     assert series is not None
@@ -119,7 +119,7 @@ def _sheet(loads: LinkLoads, width: float, hole: float, strength: Strength, syst
     return next(bearing, series.sizes[-1])
 
 
-def _of(strength: Strength) -> str:
+def _of(strength: PartStrength) -> str:
     return strength.name + (", assumed" if strength.assumed else "")
 
 
@@ -134,7 +134,7 @@ def _guided(spec: SliderCrankSpec, solution: Solution) -> tuple[float, float, fl
 
 
 def _parts(
-    spec: SliderCrankSpec, solution: Solution, strength: Strength, sizes: tuple[float, float, float], load: float
+    spec: SliderCrankSpec, solution: Solution, strength: PartStrength, sizes: tuple[float, float, float], load: float
 ) -> Iterator[ListedPart]:
     """Yield links, slider, pins and springs."""
     mechanism, legs, link = spec.mechanism, spec.mechanism.sets, solution.assembly.linkage
