@@ -163,7 +163,8 @@ def swept(bodies: Iterable[PosedBody]) -> Any:
 def clear_places(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
     """Return a place next to each corner of a rectangle where a screw is reached beside all that moves, in all poses.
 
-    Places along the edges are tried, the nearest to the corner first; where all are covered, the corner itself.
+    Places along the edges are tried, the nearest to the corner first; a corner from which half of both edges is covered
+    has no screw. Where fewer than two are left, the screws are in the corners, below what moves.
 
     Parameters
     ----------
@@ -183,8 +184,8 @@ def clear_places(ground: FloatArray, moving: Sequence[PosedBody], head: float) -
     found = []
     for x, far_x in ((x0, x1), (x1, x0)):
         for y, far_y in ((y0, y1), (y1, y0)):
-            along = [(x + share * (far_x - x), y) for share in shares]
-            along += [(x, y + share * (far_y - y)) for share in shares]
+            pairs = [((x + share * (far_x - x), y), (x, y + share * (far_y - y))) for share in shares]
+            along = [at for pair in pairs for at in pair]
             clear = [at for at in along if covered.distance(Point(at)) >= 0.5 * head]
             found.append(np.array(min(clear or [(x, y)], key=lambda at: abs(at[0] - x) + abs(at[1] - y))))
     return found

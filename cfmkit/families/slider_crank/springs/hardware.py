@@ -83,7 +83,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
             "carries pivot and guide", "ground", 1, _of(strength), "make", mm(*(high - low), sheet), "", "ground"
         ),
         guide_part(rod, 1, mechanism.guide is None),
-        screw_part("ground to its base, countersunk", N_SCREWS, screw, sheet, "screw"),
+        screw_part("ground to its base, countersunk", len(places), screw, sheet, "screw"),
     )
     return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin)
 
