@@ -18,6 +18,7 @@ from cfmkit.metrics.fatigue_and_relaxation import Durability, FatigueLaw, Relaxa
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
 from cfmkit.specs.units.fields import described
+from cfmkit.stock.assumed_lasting import ASSUMED
 from cfmkit.stock.materials import UnknownMaterial, material
 from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
 from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
@@ -25,6 +26,7 @@ from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from cfmkit.stock.assumed_lasting import AssumedCreep, AssumedFatigue
     from cfmkit.stock.stock_series import StockSize
 
 
@@ -88,6 +90,11 @@ class Fatigue(Model):
         return FatigueLaw(self.points or (), line, self.ultimate_strength)
 
     @classmethod
+    def assumed(cls, found: AssumedFatigue) -> Self:
+        """Return what is assumed of a material."""
+        return cls(points=found.points, ultimate_strength=found.ultimate_strength, source=found.source)
+
+    @classmethod
     def of(cls, law: FatigueLaw) -> Self:
         """Return a law as a specification says it."""
         coefficient, exponent = law.basquin or (None, None)
@@ -122,6 +129,11 @@ class Relaxation(Model):
                 raise ValueError("'points' must have increasing times and moduli that do not rise")
         return self
 
+    @classmethod
+    def assumed(cls, found: AssumedCreep) -> Self:
+        """Return what is assumed of a material."""
+        return cls(points=found.points, temperature=found.temperature, source=found.source)
+
     @property
     def law(self) -> RelaxationLaw:
         """The same as numbers."""
@@ -149,14 +161,20 @@ class MaterialSpec(Model):
         description="at large strain, for fidelity 'solid': Hooke's law in Green's strain, or rubber-like; beams bend "
         "with small strains, for which both are Hooke's",
     )
-    fatigue: Fatigue | None = Field(None, description="S-N points or Basquin's line, for `fatigue_life`; default: none")
+    fatigue: Fatigue | None = Field(
+        None,
+        description="S-N points or Basquin's line, for `fatigue_life`; default: as "
+        "assumed in `show materials`, if it has any; null: none",
+    )
     relaxation: Relaxation | None = Field(
-        None, description="Prony terms or moduli over time, for `force_after[1000 h]`; default: none"
+        None,
+        description="Prony terms or moduli over time, for `force_after[1000 h]`; default: as assumed in `show "
+        "materials`, if it has any; null: none",
     )
 
     @model_validator(mode="after")
     def _filled_in(self) -> Self:
-        given: dict[str, float | None] = {"poisson_ratio": _POISSON_RATIO}
+        given: dict[str, Any] = {"poisson_ratio": _POISSON_RATIO}
         if self.name is not None:
             try:
                 known = material(self.name)
@@ -164,6 +182,7 @@ class MaterialSpec(Model):
                 refuse("Material", {("name",): str(error)})
                 raise
             given = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
+            given |= {key: law for key, law in _assumed(known.name).items() if key not in self.model_fields_set}
         elif self.youngs_modulus is None:
             raise ValueError("needs 'name' or 'youngs_modulus'")
         for key, value in given.items():
@@ -211,7 +230,28 @@ class MaterialSpec(Model):
             self.fatigue.law if self.fatigue else None,
             self.relaxation.law if self.relaxation else None,
             self.relaxation.hold if self.relaxation else (),
+            self.assumed,
         )
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """The sources of what is assumed, because only the name is stated."""
+        laws = (("fatigue", self.fatigue), ("relaxation", self.relaxation))
+        stated = self.model_fields_set
+        return tuple(law.source or "" for key, law in laws if law is not None and key not in stated)
+
+
+def _assumed(name: str) -> dict[str, Fatigue | Relaxation]:
+    """Return what is assumed of a material of the library, by the key that states it."""
+    found = ASSUMED.get(name)
+    if found is None:
+        return {}
+    laws: dict[str, Fatigue | Relaxation] = {}
+    if found.fatigue is not None:
+        laws["fatigue"] = Fatigue.assumed(found.fatigue)
+    if found.relaxation is not None:
+        laws["relaxation"] = Relaxation.assumed(found.relaxation)
+    return laws
 
 
 Friction = Annotated[Ratio, Field(ge=0, lt=1)]

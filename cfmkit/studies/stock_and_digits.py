@@ -142,8 +142,8 @@ def with_digits_of_process(given: Spec, found: Design, finish: Callable[[Spec], 
     if found.spec is None:
         return found
     stated, written = (dict(_texts(spec.model_dump(mode="json", exclude_unset=True))) for spec in (given, found.spec))
-    sheet = written.get("mechanism.part.sheet")
-    chosen = {path: text for path, text in written.items() if text not in (stated.get(path), sheet)}
+    kept = {*stated.values(), written.get("mechanism.part.sheet")}  # a profile made for stated links has their lengths
+    chosen = {path: text for path, text in written.items() if text not in kept}
     decimals, before = decimals_of(accuracy_of(found.spec)), None
     for refined in range(FINER):
         rounded = {path: _rounded(text, decimals + refined) for path, text in chosen.items()}

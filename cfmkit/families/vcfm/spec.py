@@ -373,7 +373,9 @@ class VcfmSpec(Spec):
         found = self.mechanism.material.durability
         if found is None or self.mechanism.springs is None:
             return found
-        return None if found.fatigue is None else Durability(found.fatigue)
+        if found.fatigue is None:
+            return None
+        return Durability(found.fatigue, assumed=found.assumed if found.relaxation is None else ())
 
     @property
     def travel(self) -> float:
