@@ -13,6 +13,7 @@ Shigley
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -76,7 +77,7 @@ def machined_surface(ultimate: float) -> float:
     >>> round(machined_surface(520e6), 2)
     0.86
     """
-    return min(1.0, 4.51 * (ultimate / 1e6) ** -0.265)
+    return min(1.0, 4.51 * math.pow(ultimate / 1e6, -0.265))
 
 
 def steel(ultimate: float, strength: str) -> AssumedFatigue:

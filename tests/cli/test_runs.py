@@ -21,7 +21,8 @@ def test_analyze_writes_curve_metrics_resolved_spec_and_manifest_in_the_default_
     done = cli("analyze", cam, *QUICK)
     assert (done.code, done.err) == (0, "")
     assert written(cli.folder) == {cam} | {
-        f"cfm-out/cam-analyze/{name}" for name in ("curve.csv", "metrics.json", "parts.csv", "resolved.yaml", "manifest.json")
+        f"cfm-out/cam-analyze/{name}"
+        for name in ("curve.csv", "metrics.json", "parts.csv", "resolved.yaml", "manifest.json")
     }
 
 
