@@ -22,10 +22,29 @@ def part_on_paper(drawing: Drawing, spec: Spec) -> Figure:
 
     stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
     reported = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
+    reported = (*reported, *how_to_print(drawing, spec))
     # a date would make other bytes of the same part; the revision changes with any value of the mechanism
     revision = stable_hash(spec.model_dump(mode="json", include={"family", "mechanism"}))[:8]
     block = TitleBlock(revision, weight_in_words(drawing, spec), decimals_of(accuracy_of(spec)))
     return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", reported, block)
+
+
+def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
+    """Return how a part lies on the bed of a printer, and of how many strands its leaves are; nothing if it is cut."""
+    from cfmkit.plots.workshop_drawing import thicknesses
+    from cfmkit.stock.printing import strands_in_words
+    from cfmkit.studies.parts.assumed_errors import accuracy_of
+
+    accuracy = accuracy_of(spec)
+    if accuracy.name != "fdm":
+        return ()
+    material = getattr(getattr(spec, "mechanism", None), "material", None)
+    sizes = dict.fromkeys(round(section.thickness, 7) for section in thicknesses(drawing))
+    if getattr(material, "layers", None) == "across":
+        laid = "print standing: layers across the leaves, whose strength is that between layers"
+    else:
+        laid = "print lying flat: layers in the plane of this sheet, strands along the leaves"
+    return (laid, *(strands_in_words(size, accuracy.least_feature) for size in list(sizes)[:3]))
 
 
 def weight_in_words(drawing: Drawing, spec: Spec) -> str:

@@ -8,136 +8,32 @@ One rule: the allowable stress is the yield strength over `safety_factor`, which
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from cfmkit.errors import QuantityError
-from cfmkit.metrics.fatigue_and_relaxation import Durability, FatigueLaw, RelaxationLaw
+from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
+from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
 from cfmkit.specs.units.fields import described
-from cfmkit.stock.assumed_lasting import ASSUMED
+from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed
 from cfmkit.stock.materials import UnknownMaterial, material
+from cfmkit.stock.printing import LAYERED, Layers
 from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
 from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.stock.assumed_lasting import AssumedCreep, AssumedFatigue
     from cfmkit.stock.stock_series import StockSize
 
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
-PositiveTime = Annotated[Time, Field(gt=0)]
-PositiveRatio = Annotated[Ratio, Field(gt=0, lt=1)]
-PositiveNumber = Annotated[float, Field(gt=0)]
 SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this factor")]
 
 _POISSON_RATIO = 0.3
 """Of a material described by its values alone: between that of metals and that of plastics."""
-
-
-class Fatigue(Model):
-    """How many cycles a material lasts: S-N points or Basquin's line, with Goodman's line for the mean stress."""
-
-    points: tuple[tuple[PositiveNumber, PositiveStress], ...] | None = Field(
-        None, min_length=2, description="S-N points [[cycles, amplitude], ...], fully reversed, cycles increasing"
-    )
-    coefficient: PositiveStress | None = Field(None, description="instead of points: s_f' of Basquin's s_f' (2 N)^b")
-    exponent: Annotated[Ratio, Field(gt=-1, lt=0)] | None = Field(None, description="b of the same, negative")
-    ultimate_strength: PositiveStress = Field(description="s_u, at which Goodman's line ends")
-    cycles: Annotated[float, Field(gt=0)] | None = Field(
-        None,
-        description="required life in cycles: the allowable stress is then at most the one that "
-        "can be applied so often, from 0 and back",
-    )
-    source: str | None = Field(None, max_length=300, description="where the values were read")
-
-    @model_validator(mode="after")
-    def _one_line(self) -> Self:
-        basquin = self.coefficient is not None and self.exponent is not None
-        if (self.coefficient is None) != (self.exponent is None):
-            raise ValueError("'coefficient' and 'exponent' belong together")
-        if basquin == (self.points is not None):
-            raise ValueError("give either 'points' or 'coefficient' and 'exponent'")
-        for (before, above), (after, below) in pairwise(self.points or ()):
-            if after <= before or below > above:
-                raise ValueError("'points' must have increasing cycles and amplitudes that do not rise")
-        if self.points is not None:
-            self._within_points(self.points)
-        return self
-
-    def _within_points(self, points: tuple[tuple[float, float], ...]) -> None:
-        """Raise if an amplitude is more than the material bears once, or more cycles are wanted than were shown."""
-        if points[0][1] > self.ultimate_strength:
-            reported = (
-                f"{format_short(points[0][1], 'stress')} is above {format_short(self.ultimate_strength, 'stress')}"
-            )
-            raise ValueError(f"an amplitude of 'points' is above 'ultimate_strength': {reported}")
-        if self.cycles is not None and self.cycles > points[-1][0] * (1 + 1e-12):
-            raise ValueError(
-                f"'cycles' is {self.cycles:g}, more than the {points[-1][0]:g} at which 'points' end: add points, or "
-                "give Basquin's line"
-            )
-
-    @property
-    def law(self) -> FatigueLaw:
-        """The same as numbers."""
-        line = None if self.coefficient is None or self.exponent is None else (self.coefficient, self.exponent)
-        return FatigueLaw(self.points or (), line, self.ultimate_strength)
-
-    @classmethod
-    def assumed(cls, found: AssumedFatigue) -> Self:
-        """Return what is assumed of a material."""
-        return cls(points=found.points, ultimate_strength=found.ultimate_strength, source=found.source)
-
-    @classmethod
-    def of(cls, law: FatigueLaw) -> Self:
-        """Return a law as a specification says it."""
-        coefficient, exponent = law.basquin or (None, None)
-        return cls(
-            points=law.points or None, coefficient=coefficient, exponent=exponent, ultimate_strength=law.ultimate
-        )
-
-
-class Relaxation(Model):
-    """How the modulus falls while a strain is held: Prony terms, or the modulus at some times."""
-
-    terms: tuple[tuple[PositiveRatio, PositiveTime], ...] | None = Field(
-        None, min_length=1, description="Prony terms [[share, relaxation time], ...]: [[20 %, 10 h], [15 %, 500 h]]"
-    )
-    points: tuple[tuple[Annotated[Time, Field(ge=0)], PositiveStress], ...] | None = Field(
-        None, min_length=2, description="or the modulus after some times [[0 h, 1.5 GPa], [1000 h, 1.1 GPa]]"
-    )
-    hold: tuple[PositiveTime, ...] = Field(
-        (3.6e6,), min_length=1, description="after which the force is reported as `force_after[...]`; default: 1000 h"
-    )
-    temperature: str | None = Field(None, max_length=100, description="of the data, in words")
-    source: str | None = Field(None, max_length=300, description="where the values were read")
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        if (self.terms is None) == (self.points is None):
-            raise ValueError("give either 'terms' or 'points'")
-        if self.terms is not None and sum(share for share, _ in self.terms) >= 1:
-            raise ValueError("the shares of 'terms' must add up to less than 100 %: part of the modulus must remain")
-        for (before, above), (after, below) in pairwise(self.points or ()):
-            if after <= before or below > above:
-                raise ValueError("'points' must have increasing times and moduli that do not rise")
-        return self
-
-    @classmethod
-    def assumed(cls, found: AssumedCreep) -> Self:
-        """Return what is assumed of a material."""
-        return cls(points=found.points, temperature=found.temperature, source=found.source)
-
-    @property
-    def law(self) -> RelaxationLaw:
-        """The same as numbers."""
-        return RelaxationLaw(self.terms or (), self.points or ())
 
 
 class MaterialSpec(Model):
@@ -155,6 +51,11 @@ class MaterialSpec(Model):
     )
     yield_strength: PositiveStress | None = Field(
         None, description="for the allowable stress; default: the named material's, if known"
+    )
+    layers: Layers | None = Field(
+        None,
+        description="of a printed part: 'along' if it lies flat and its leaves bend along the layers, 'across' if it "
+        "stands; the strength, and the modulus if known, are then those of this direction",
     )
     law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
         "st-venant-kirchhoff",
@@ -182,9 +83,12 @@ class MaterialSpec(Model):
                 refuse("Material", {("name",): str(error)})
                 raise
             given = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
-            given |= {key: law for key, law in _assumed(known.name).items() if key not in self.model_fields_set}
+            given |= {key: law for key, law in assumed(known.name).items() if key not in self.model_fields_set}
+            given |= self._of_layers(known.name)
         elif self.youngs_modulus is None:
             raise ValueError("needs 'name' or 'youngs_modulus'")
+        else:
+            self._of_layers("these values")
         for key, value in given.items():
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
@@ -192,6 +96,23 @@ class MaterialSpec(Model):
             reported = "'neo-hookean' needs a poisson_ratio below 0.5: at 0.5 it has no finite bulk modulus"
             refuse("Material", {("law",): reported})
         return self
+
+    def _of_layers(self, name: str) -> dict[str, float]:
+        """Return strength and modulus of a print in the direction that is stated, by their keys."""
+        known = LAYERED.get(name)
+        if self.layers is None or self.yield_strength is not None:
+            return {}
+        if known is None:
+            named = ", ".join(LAYERED)
+            reported = (
+                f"no strength along and across the layers is known of {name}: state 'yield_strength'; known: {named}"
+            )
+            refuse("Material", {("layers",): reported})
+            return {}
+        if self.layers == "along":
+            return {"yield_strength": known.along}
+        modulus = {} if known.modulus_across is None else {"youngs_modulus": known.modulus_across}
+        return {"yield_strength": known.across, **modulus}
 
     @property
     def modulus(self) -> float:
@@ -230,28 +151,15 @@ class MaterialSpec(Model):
             self.fatigue.law if self.fatigue else None,
             self.relaxation.law if self.relaxation else None,
             self.relaxation.hold if self.relaxation else (),
-            self.assumed,
+            self.assumed_sources,
         )
 
     @property
-    def assumed(self) -> tuple[str, ...]:
+    def assumed_sources(self) -> tuple[str, ...]:
         """The sources of what is assumed, because only the name is stated."""
         laws = (("fatigue", self.fatigue), ("relaxation", self.relaxation))
         stated = self.model_fields_set
         return tuple(law.source or "" for key, law in laws if law is not None and key not in stated)
-
-
-def _assumed(name: str) -> dict[str, Fatigue | Relaxation]:
-    """Return what is assumed of a material of the library, by the key that states it."""
-    found = ASSUMED.get(name)
-    if found is None:
-        return {}
-    laws: dict[str, Fatigue | Relaxation] = {}
-    if found.fatigue is not None:
-        laws["fatigue"] = Fatigue.assumed(found.fatigue)
-    if found.relaxation is not None:
-        laws["relaxation"] = Relaxation.assumed(found.relaxation)
-    return laws
 
 
 Friction = Annotated[Ratio, Field(ge=0, lt=1)]

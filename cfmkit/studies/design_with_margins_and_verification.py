@@ -32,14 +32,15 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
         that for its margins what is left. A part from a sheet is designed again for its solid, with the whole budget:
         with what is left, the finished design could be lost.
     """
-    from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet
+    from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet, with_whole_strands
 
     found = _finished(spec, designer, run)
 
     def finish(other: Spec) -> Design:
         return _finished(other, designer, run)
 
-    return with_digits_of_process(spec, with_stock_sheet(spec, found, finish, run), finish, run)
+    found = with_whole_strands(spec, with_stock_sheet(spec, found, finish, run), finish, run)
+    return with_digits_of_process(spec, found, finish, run)
 
 
 def _finished(spec: Spec, designer: Designer, run: Run) -> Design:

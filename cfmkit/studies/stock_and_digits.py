@@ -20,6 +20,7 @@ from cfmkit.families import family
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
+from cfmkit.stock.printing import is_whole, strands, strands_in_words
 from cfmkit.stock.stock_series import series_of
 from cfmkit.studies.parts.assumed_errors import accuracy_of, process_of_part
 
@@ -37,6 +38,9 @@ MAX_SHEETS = 4
 
 SHARE_OF_DEVIATION = 0.1
 """Largest unit of the last digit over the standard deviation of the process: the error is at most 5 % of it."""
+
+MOST_CHANGE = 0.05
+"""Change of the mean force with which a design of whole strands still counts as the same design."""
 
 FINER = 4
 """Decimals by which the digits are refined where a rounded design misses a requirement that it met: to a nanometre."""
@@ -93,6 +97,61 @@ def with_stock_sheet(given: Spec, found: Design, finish: Callable[[Spec], Design
     return Design(None, Status.INFEASIBLE, text)
 
 
+def with_whole_strands(given: Spec, found: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
+    """Return a design whose printed leaves are whole strands thick, where `part.stock` asks for sizes that exist.
+
+    The next whole numbers are tried, the nearest first, and the design is repeated for each. Where it would then miss a
+    requirement that it meets, or another force results, it is left as it is, with a note.
+    """
+    part: Any = getattr(getattr(given, "mechanism", None), "part", None)
+    if found.spec is None or getattr(part, "stock", None) is None or accuracy_of(given).name != "fdm":
+        return found
+    nozzle = accuracy_of(given).least_feature
+    leaves = {path: size for path, size in found.spec.leaves() if _is_leaf(path, size)}
+    if not leaves or all(is_whole(size, nozzle) for size in leaves.values()):
+        return found
+    near = [{path: _whole(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
+    before = _outcomes(found.spec, run)
+    words = "; ".join(strands_in_words(size, nozzle) for size in dict.fromkeys(leaves.values()))
+    for changes in near:
+        try:
+            levers = _levers(given, leaves, changes)
+            stated = {path: value for path, value in given.leaves() if path in levers}  # what is asked for stays
+            again = finish(given.replace({**changes, **levers}))
+            spec = None if again.spec is None else again.spec.replace({**changes, **stated})
+        except SpecError:
+            continue
+        if spec is None or any(was and not now for was, now in zip(before, _outcomes(spec, run), strict=True)):
+            continue
+        means = [_mean(family(one.family).analyze(one, run)) or math.nan for one in (found.spec, spec)]
+        if not abs(means[1] / means[0] - 1.0) <= MOST_CHANGE:
+            continue
+        told = _compared(f"whole strands taken: {words}", found.spec, spec, run)
+        return replace(again, spec=spec, notes=(*again.notes, ("strands", told)))
+    text = f"left as they are, because no design of whole strands meets as much: {words}"
+    return replace(found, notes=(*found.notes, ("strands", text)))
+
+
+def _levers(given: Spec, leaves: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, Any]:
+    """Return by which keys a design comes to thicknesses: a strip is as thick as its stress allows, or thinner."""
+    beam = "mechanism.beam.thickness"
+    if beam not in changes or getattr(getattr(given, "design", None), "beam", None) is None:
+        return {}
+    thinner = max(1.0, leaves[beam] / changes[beam])
+    return {"mechanism.safety_factor": thinner * float(given.at("mechanism").safety_factor)}
+
+
+def _is_leaf(path: str, size: Any) -> bool:
+    """Return True for the thickness of a leaf [m], not for the deviation of it that a process has."""
+    leaf = path.startswith("mechanism.") and path.endswith(".thickness") and ".process." not in path
+    return leaf and isinstance(size, float)
+
+
+def _whole(thickness: float, nozzle: float, rank: int) -> float:
+    numbers = strands(thickness, nozzle)
+    return round(numbers[min(rank, len(numbers) - 1)] * nozzle, 9)
+
+
 def _widths(spec: Spec) -> dict[str, float]:
     """Return the widths out of the plane, by their paths [m]."""
     stated = spec.out_of_plane_widths.items()
@@ -103,6 +162,11 @@ def _change(before: Spec, after: Spec, series: StockSeries, sheet: float, widths
     """Return which sheet was taken instead of which widths, and what that does to the force."""
     old = ", ".join(format_short(width, "length") for width in dict.fromkeys(widths.values()))
     begun = f"sheet {format_short(sheet, 'length', 6)} ({series.system}, {series.standard}) instead of {old}"
+    return _compared(begun, before, after, run)
+
+
+def _compared(begun: str, before: Spec, after: Spec, run: Run) -> str:
+    """Return a sentence on a change, and what that does to the force."""
     record = family(after.family)
     means = [_mean(record.analyze(one, run)) for one in (before, after)]
     if None in means or not means[0]:
