@@ -43,7 +43,7 @@ def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
     if getattr(material, "layers", None) == "across":
         laid = "print standing: layers across the leaves, whose strength is that between layers"
     else:
-        laid = "print lying flat: layers in the plane of this sheet, strands along the leaves"
+        laid = "print lying flat: layers in the plane of this sheet" + (", strands along the leaves" if sizes else "")
     return (laid, *(strands_in_words(size, accuracy.least_feature) for size in list(sizes)[:3]))
 
 
