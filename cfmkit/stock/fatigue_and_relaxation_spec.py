@@ -1,4 +1,4 @@
-"""How a specification says how long a material lasts and how it creeps, and what is assumed where it says nothing."""
+"""Fatigue and relaxation of a material as a specification states them, and as they are assumed otherwise."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PositiveNumber = Annotated[float, Field(gt=0)]
 
 
 class Fatigue(Model):
-    """How many cycles a material lasts: S-N points or Basquin's line, with Goodman's line for the mean stress."""
+    """Fatigue of a material: S-N points or Basquin's line, with Goodman's line for the mean stress."""
 
     points: tuple[tuple[PositiveNumber, PositiveStress], ...] | None = Field(
         None, min_length=2, description="S-N points [[cycles, amplitude], ...], fully reversed, cycles increasing"
@@ -85,7 +85,7 @@ class Fatigue(Model):
 
 
 class Relaxation(Model):
-    """How the modulus falls while a strain is held: Prony terms, or the modulus at some times."""
+    """Relaxation of the modulus while a strain is held: Prony terms, or the modulus at some times."""
 
     terms: tuple[tuple[PositiveRatio, PositiveTime], ...] | None = Field(
         None, min_length=1, description="Prony terms [[share, relaxation time], ...]: [[20 %, 10 h], [15 %, 500 h]]"

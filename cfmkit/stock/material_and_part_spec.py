@@ -1,4 +1,4 @@
-"""How every family's specification says what a part is made of, and how much of its strength may be used.
+"""Material and part in a specification, and the share of the strength that may be used.
 
 One grammar: a name from the library, a block of values, or a name with some of its values changed; and one for how
 a part is cut, and for plain pins and guides that rub.
@@ -126,7 +126,7 @@ class MaterialSpec(Model):
 
     @property
     def words(self) -> str:
-        """What it is in words: its name, if it has one, its modulus, and its strength, if that is known."""
+        """Description: its name, if it has one, its modulus, and its strength, if that is known."""
         values = f"E {format_short(self.modulus, 'stress')}"
         if self.yield_strength is not None:
             values += f", yield {format_short(self.yield_strength, 'stress')}"
@@ -229,7 +229,7 @@ class Hole(Model):
 
 
 class PartProcess(Model):
-    """How a part is made: a process, and what is known better than what is assumed of it."""
+    """Process that makes a part, and values known better than assumed."""
 
     name: ProcessName | None = Field(None, description="the process; default: by the material")
     kerf: FromZero | None = Field(None, description="width of the cut")
@@ -280,7 +280,7 @@ ProcessField = Annotated[PartProcess, BeforeValidator(_process_block, json_schem
 
 
 class PartFrame(Model):
-    """What stands and what is moved, around the elastic part: thicknesses in the plane."""
+    """Standing and moved pieces around the elastic part: thicknesses in the plane."""
 
     wall: AboveZero | None = Field(None, description="thickness of the held parts behind the roots")
     shuttle: AboveZero | None = Field(None, description="thickness of the driven part behind the roots")
@@ -299,7 +299,7 @@ class AroundFrame(PartFrame):
 
 
 class CutPart(Model):
-    """How a part is cut: what every family that is cut from a sheet can say."""
+    """Cut of a part from a sheet, common to all families."""
 
     process: ProcessField | None = Field(
         None,
@@ -334,7 +334,7 @@ class CutPart(Model):
 
 
 class PaddedPart(CutPart):
-    """How a part that ends in pads is cut."""
+    """Cut of a part that ends in pads."""
 
     pad: tuple[AboveZero, AboveZero] | None = Field(
         None, description="depth and breadth of the pads at held and driven ends"
@@ -354,7 +354,7 @@ def fillet_of(part: CutPart | None, thinnest: float) -> float:
 
 
 class RoundedCorners:
-    """What a mechanism that has `part` and `thinnest` knows of the inside corners of its part."""
+    """Inside corners of the part of a mechanism that has `part` and `thinnest`."""
 
     @property
     def fillet(self: Any) -> float:

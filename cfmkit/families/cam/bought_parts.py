@@ -1,4 +1,4 @@
-"""What is bought for a cam mechanism, in words: its springs."""
+"""Bought parts of a cam mechanism, in words: its springs."""
 
 from __future__ import annotations
 
