@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NO_SPREAD = "none stated"
 """Of a property for which the sources of a material state no range."""
 
-TEXT = (
+PAGE_TEXT = (
     "At room temperature, under short-term loads; the ranges are what to expect in practice. What is assumed counts "
     "where a specification names the material and states no 'fatigue' or 'relaxation'. With --json in SI units."
 )
@@ -26,10 +26,10 @@ TEXT = (
 def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, list[dict[str, Any]]]]:
     """Return title, text, tables and records of the page."""
     from cfmkit.stock import MATERIALS
-    from cfmkit.stock.assumed_lasting import ASSUMED
+    from cfmkit.stock.assumed_lasting import ASSUMED_DATA
 
     records = [
-        {**asdict(item), "assumed": asdict(ASSUMED[item.name]) if item.name in ASSUMED else None}
+        {**asdict(item), "assumed": asdict(ASSUMED_DATA[item.name]) if item.name in ASSUMED_DATA else None}
         for item in MATERIALS.values()
     ]
     columns = (
@@ -47,7 +47,7 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
         Field("from ... to", lambda item: _spread(item["scatter"]["density"]), wraps=True),
         field("source", wraps=True),
     )
-    lasting = [row for name, one in ASSUMED.items() for row in assumed_rows(name, one)]
+    lasting = [row for name, entry in ASSUMED_DATA.items() for row in assumed_rows(name, entry)]
     assumed = (
         field("name", "material", wraps=True),
         field("property", wraps=True),
@@ -55,40 +55,40 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
         field("source", wraps=True),
     )
     sections = (("", records, columns), ("sources", records, sources), ("assumed", lasting, assumed))
-    return "materials", TEXT, sections, {"materials": records}
+    return "materials", PAGE_TEXT, sections, {"materials": records}
 
 
-def assumed_rows(name: str, one: Assumed) -> list[dict[str, str]]:
+def assumed_rows(name: str, entry: Assumed) -> list[dict[str, str]]:
     """Return what is assumed of a material, a row for each property.
 
     Examples
     --------
-    >>> from cfmkit.stock.assumed_lasting import ASSUMED
-    >>> [row["values"] for row in assumed_rows("pc", ASSUMED["pc"])]
+    >>> from cfmkit.stock.assumed_lasting import ASSUMED_DATA
+    >>> [row["values"] for row in assumed_rows("pc", ASSUMED_DATA["pc"])]
     ['2.4 GPa at once, 2.2 GPa after 1 h, 1.9 GPa after 1000 h, 23 deg C']
     """
-    found: list[tuple[str, str, str]] = []
-    if (law := one.fatigue) is not None:
+    result: list[tuple[str, str, str]] = []
+    if (law := entry.fatigue) is not None:
         amplitudes = ", ".join(f"{amplitude / 1e6:.0f} MPa at {cycles:.0e}" for cycles, amplitude in law.points)
         words = f"{amplitudes}, fully reversed; tensile strength {law.ultimate_strength / 1e6:.0f} MPa"
-        found.append(("S-N", words.replace("e+0", "e"), law.source))
-    if (creep := one.relaxation) is not None:
+        result.append(("S-N", words.replace("e+0", "e"), law.source))
+    if (creep := entry.relaxation) is not None:
         moduli = ", ".join(
             f"{modulus / 1e9:.3g} GPa {f'after {time / 3600:.0f} h' if time else 'at once'}"
             for time, modulus in creep.points
         )
-        found.append(("modulus over time", f"{moduli}, {creep.temperature}", creep.source))
-    if one.loss_factor is not None:
-        found.append(("loss factor", f"{one.loss_factor:g}", f"assumed: {one.loss_source}; no model uses it"))
+        result.append(("modulus over time", f"{moduli}, {creep.temperature}", creep.source))
+    if entry.loss_factor is not None:
+        result.append(("loss factor", f"{entry.loss_factor:g}", f"assumed: {entry.loss_source}; no model uses it"))
     return [
         {"name": name, "property": what, "values": values, "source": source.removeprefix("assumed: ")}
-        for what, values, source in found
+        for what, values, source in result
     ]
 
 
 def properties(item: Mapping[str, Any]) -> str:
     """Return the numbers of a material in words."""
-    from cfmkit.stock.assumed_lasting import ASSUMED
+    from cfmkit.stock.assumed_lasting import ASSUMED_DATA
 
     scatter, strength = item["scatter"], item["yield_strength"]
     reported = [
@@ -98,8 +98,8 @@ def properties(item: Mapping[str, Any]) -> str:
     ]
     if strength is not None:
         reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_range(scatter['yield_strength'], 1e6)})")
-    if item["name"] in ASSUMED:
-        rows = assumed_rows(item["name"], ASSUMED[item["name"]])
+    if item["name"] in ASSUMED_DATA:
+        rows = assumed_rows(item["name"], ASSUMED_DATA[item["name"]])
         reported += [f"assumed {row['property']}: {row['values']} ({row['source']})" for row in rows]
     return ", ".join(reported)
 

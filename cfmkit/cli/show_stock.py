@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Section = tuple[str, Sequence[Mapping[str, Any]], tuple[Field, ...]]
 
-TEXT = (
+PAGE_TEXT = (
     "Sizes for `part.stock: metric` and `inch`, as far as a text with them was read: sheets by material, bearings by "
     "their bore. Materials that are missing have no series here, and their sheets are not rounded."
 )
@@ -23,20 +23,20 @@ def stock_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, list[di
 
     records = [
         {
-            "kind": one.kind,
-            "system": one.system,
-            "materials": list(one.materials),
-            "standard": one.standard,
-            "sizes": list(one.sizes),
-            "read": one.read,
+            "kind": entry.kind,
+            "system": entry.system,
+            "materials": list(entry.materials),
+            "standard": entry.standard,
+            "sizes": list(entry.sizes),
+            "read": entry.read,
         }
-        for one in ALL_SERIES
+        for entry in ALL_SERIES
     ]
     columns = (
-        Field("stock", lambda one: " ".join((one["kind"], *one["materials"])), wraps=True),
+        Field("stock", lambda entry: " ".join((entry["kind"], *entry["materials"])), wraps=True),
         field("system"),
         field("standard", wraps=True),
-        Field("sizes [mm]", lambda one: ", ".join(f"{1e3 * size:.6g}" for size in one["sizes"]), wraps=True),
+        Field("sizes [mm]", lambda entry: ", ".join(f"{1e3 * size:.6g}" for size in entry["sizes"]), wraps=True),
         field("read", "read in", wraps=True),
     )
-    return "stock", TEXT, (("", records, columns),), {"stock": records}
+    return "stock", PAGE_TEXT, (("", records, columns),), {"stock": records}

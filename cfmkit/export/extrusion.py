@@ -94,8 +94,8 @@ def volume(drawing: Drawing) -> float:
     cfmkit.errors.GeometryError
         As `plates`.
     """
-    found = plates(outlines(drawing, drawing.tolerance), drawing.sheet, drawing.tolerance)
-    return float(sum(face.area * thickness for plate in found for face, thickness in plate.faces))
+    result = plates(outlines(drawing, drawing.tolerance), drawing.sheet, drawing.tolerance)
+    return float(sum(face.area * thickness for plate in result for face, thickness in plate.faces))
 
 
 def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:

@@ -180,18 +180,18 @@ def clear_places(ground: FloatArray, moving: Sequence[PosedBody], head: float) -
     covered = swept([replace(body, core=body.core[_evenly_moved(body.core)]) for body in moving])
     (x0, y0), (x1, y1) = (ground.min(axis=0) + head).tolist(), (ground.max(axis=0) - head).tolist()
     shares = np.linspace(0.0, 0.5, N_PLACES).tolist()
-    found: list[FloatArray] = []
+    result: list[FloatArray] = []
     for x, far_x in ((x0, x1), (x1, x0)):
         for y, far_y in ((y0, y1), (y1, y0)):
             pairs = [((x + share * (far_x - x), y), (x, y + share * (far_y - y))) for share in shares]
             along = [at for pair in pairs for at in pair]
             clear = [at for at in along if covered.distance(Point(at)) >= 0.5 * head]
-            found += [np.array(clear[0])] if clear else []
-    return found if len(found) > 1 else [np.array([x, y]) for x in (x0, x1) for y in (y0, y1)]
+            result += [np.array(clear[0])] if clear else []
+    return result if len(result) > 1 else [np.array([x, y]) for x in (x0, x1) for y in (y0, y1)]
 
 
 def _evenly_moved(core: FloatArray) -> Any:
     """Return the numbers of poses (p, k, 2) between which a body moves by equal distances, the ends included."""
     steps = np.hypot(*np.moveaxis(np.diff(core, axis=0), -1, 0)).max(axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], N_COVERING)))
+    path = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.unique(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))

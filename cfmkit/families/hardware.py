@@ -1,4 +1,4 @@
-"""What joins a mechanism of rigid parts: links, pins, slider guide and screws, dimensioned for the loads of its motion.
+"""Parts that join a mechanism of rigid parts: links, pins, guide and screws, sized for the loads of its motion.
 
 Sizes that the specification states are kept; others are the smallest of their series that bear the load. What is
 assumed where nothing is stated: links and plates of S235, pins and rods of the same strength, a safety factor of
@@ -16,7 +16,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock import MATERIALS
 from cfmkit.stock.joint_strength import eye_that_bears, pin_that_bears, rod_that_guides
 from cfmkit.stock.parts_list import ListedPart
-from cfmkit.stock.stock_series import SCREWS, series_of
+from cfmkit.stock.stock_series import SOCKET_SCREWS, series_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -62,14 +62,14 @@ class PartStrength:
     assumed: bool  # whether the material is not stated
 
     @classmethod
-    def of(cls, material: MaterialSpec | None, safety_factor: float) -> PartStrength:
+    def from_material(cls, material: MaterialSpec | None, safety_factor: float) -> PartStrength:
         """Return that of a stated material, or of the default one where none with a strength is stated."""
         safety = safety_factor if safety_factor > 1.0 else DEFAULT_SAFETY
         allowable = None if material is None else material.allowable(safety)
         if material is None or allowable is None:
-            known = MATERIALS[DEFAULT_MATERIAL]
-            strength = float(known.yield_strength or 0.0)
-            return cls(known.name, known.youngs_modulus, strength / safety, PIN_STRENGTH / safety, True)
+            reference = MATERIALS[DEFAULT_MATERIAL]
+            strength = float(reference.yield_strength or 0.0)
+            return cls(reference.name, reference.youngs_modulus, strength / safety, PIN_STRENGTH / safety, True)
         return cls(material.name or material.words, material.modulus, allowable, PIN_STRENGTH / safety, False)
 
 
@@ -92,8 +92,8 @@ def with_faults(parts: Iterable[ListedPart], faults: Mapping[str, str]) -> tuple
 
 def series_sizes(kind: str, system: System | None) -> tuple[float, ...]:
     """Return the diameters of a series of pins or dowels [m], metric ones unless inches are requested."""
-    found = series_of("dowel" if kind == "dowel" else "pin", system or "metric")
-    return () if found is None else tuple(size for size in found.sizes if size >= 1e-3)
+    result = series_of("dowel" if kind == "dowel" else "pin", system or "metric")
+    return () if result is None else tuple(size for size in result.sizes if size >= 1e-3)
 
 
 def pin_for(
@@ -101,8 +101,8 @@ def pin_for(
 ) -> tuple[float, bool]:
     """Return the pin that bears a load at an arm [m], and whether there is one: where not, the thickest."""
     sizes = series_sizes("pin", system)
-    found = pin_that_bears(force, arm, thickness, strength.allowable, strength.pins, sizes)
-    return (sizes[-1], False) if found is None else (found, True)
+    result = pin_that_bears(force, arm, thickness, strength.allowable, strength.pins, sizes)
+    return (sizes[-1], False) if result is None else (result, True)
 
 
 def link_width(force: float, thickness: float, hole: float, strength: PartStrength) -> float:
@@ -113,12 +113,12 @@ def link_width(force: float, thickness: float, hole: float, strength: PartStreng
 
 def screw_for(load: float, thickness: float, count: int, strength: PartStrength) -> Screw:
     """Return the smallest screw that a plate bears when so many share a load: bearing, and shear of the screw."""
-    each = load / count
-    for screw in (one for one in SCREWS if one.diameter >= LEAST_SCREW):
-        shear = each / (0.25 * math.pi * screw.diameter**2)
-        if each / (screw.diameter * thickness) <= strength.allowable and shear <= strength.pins / math.sqrt(3.0):
+    share = load / count
+    for screw in (entry for entry in SOCKET_SCREWS if entry.diameter >= LEAST_SCREW):
+        shear = share / (0.25 * math.pi * screw.diameter**2)
+        if share / (screw.diameter * thickness) <= strength.allowable and shear <= strength.pins / math.sqrt(3.0):
             return screw
-    return SCREWS[-1]
+    return SOCKET_SCREWS[-1]
 
 
 @dataclass(frozen=True)
@@ -160,8 +160,8 @@ def guide_rod(
     couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bush
     load = max(across + couple, SIDE_SHARE * force)
     span, sizes = travel + length, series_sizes("pin", system)
-    found = rod_that_guides(load, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
-    diameter = sizes[-1] if found is None else found
+    result = rod_that_guides(load, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
+    diameter = sizes[-1] if result is None else result
     return GuideRod(diameter, span, length, load, load / (diameter * length))
 
 
@@ -172,11 +172,12 @@ def mm(*sizes: float) -> str:
 
 def pin_part(place: str, count: int, diameter: float, length: float, load: float, body: str = "") -> ListedPart:
     """Return a pin of the list, as long as what it joins."""
-    found = next(
-        (one for one in (series_of("pin", "metric"), series_of("pin", "inch")) if one and one.holds(diameter)), None
+    result = next(
+        (entry for entry in (series_of("pin", "metric"), series_of("pin", "inch")) if entry and entry.holds(diameter)),
+        None,
     )
     data = f"pin, diameter {format_short(diameter, 'length')}, bears {format_short(load, 'force', 3)}"
-    standard = "" if found is None else found.standard
+    standard = "" if result is None else result.standard
     return ListedPart(place, "", count, data, "buy", mm(diameter, length), standard, body)
 
 

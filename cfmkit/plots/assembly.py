@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from cfmkit.export.posed_part import PosedBody
     from cfmkit.stock.parts_list import ListedPart
 
-SIZE = (220.0, 150.0)
+SHEET_SIZE = (220.0, 150.0)
 """Of the figure [mm]."""
 
 LIST_WIDTH = 92.0
 """Of the parts list beside the picture [mm]."""
 
-MARGIN, BALLOON = 12.0, 3.0
+EDGE_MARGIN, BALLOON_RADIUS = 12.0, 3.0
 """Room for balloons around the parts, and their radius [mm of print]."""
 
-SHARES = (0.0, 0.6, -0.6, 0.3, -0.3)
+ANCHOR_SHARES = (0.0, 0.6, -0.6, 0.3, -0.3)
 """Where a number may point at a part whose middle is that of another one."""
 
 LETTERS_PER_LINE = 50
@@ -53,9 +53,9 @@ def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[Lis
     pose : int
         Which pose of bodies that move.
     """
-    figure = new_figure(*SIZE)
+    figure = new_figure(*SHEET_SIZE)
     write_heading(figure, Heading(title, "assembly, numbers as in parts.csv"))
-    ax = axes_mm(figure, (0.0, 4.0, SIZE[0] - LIST_WIDTH, SIZE[1] - 16.0))
+    ax = axes_mm(figure, (0.0, 4.0, SHEET_SIZE[0] - LIST_WIDTH, SHEET_SIZE[1] - 16.0))
     ax.axis("off")
     drawn = [(body, mm(body.outline(pose))) for body in bodies]
     points = np.vstack([outline for _, outline in drawn])
@@ -73,8 +73,8 @@ def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[Lis
 def _frame(ax: Axes, low: FloatArray, high: FloatArray) -> None:
     """Set the limits of the axes: the parts to scale, with room for balloons."""
     box = ax.get_position()
-    width, height = SIZE[0] * box.width, SIZE[1] * box.height
-    scale = min((width - 2.0 * MARGIN) / (high[0] - low[0]), (height - 2.0 * MARGIN) / (high[1] - low[1]))
+    width, height = SHEET_SIZE[0] * box.width, SHEET_SIZE[1] * box.height
+    scale = min((width - 2.0 * EDGE_MARGIN) / (high[0] - low[0]), (height - 2.0 * EDGE_MARGIN) / (high[1] - low[1]))
     middle, half = 0.5 * (low + high), 0.5 * np.array([width, height]) / scale
     ax.set_xlim(middle[0] - half[0], middle[0] + half[0])
     ax.set_ylim(middle[1] - half[1], middle[1] + half[1])
@@ -90,24 +90,24 @@ def _balloons(
 ) -> None:
     """Draw a number on each side of the parts, in the order of the heights of what it points at."""
     middle = 0.5 * (low + high)
-    near = 0.01 * float(np.hypot(*(high - low)))
+    neighbours = 0.01 * float(np.hypot(*(high - low)))
     shapes = {}
     for number, part in enumerate(parts, start=1):
-        found = [outline for body, outline in drawn if part.body and body.name == part.body]
-        if found:  # that of several which is farthest from the middle
-            shapes[number] = max(found, key=lambda outline: abs(float(outline.mean(axis=0)[0] - middle[0])))
+        result = [outline for body, outline in drawn if part.body and body.name == part.body]
+        if result:  # that of several which is farthest from the middle
+            shapes[number] = max(result, key=lambda outline: abs(float(outline.mean(axis=0)[0] - middle[0])))
     anchors: dict[int, tuple[float, float]] = {}
-    for number in sorted(shapes, key=lambda one: float(np.prod(np.ptp(shapes[one], axis=0)))):  # small ones first
-        for share in SHARES:
+    for number in sorted(shapes, key=lambda entry: float(np.prod(np.ptp(shapes[entry], axis=0)))):  # small ones first
+        for share in ANCHOR_SHARES:
             anchors[number] = _anchor(shapes[number], share)
-            others = [place for one, place in anchors.items() if one != number]
-            if all(math.dist(anchors[number], place) > near for place in others):
+            others = [place for entry, place in anchors.items() if entry != number]
+            if all(math.dist(anchors[number], place) > neighbours for place in others):
                 break
     left, right = _sides(anchors, middle[0])
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
-    per_mm = (x1 - x0) / (SIZE[0] - LIST_WIDTH)
-    for side, numbers in ((x0 + 1.5 * BALLOON * per_mm, left), (x1 - 1.5 * BALLOON * per_mm, right)):
-        heights = _spread([anchors[number][1] for number in numbers], 2.6 * BALLOON * per_mm, (y0, y1))
+    per_mm = (x1 - x0) / (SHEET_SIZE[0] - LIST_WIDTH)
+    for side, numbers in ((x0 + 1.5 * BALLOON_RADIUS * per_mm, left), (x1 - 1.5 * BALLOON_RADIUS * per_mm, right)):
+        heights = _spread([anchors[number][1] for number in numbers], 2.6 * BALLOON_RADIUS * per_mm, (y0, y1))
         for number, height in zip(numbers, heights, strict=True):
             x, y = anchors[number]
             ax.plot([x, side], [y, height], color=GREY, linewidth=0.5, zorder=5)
@@ -132,7 +132,7 @@ def _sides(anchors: dict[int, tuple[float, float]], middle: float) -> tuple[list
     half = sum(anchors[number][0] < middle for number in across)
     half = min(max(half, math.floor(0.4 * len(across))), math.ceil(0.6 * len(across)))
     left, right = across[:half], across[half:]
-    return sorted(left, key=lambda one: anchors[one][1]), sorted(right, key=lambda one: anchors[one][1])
+    return sorted(left, key=lambda entry: anchors[entry][1]), sorted(right, key=lambda entry: anchors[entry][1])
 
 
 def _spread(heights: Sequence[float], gap: float, ends: tuple[float, float]) -> list[float]:
@@ -149,10 +149,10 @@ def _spread(heights: Sequence[float], gap: float, ends: tuple[float, float]) -> 
 
 def _list(figure: Figure, parts: Iterable[ListedPart]) -> None:
     """Write the parts list: item, count, name and size."""
-    ax = axes_mm(figure, (SIZE[0] - LIST_WIDTH, 4.0, LIST_WIDTH, SIZE[1] - 16.0))
-    ax.set(xlim=(0.0, LIST_WIDTH), ylim=(0.0, SIZE[1] - 16.0))
+    ax = axes_mm(figure, (SHEET_SIZE[0] - LIST_WIDTH, 4.0, LIST_WIDTH, SHEET_SIZE[1] - 16.0))
+    ax.set(xlim=(0.0, LIST_WIDTH), ylim=(0.0, SHEET_SIZE[1] - 16.0))
     ax.axis("off")
-    y = SIZE[1] - 20.0
+    y = SHEET_SIZE[1] - 20.0
     for number, part in enumerate(parts, start=1):
         name = part.name or part.data.partition(",")[0]
         where = f", {part.place}" if part.place != name else ""

@@ -60,13 +60,13 @@ TITLE_BLOCK = 33.0
 MAX_THICKNESSES = 2
 """Thicknesses that are drawn of one beam: of more, the smallest and the largest."""
 
-STUB, LEADER = 4.0, 7.0
+STUB_LENGTH, LEADER_LENGTH = 4.0, 7.0
 """Lengths of the arrows that point at a beam from both sides, and of the line to its text [mm of print]."""
 
 
 @dataclass(frozen=True)
 class TitleBlock:
-    """What a drawing says of itself, in words."""
+    """Words of a drawing on itself."""
 
     revision: str
     weight: str
@@ -140,12 +140,12 @@ def thicknesses(drawing: Drawing) -> Iterator[BeamSection]:
     for section in drawing.sections:
         beams.setdefault(section.beam, {}).setdefault(round(section.thickness, 7), section)
     drawn = set()
-    for found in beams.values():
-        ordered = sorted(found)
+    for result in beams.values():
+        ordered = sorted(result)
         for thickness in ordered if len(ordered) <= MAX_THICKNESSES else (ordered[0], ordered[-1]):
             if thickness not in drawn:  # equal beams are alike
                 drawn.add(thickness)
-                yield found[thickness]
+                yield result[thickness]
 
 
 def length_in_words(value: float, decimals: int) -> str:
@@ -164,11 +164,11 @@ def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> N
         across = -across
     half = 0.5e3 * section.thickness * across
     look = {"arrowstyle": "-|>", "linewidth": 0.5, "color": INK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
-    for side, far in ((1.0, STUB + LEADER), (-1.0, STUB)):
+    for side, far in ((1.0, STUB_LENGTH + LEADER_LENGTH), (-1.0, STUB_LENGTH)):
         tip = middle + side * half
         (x, y), (x_far, y_far) = tip.tolist(), (tip + side * far / scale * across).tolist()
         ax.annotate("", xy=(x, y), xytext=(x_far, y_far), arrowprops=look, zorder=5)
-    place = middle + half + (STUB + LEADER) / scale * across
+    place = middle + half + (STUB_LENGTH + LEADER_LENGTH) / scale * across
     ax.text(
         float(place[0]),
         float(place[1]),

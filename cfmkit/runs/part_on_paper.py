@@ -54,11 +54,11 @@ def weight_in_words(drawing: Drawing, spec: Spec) -> str:
 
     mechanism: Any = getattr(spec, "mechanism", None)
     material = getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
-    known = MATERIALS.get(getattr(material, "name", None) or "")
-    if known is None:
+    reference = MATERIALS.get(getattr(material, "name", None) or "")
+    if reference is None:
         return "not known: no named material"
     try:
-        mass = known.density * volume(drawing)
+        mass = reference.density * volume(drawing)
     except GeometryError:
         return "not known: no thickness"
     return f"{1e3 * mass:.3g} g, without what is bought"

@@ -276,10 +276,10 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
 def analysed(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
     found = run_outcome.report_on(api.analyze(spec, run))
-    return found.beside({}, run_outcome.Supplement(lines=_assumed(spec)))
+    return found.beside({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
 
 
-def _assumed(spec: Spec) -> tuple[tuple[str, str], ...]:
+def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
     """Return where the data on life and creep come from that a specification leaves to the library."""
     lasting = getattr(spec, "durability", None)
     return () if lasting is None else tuple(("lasting", text) for text in lasting.assumed)
@@ -299,7 +299,7 @@ def designed(spec: Spec, run: Run) -> Report:
     drawn = warnings_of_part(result.spec) if design.spec is not None and result.status.usable else ()
     known = {one.name for one in result.warnings}
     more = tuple(one for one in drawn if one.name not in known)
-    lines = (*design.notes, *_assumed(result.spec))
+    lines = (*design.notes, *_assumed_lines(result.spec))
     found = found.beside({}, run_outcome.Supplement(files=tables, lines=lines, warnings=more))
     if design.spec is None or result.status is not Status.COMPLETE:
         return found

@@ -1,4 +1,4 @@
-"""What is assumed of a material that lasts or creeps, where a specification states nothing better.
+"""Assumed data on how materials last and creep, for where a specification states nothing better.
 
 S-N data of steels follow the rule of a text book from their least tensile strength; creep is that of a data sheet. Each
 says its source and how far it may be off. Materials that are missing here have no such data: printed plastics,
@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-_HOUR = 3600.0
-_KPSI = 6.894757e6
-_FIRST, _KNEE, _LAST = 1e3, 1e6, 1e9
+_ONE_HOUR = 3600.0
+_ONE_KPSI = 6.894757e6
+_FIRST_CYCLES, _KNEE_CYCLES, _LAST_CYCLES = 1e3, 1e6, 1e9
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class AssumedCreep:
 
 @dataclass(frozen=True)
 class Assumed:
-    """What is assumed of one material; None: nothing."""
+    """Assumed data of one material; None: nothing is assumed."""
 
     fatigue: AssumedFatigue | None = None
     relaxation: AssumedCreep | None = None
@@ -65,7 +65,7 @@ def strength_fraction(ultimate: float) -> float:
     >>> strength_fraction(360e6)
     0.9
     """
-    kpsi = ultimate / _KPSI
+    kpsi = ultimate / _ONE_KPSI
     return 0.9 if kpsi < 70.0 else 1.06 - 2.8e-3 * kpsi + 6.9e-6 * kpsi**2
 
 
@@ -90,7 +90,11 @@ def steel(ultimate: float, strength: str) -> AssumedFatigue:
     """
     surface = machined_surface(ultimate)
     limit = round(0.5 * surface * ultimate, -6)
-    points = ((_FIRST, round(strength_fraction(ultimate) * ultimate, -6)), (_KNEE, limit), (_LAST, limit))
+    points = (
+        (_FIRST_CYCLES, round(strength_fraction(ultimate) * ultimate, -6)),
+        (_KNEE_CYCLES, limit),
+        (_LAST_CYCLES, limit),
+    )
     low, high = (round(share * surface * ultimate, -6) for share in (0.4, 0.6))
     return AssumedFatigue(
         points,
@@ -103,7 +107,7 @@ def steel(ultimate: float, strength: str) -> AssumedFatigue:
 
 def _creep(moduli: tuple[float, float, float], source: str) -> AssumedCreep:
     """Return moduli [Pa] at once, after 1 h and after 1000 h."""
-    times = (0.0, _HOUR, 1000.0 * _HOUR)
+    times = (0.0, _ONE_HOUR, 1000.0 * _ONE_HOUR)
     return AssumedCreep(
         tuple(zip(times, moduli, strict=True)),
         "23 deg C",
@@ -111,15 +115,15 @@ def _creep(moduli: tuple[float, float, float], source: str) -> AssumedCreep:
     )
 
 
-_LECTURE = "NPTEL course 112104040, lecture 9, Table 9.1, order of size"
+_LOSS_LECTURE = "NPTEL course 112104040, lecture 9, Table 9.1, order of size"
 
-ASSUMED: Mapping[str, Assumed] = MappingProxyType(
+ASSUMED_DATA: Mapping[str, Assumed] = MappingProxyType(
     {
-        "steel-1.4310": Assumed(steel(1300e6, "EN 10151, +C1300"), loss_factor=1e-3, loss_source=_LECTURE),
-        "steel-304": Assumed(steel(515e6, "ASTM A240"), loss_factor=1e-3, loss_source=_LECTURE),
-        "steel-s235": Assumed(steel(360e6, "EN 10025-2"), loss_factor=1e-3, loss_source=_LECTURE),
-        "aluminium-6061-t6": Assumed(loss_factor=1e-5, loss_source=_LECTURE),
-        "aluminium-7075-t6": Assumed(loss_factor=1e-5, loss_source=_LECTURE),
+        "steel-1.4310": Assumed(steel(1300e6, "EN 10151, +C1300"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
+        "steel-304": Assumed(steel(515e6, "ASTM A240"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
+        "steel-s235": Assumed(steel(360e6, "EN 10025-2"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
+        "aluminium-6061-t6": Assumed(loss_factor=1e-5, loss_source=_LOSS_LECTURE),
+        "aluminium-7075-t6": Assumed(loss_factor=1e-5, loss_source=_LOSS_LECTURE),
         "pom": Assumed(
             relaxation=_creep(
                 (2850e6, 2500e6, 1300e6),

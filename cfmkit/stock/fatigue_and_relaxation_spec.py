@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Ratio, Stress, Time, format_short
-from cfmkit.stock.assumed_lasting import ASSUMED
+from cfmkit.stock.assumed_lasting import ASSUMED_DATA
 
 if TYPE_CHECKING:
     from cfmkit.stock.assumed_lasting import AssumedCreep, AssumedFatigue
@@ -71,9 +71,9 @@ class Fatigue(Model):
         return FatigueLaw(self.points or (), line, self.ultimate_strength)
 
     @classmethod
-    def assumed(cls, found: AssumedFatigue) -> Self:
+    def from_assumed(cls, result: AssumedFatigue) -> Self:
         """Return what is assumed of a material."""
-        return cls(points=found.points, ultimate_strength=found.ultimate_strength, source=found.source)
+        return cls(points=result.points, ultimate_strength=result.ultimate_strength, source=result.source)
 
     @classmethod
     def of(cls, law: FatigueLaw) -> Self:
@@ -111,9 +111,9 @@ class Relaxation(Model):
         return self
 
     @classmethod
-    def assumed(cls, found: AssumedCreep) -> Self:
+    def from_assumed(cls, result: AssumedCreep) -> Self:
         """Return what is assumed of a material."""
-        return cls(points=found.points, temperature=found.temperature, source=found.source)
+        return cls(points=result.points, temperature=result.temperature, source=result.source)
 
     @property
     def law(self) -> RelaxationLaw:
@@ -121,14 +121,14 @@ class Relaxation(Model):
         return RelaxationLaw(self.terms or (), self.points or ())
 
 
-def assumed(name: str) -> dict[str, Fatigue | Relaxation]:
+def assumed_laws(name: str) -> dict[str, Fatigue | Relaxation]:
     """Return what is assumed of a material of the library, by the key that states it."""
-    found = ASSUMED.get(name)
-    if found is None:
+    result = ASSUMED_DATA.get(name)
+    if result is None:
         return {}
     laws: dict[str, Fatigue | Relaxation] = {}
-    if found.fatigue is not None:
-        laws["fatigue"] = Fatigue.assumed(found.fatigue)
-    if found.relaxation is not None:
-        laws["relaxation"] = Relaxation.assumed(found.relaxation)
+    if result.fatigue is not None:
+        laws["fatigue"] = Fatigue.from_assumed(result.fatigue)
+    if result.relaxation is not None:
+        laws["relaxation"] = Relaxation.from_assumed(result.relaxation)
     return laws

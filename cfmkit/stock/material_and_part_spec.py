@@ -17,9 +17,9 @@ from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
 from cfmkit.specs.units.fields import described
-from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed
+from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed_laws
 from cfmkit.stock.materials import UnknownMaterial, material
-from cfmkit.stock.printing import LAYERED, Layers
+from cfmkit.stock.printing import LAYER_STRENGTHS, Layers
 from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
 from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 
@@ -75,21 +75,21 @@ class MaterialSpec(Model):
 
     @model_validator(mode="after")
     def _filled_in(self) -> Self:
-        given: dict[str, Any] = {"poisson_ratio": _POISSON_RATIO}
+        filled: dict[str, Any] = {"poisson_ratio": _POISSON_RATIO}
         if self.name is not None:
             try:
                 known = material(self.name)
             except UnknownMaterial as error:
                 refuse("Material", {("name",): str(error)})
                 raise
-            given = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
-            given |= {key: law for key, law in assumed(known.name).items() if key not in self.model_fields_set}
-            given |= self._of_layers(known.name)
+            filled = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
+            filled |= {key: law for key, law in assumed_laws(known.name).items() if key not in self.model_fields_set}
+            filled |= self._of_layers(known.name)
         elif self.youngs_modulus is None:
             raise ValueError("needs 'name' or 'youngs_modulus'")
         else:
             self._of_layers("these values")
-        for key, value in given.items():
+        for key, value in filled.items():
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
         if self.law == "neo-hookean" and self.poisson >= 0.5:
@@ -99,20 +99,20 @@ class MaterialSpec(Model):
 
     def _of_layers(self, name: str) -> dict[str, float]:
         """Return strength and modulus of a print in the direction that is stated, by their keys."""
-        known = LAYERED.get(name)
+        reference = LAYER_STRENGTHS.get(name)
         if self.layers is None or self.yield_strength is not None:
             return {}
-        if known is None:
-            named = ", ".join(LAYERED)
+        if reference is None:
+            named = ", ".join(LAYER_STRENGTHS)
             reported = (
                 f"no strength along and across the layers is known of {name}: state 'yield_strength'; known: {named}"
             )
             refuse("Material", {("layers",): reported})
             return {}
         if self.layers == "along":
-            return {"yield_strength": known.along}
-        modulus = {} if known.modulus_across is None else {"youngs_modulus": known.modulus_across}
-        return {"yield_strength": known.across, **modulus}
+            return {"yield_strength": reference.along}
+        modulus = {} if reference.modulus_across is None else {"youngs_modulus": reference.modulus_across}
+        return {"yield_strength": reference.across, **modulus}
 
     @property
     def modulus(self) -> float:

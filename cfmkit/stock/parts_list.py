@@ -37,6 +37,6 @@ def parts_table(parts: Sequence[ListedPart]) -> Table:
     return Table((item, *first, count, *columns.values()))
 
 
-def listed(parts: Callable[[], Iterable[ListedPart]]) -> dict[str, Callable[[], Table]]:
+def parts_tables(parts: Callable[[], Iterable[ListedPart]]) -> dict[str, Callable[[], Table]]:
     """Return the list as a result carries it, computed when it is written."""
     return {"parts": lambda: parts_table(tuple(parts()))}

@@ -1,4 +1,4 @@
-"""What a printed part is made of: strands of a nozzle beside each other, and layers on each other.
+"""Strands and layers of a printed part: strands of a nozzle beside each other, and layers on each other.
 
 Along its layers a part bears more than across them. A wall is a whole number of strands: between two whole numbers a
 slicer leaves a gap, or presses strands together, and the wall is not what was analysed.
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Layers = Literal["along", "across"]
 """Whether what bends is stressed along the layers of the print (it lies flat), or across them (it stands)."""
 
-WHOLE = 0.02
+WHOLE_SHARE = 0.02
 """Part of a strand within which a thickness counts as a whole number of them."""
 
 
@@ -31,7 +31,7 @@ class LayeredStrength:
     source: str
 
 
-LAYERED: Mapping[str, LayeredStrength] = MappingProxyType(
+LAYER_STRENGTHS: Mapping[str, LayeredStrength] = MappingProxyType(
     {
         "pla": LayeredStrength(
             45e6, 12e6, 1.6e9,
@@ -55,7 +55,7 @@ def strands(thickness: float, nozzle: float) -> tuple[int, ...]:
     """
     share = thickness / nozzle
     nearest = max(1, round(share))
-    if abs(share - nearest) <= WHOLE or share < 1.0:
+    if abs(share - nearest) <= WHOLE_SHARE or share < 1.0:
         return (nearest,)
     return (nearest, nearest + (1 if share > nearest else -1))
 
@@ -63,7 +63,7 @@ def strands(thickness: float, nozzle: float) -> tuple[int, ...]:
 def is_whole(thickness: float, nozzle: float) -> bool:
     """Return True if a thickness [m] is a whole number of strands."""
     share = thickness / nozzle
-    return share > 0.5 and abs(share - round(share)) <= WHOLE
+    return share > 0.5 and abs(share - round(share)) <= WHOLE_SHARE
 
 
 def strands_in_words(thickness: float, nozzle: float) -> str:
@@ -79,7 +79,7 @@ def strands_in_words(thickness: float, nozzle: float) -> str:
     millimetres, share = 1e3 * thickness, thickness / nozzle
     if is_whole(thickness, nozzle):
         return f"{millimetres:.6g} mm are {round(share)} strand{'s' if round(share) > 1 else ''} of {1e3 * nozzle:g} mm"
-    near = sorted(strands(thickness, nozzle))
-    whole = " or ".join(f"{1e3 * nozzle * number:.6g} mm ({number})" for number in near)
+    neighbours = sorted(strands(thickness, nozzle))
+    whole = " or ".join(f"{1e3 * nozzle * number:.6g} mm ({number})" for number in neighbours)
     rounded = math.floor(100.0 * share + 0.5) / 100.0
     return f"{millimetres:.6g} mm are {rounded:g} strands of {1e3 * nozzle:g} mm: whole ones are {whole}"

@@ -21,7 +21,7 @@ Kind = Literal["sheet", "wire", "pin", "dowel", "bearing", "screw"]
 SIZE_RTOL = 1e-6
 """A size that is so near to one of a series is that one: inches are written in millimetres."""
 
-WORDS: Mapping[Kind, str] = {
+KIND_WORDS: Mapping[Kind, str] = {
     "sheet": "sheet that is {} thick",
     "wire": "wire of {}",
     "pin": "pin of {}",
@@ -56,7 +56,7 @@ class StockSeries:
 
     def by_distance(self, size: float) -> tuple[float, ...]:
         """Return all sizes, those first whose ratio to another size [m] is nearest to 1."""
-        return tuple(sorted(self.sizes, key=lambda one: abs(math.log(one / size))))
+        return tuple(sorted(self.sizes, key=lambda entry: abs(math.log(entry / size))))
 
 
 def _mm(*sizes: float) -> tuple[float, ...]:
@@ -77,10 +77,10 @@ class Bearing:
     width: float  # [m]
 
 
-BOLTS = "BOLTS parts library (boltsparts/BOLTS_archive, data/bearings.blt, and its tables of release 0.3)"
-FASTENERS = "data of the FreeCAD Fasteners workbench (shaise/FreeCAD_FastenersWB, FsData)"
+BOLTS_LIBRARY = "BOLTS parts library (boltsparts/BOLTS_archive, data/bearings.blt, and its tables of release 0.3)"
+FASTENER_TABLES = "data of the FreeCAD Fasteners workbench (shaise/FreeCAD_FastenersWB, FsData)"
 
-BEARINGS = tuple(
+BALL_BEARINGS = tuple(
     Bearing(name, *_mm(bore, outer, width))
     for name, bore, outer, width in (
         ("623", 3, 10, 4), ("624", 4, 13, 5), ("634", 4, 16, 5), ("625", 5, 16, 5), ("635", 5, 19, 6),
@@ -106,7 +106,7 @@ class Screw:
     hole: float  # clearance hole, ISO 273 medium [m]
 
 
-SCREWS = tuple(
+SOCKET_SCREWS = tuple(
     Screw(f"M{diameter:g}", *_mm(diameter, head, hole))
     for diameter, head, hole in (
         (1.6, 3.0, 1.8), (2, 3.8, 2.4), (2.5, 4.5, 2.9), (3, 5.5, 3.4), (4, 7, 4.5), (5, 8.5, 5.5), (6, 10, 6.6),
@@ -142,17 +142,17 @@ ALL_SERIES = (
                    0.051, 0.055, 0.059, 0.063, 0.067, 0.072, 0.076, 0.080, 0.085, 0.090, 0.095, 0.100, 0.102, 0.107,
                    0.110, 0.112, 0.121, 0.125, 0.130, 0.135, 0.140, 0.145, 0.150, 0.156, 0.162, 0.177, 0.192, 0.207,
                    0.225, 0.250)),
-    StockSeries("pin", "metric", "ISO 2338", f"{FASTENERS}, iso2338def.csv",
+    StockSeries("pin", "metric", "ISO 2338", f"{FASTENER_TABLES}, iso2338def.csv",
            _mm(0.6, 0.8, 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30, 40, 50)),
     StockSeries("pin", "inch", "ASME B18.8.2", "hdw.com.tw, ANSI dowel pins chart",
            _inches(0.0625, 0.078125, 0.09375, 0.125, 0.15625, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.5, 0.625, 0.75,
                    0.875, 1)),
-    StockSeries("dowel", "metric", "ISO 8734", f"{FASTENERS}, iso8734def.csv",
+    StockSeries("dowel", "metric", "ISO 8734", f"{FASTENER_TABLES}, iso8734def.csv",
            _mm(1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20)),
-    StockSeries("bearing", "metric", "DIN 625-1", BOLTS, tuple(sorted({one.bore for one in BEARINGS}))),
+    StockSeries("bearing", "metric", "DIN 625-1", BOLTS_LIBRARY, tuple(sorted({b.bore for b in BALL_BEARINGS}))),
     StockSeries("screw", "metric", "ISO 4762, holes ISO 273 medium",
-           f"{FASTENERS}, iso4762def.csv; engineeringhardware.com, clearance hole sizes",
-           tuple(one.diameter for one in SCREWS)),
+           f"{FASTENER_TABLES}, iso4762def.csv; engineeringhardware.com, clearance hole sizes",
+           tuple(entry.diameter for entry in SOCKET_SCREWS)),
 )  # fmt: skip
 """All series that a text is known for: no inch series of bearings, dowels and screws, and few of sheets."""
 
@@ -161,9 +161,9 @@ def series_of(kind: Kind, system: System, material: str | None = None) -> StockS
     """Return the series of one kind of stock, of sheets that of a material by its name; None if none is known."""
     return next(
         (
-            one
-            for one in ALL_SERIES
-            if one.kind == kind and one.system == system and (kind != "sheet" or material in one.materials)
+            entry
+            for entry in ALL_SERIES
+            if entry.kind == kind and entry.system == system and (kind != "sheet" or material in entry.materials)
         ),
         None,
     )
@@ -181,8 +181,8 @@ def missing_size(kind: Kind, system: System, size: float, material: str | None =
     if series is None or series.holds(size):
         return ""
     about = f"{material}; {series.standard}" if kind == "sheet" else series.standard
-    stated, nearest = (format_short(one, "length", 6) for one in (size, series.nearest(size)))
-    return f"no {system} {WORDS[kind].format(stated)} ({about}); the nearest is {nearest}"
+    stated, nearest = (format_short(entry, "length", 6) for entry in (size, series.nearest(size)))
+    return f"no {system} {KIND_WORDS[kind].format(stated)} ({about}); the nearest is {nearest}"
 
 
 Path = tuple[str | int, ...]
@@ -197,12 +197,12 @@ def stock_faults(system: System | None, sizes: Iterable[StockSize], material: st
     """
     if system is None:
         return {}
-    found = {
+    result = {
         ("mechanism", *path): missing_size(kind, system, float(size), material)
         for path, kind, size in sizes
         if size is not None
     }
-    return {path: text for path, text in found.items() if text}
+    return {path: text for path, text in result.items() if text}
 
 
 def bearings_of(bore: float) -> tuple[Bearing, ...]:
@@ -211,8 +211,8 @@ def bearings_of(bore: float) -> tuple[Bearing, ...]:
     >>> [one.name for one in bearings_of(0.008)]
     ['608']
     """
-    fitting = (one for one in BEARINGS if math.isclose(one.bore, bore, rel_tol=SIZE_RTOL))
-    return tuple(sorted(fitting, key=lambda one: (one.outer, one.width)))
+    fitting = (entry for entry in BALL_BEARINGS if math.isclose(entry.bore, bore, rel_tol=SIZE_RTOL))
+    return tuple(sorted(fitting, key=lambda entry: (entry.outer, entry.width)))
 
 
 def screw_through(hole: float) -> Screw | None:
@@ -221,4 +221,4 @@ def screw_through(hole: float) -> Screw | None:
     >>> screw_through(0.0066).name, screw_through(0.004).name
     ('M6', 'M3')
     """
-    return next((one for one in reversed(SCREWS) if one.hole <= hole * (1 + SIZE_RTOL)), None)
+    return next((entry for entry in reversed(SOCKET_SCREWS) if entry.hole <= hole * (1 + SIZE_RTOL)), None)

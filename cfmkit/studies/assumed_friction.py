@@ -1,4 +1,4 @@
-"""What the friction of pins and guide takes from a design that states none."""
+"""Loss by the friction of pins and guide in a design that states none."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Result
 
-FRICTION = 0.15
+PLAIN_FRICTION = 0.15
 """Coefficient of pins and guide, assumed: dry steel on steel has 0.1 to 0.2."""
 
 
@@ -35,21 +35,21 @@ def friction_note(result: Result, run: Run) -> str:
     pin = getattr(function_named(record.part)(result), "pin", None)
     if pin is None:
         return ""
-    rubbing: dict[str, Any] = {"mechanism.pins": {"diameter": pin, "friction": FRICTION}}
-    rubbing["mechanism.guide"] = {"friction": FRICTION}
+    rubbing: dict[str, Any] = {"mechanism.pins": {"diameter": pin, "friction": PLAIN_FRICTION}}
+    rubbing["mechanism.guide"] = {"friction": PLAIN_FRICTION}
     try:
-        found = record.analyze(result.spec.replace(rubbing), run)
+        outcome = record.analyze(result.spec.replace(rubbing), run)
     except SpecError:
         return ""
     kind = result.curve.kind
     name = f"{kind}_mean"
-    means = [evaluate(found, [f"{name}[{way}]"])[f"{name}[{way}]"].value for way in ("load", "unload")]
+    means = [evaluate(outcome, [f"{name}[{path}]"])[f"{name}[{path}]"].value for path in ("load", "unload")]
     frictionless = evaluate(result, [name])[name].value
     if None in means or frictionless is None:
-        return f"with {FRICTION:g} assumed in pins and guide there is no force all the way; no friction is stated"
-    up, down, free = (format_short(float(one or 0.0), kind) for one in (*means, frictionless))
+        return f"with {PLAIN_FRICTION:g} assumed in pins and guide there is no force all the way; no friction is stated"
+    up, down, free = (format_short(float(entry or 0.0), kind) for entry in (*means, frictionless))
     size = format_short(pin, "length")
     return (
-        f"with {FRICTION:g} assumed in pins ({size}) and guide the mean {kind} is {up} one way and {down} back, not "
-        f"{free}; no friction is stated"
+        f"with {PLAIN_FRICTION:g} assumed in pins ({size}) and guide the mean {kind} is {up} one way and {down} "
+        f"back, not {free}; no friction is stated"
     )

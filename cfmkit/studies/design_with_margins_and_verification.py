@@ -34,25 +34,25 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
     """
     from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet, with_whole_strands
 
-    found = _finished(spec, designer, run)
+    found = _finished_design(spec, designer, run)
 
-    def finish(other: Spec) -> Design:
-        return _finished(other, designer, run)
+    def finish(variant: Spec) -> Design:
+        return _finished_design(variant, designer, run)
 
     found = with_whole_strands(spec, with_stock_sheet(spec, found, finish, run), finish, run)
     return with_digits_of_process(spec, found, finish, run)
 
 
-def _finished(spec: Spec, designer: Designer, run: Run) -> Design:
+def _finished_design(spec: Spec, designer: Designer, run: Run) -> Design:
     """Return the design of a specification with its margins, verified."""
     asked = getattr(spec, "design", None)
     plain = getattr(asked, "yield", None) is None
-    found = designer(spec, run) if plain else _with_yield(spec, designer, run)
+    result = designer(spec, run) if plain else _with_yield(spec, designer, run)
     if getattr(asked, "verify", None) is not None:
         from cfmkit.studies.verify_design_by_solid_model import verified
 
-        found = verified(spec, found, run)
-    return found
+        result = verified(spec, result, run)
+    return result
 
 
 def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:

@@ -42,21 +42,21 @@ SHARE_OF_DEVIATION = 0.1
 MOST_CHANGE = 0.05
 """Change of the mean force with which a design of whole strands still counts as the same design."""
 
-FINER = 4
+FINER_DIGITS = 4
 """Decimals by which the digits are refined where a rounded design misses a requirement that it met: to a nanometre."""
 
 NOT_CHOSEN = ("wound", "bought")
 """Blocks of what is bought: its sizes are its maker's."""
 
 
-def with_stock_sheet(given: Spec, found: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
+def with_stock_sheet(original: Spec, outcome: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
     """Return a design that is cut from a sheet of its series, where `part.stock` asks for one.
 
     Parameters
     ----------
-    given : Spec
+    original : Spec
         With a `design` block.
-    found : Design
+    outcome : Design
         Its design, of any width.
     finish : callable
         What designs a specification.
@@ -68,77 +68,77 @@ def with_stock_sheet(given: Spec, found: Design, finish: Callable[[Spec], Design
     Design
         INFEASIBLE where no design exists for the sheets around its width.
     """
-    part: Any = getattr(getattr(given, "mechanism", None), "part", None)
+    part: Any = getattr(getattr(original, "mechanism", None), "part", None)
     system = getattr(part, "stock", None)
-    widths = {} if found.spec is None else _widths(found.spec)
-    process = process_of_part(given)
-    if system is None or found.spec is None or not widths or getattr(part, "sheet", None) is not None:
-        return found
-    if (process is not None and process.prints) or accuracy_of(given).name in ("fdm", "sls"):
-        return found
-    material = getattr(getattr(given.at("mechanism"), "material", None), "name", None)
+    widths = {} if outcome.spec is None else _widths(outcome.spec)
+    process = process_of_part(original)
+    if system is None or outcome.spec is None or not widths or getattr(part, "sheet", None) is not None:
+        return outcome
+    if (process is not None and process.prints) or accuracy_of(original).name in ("fdm", "sls"):
+        return outcome
+    material = getattr(getattr(original.at("mechanism"), "material", None), "name", None)
     series = series_of("sheet", system, material)
     if series is None:
         text = f"no {system} series of {material or 'this material'} is known: its width is not rounded"
-        return replace(found, notes=(*found.notes, ("stock", text)))
+        return replace(outcome, notes=(*outcome.notes, ("stock", text)))
     middle = math.exp(float(np.mean([math.log(width) for width in widths.values()])))
     reasons = []
     for sheet in series.by_distance(middle)[:MAX_SHEETS]:
         try:
-            again = finish(given.replace({"mechanism.part.sheet": sheet, **dict.fromkeys(widths, sheet)}))
+            again = finish(original.replace({"mechanism.part.sheet": sheet, **dict.fromkeys(widths, sheet)}))
         except SpecError as error:
             reasons.append(f"{format_short(sheet, 'length')}: {error.problems[0].message}")
             continue
         if again.spec is not None:
-            note = _change(found.spec, again.spec, series, sheet, widths, run)
+            note = _change(outcome.spec, again.spec, series, sheet, widths, run)
             return replace(again, notes=(*again.notes, ("stock", note)))
         reasons.append(f"{format_short(sheet, 'length')}: {again.message}")
     text = f"part.stock: no design from a sheet of {material} that is sold ({system}: {'; '.join(reasons)})"
     return Design(None, Status.INFEASIBLE, text)
 
 
-def with_whole_strands(given: Spec, found: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
+def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
     """Return a design whose printed leaves are whole strands thick, where `part.stock` asks for sizes that exist.
 
     The next whole numbers are tried, the nearest first, and the design is repeated for each. Where it would then miss a
     requirement that it meets, or another force results, it is left as it is, with a note.
     """
-    part: Any = getattr(getattr(given, "mechanism", None), "part", None)
-    if found.spec is None or getattr(part, "stock", None) is None or accuracy_of(given).name != "fdm":
-        return found
-    nozzle = accuracy_of(given).least_feature
-    leaves = {path: size for path, size in found.spec.leaves() if _is_leaf(path, size)}
+    part: Any = getattr(getattr(original, "mechanism", None), "part", None)
+    if outcome.spec is None or getattr(part, "stock", None) is None or accuracy_of(original).name != "fdm":
+        return outcome
+    nozzle = accuracy_of(original).least_feature
+    leaves = {path: size for path, size in outcome.spec.leaves() if _is_leaf(path, size)}
     if not leaves or all(is_whole(size, nozzle) for size in leaves.values()):
-        return found
-    near = [{path: _whole(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
-    before = _outcomes(found.spec, run)
+        return outcome
+    neighbours = [{path: _whole(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
+    before = _outcomes(outcome.spec, run)
     words = "; ".join(strands_in_words(size, nozzle) for size in dict.fromkeys(leaves.values()))
-    for changes in near:
+    for changes in neighbours:
         try:
-            levers = _levers(given, leaves, changes)
-            stated = {path: value for path, value in given.leaves() if path in levers}  # what is asked for stays
-            again = finish(given.replace({**changes, **levers}))
+            levers = _levers(original, leaves, changes)
+            stated = {path: value for path, value in original.leaves() if path in levers}  # what is asked for stays
+            again = finish(original.replace({**changes, **levers}))
             spec = None if again.spec is None else again.spec.replace({**changes, **stated})
         except SpecError:
             continue
         if spec is None or any(was and not now for was, now in zip(before, _outcomes(spec, run), strict=True)):
             continue
-        means = [_mean(family(one.family).analyze(one, run)) or math.nan for one in (found.spec, spec)]
+        means = [_mean(family(entry.family).analyze(entry, run)) or math.nan for entry in (outcome.spec, spec)]
         if not abs(means[1] / means[0] - 1.0) <= MOST_CHANGE:
             continue
-        told = _compared(f"whole strands taken: {words}", found.spec, spec, run)
+        told = _comparison(f"whole strands taken: {words}", outcome.spec, spec, run)
         return replace(again, spec=spec, notes=(*again.notes, ("strands", told)))
     text = f"left as they are, because no design of whole strands meets as much: {words}"
-    return replace(found, notes=(*found.notes, ("strands", text)))
+    return replace(outcome, notes=(*outcome.notes, ("strands", text)))
 
 
-def _levers(given: Spec, leaves: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, Any]:
+def _levers(original: Spec, leaves: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, Any]:
     """Return by which keys a design comes to thicknesses: a strip is as thick as its stress allows, or thinner."""
     beam = "mechanism.beam.thickness"
-    if beam not in changes or getattr(getattr(given, "design", None), "beam", None) is None:
+    if beam not in changes or getattr(getattr(original, "design", None), "beam", None) is None:
         return {}
     thinner = max(1.0, leaves[beam] / changes[beam])
-    return {"mechanism.safety_factor": thinner * float(given.at("mechanism").safety_factor)}
+    return {"mechanism.safety_factor": thinner * float(original.at("mechanism").safety_factor)}
 
 
 def _is_leaf(path: str, size: Any) -> bool:
@@ -162,13 +162,13 @@ def _change(before: Spec, after: Spec, series: StockSeries, sheet: float, widths
     """Return which sheet was taken instead of which widths, and what that does to the force."""
     old = ", ".join(format_short(width, "length") for width in dict.fromkeys(widths.values()))
     begun = f"sheet {format_short(sheet, 'length', 6)} ({series.system}, {series.standard}) instead of {old}"
-    return _compared(begun, before, after, run)
+    return _comparison(begun, before, after, run)
 
 
-def _compared(begun: str, before: Spec, after: Spec, run: Run) -> str:
+def _comparison(begun: str, before: Spec, after: Spec, run: Run) -> str:
     """Return a sentence on a change, and what that does to the force."""
     record = family(after.family)
-    means = [_mean(record.analyze(one, run)) for one in (before, after)]
+    means = [_mean(record.analyze(entry, run)) for entry in (before, after)]
     if None in means or not means[0]:
         return f"{begun}, and designed again"
     kind = "torque" if after.motion == "angle" else "force"
@@ -193,44 +193,46 @@ def decimals_of(accuracy: ProcessAccuracy) -> int:
     >>> {name: decimals_of(process) for name, process in PROCESSES.items()}
     {'laser': 3, 'wire-edm': 4, 'fdm': 3, 'sls': 3, 'mill': 3}
     """
-    deviation = min(one for one in (accuracy.thickness, accuracy.position, 1e-3) if one > 0.0)
+    deviation = min(entry for entry in (accuracy.thickness, accuracy.position, 1e-3) if entry > 0.0)
     return max(0, math.ceil(-math.log10(1e3 * SHARE_OF_DEVIATION * deviation) - 1e-9))
 
 
-def with_digits_of_process(given: Spec, found: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
+def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
     """Return a design whose chosen lengths and angles have the digits that its process can hold.
 
     Where the rounded design would miss a requirement that it meets unrounded, its digits are refined. Where rates of
     springs are chosen, they are chosen again for the rounded lengths: `finish` designs a specification.
     """
-    if found.spec is None:
-        return found
-    stated, written = (dict(_texts(spec.model_dump(mode="json", exclude_unset=True))) for spec in (given, found.spec))
+    if outcome.spec is None:
+        return outcome
+    stated, written = (
+        dict(_texts(spec.model_dump(mode="json", exclude_unset=True))) for spec in (original, outcome.spec)
+    )
     kept = {*stated.values(), written.get("mechanism.part.sheet")}  # a profile made for stated links has their lengths
     chosen = {path: text for path, text in written.items() if text not in kept}
-    decimals, before = decimals_of(accuracy_of(found.spec)), None
-    for refined in range(FINER):
-        rounded = {path: _rounded(text, decimals + refined) for path, text in chosen.items()}
+    decimals, before = decimals_of(accuracy_of(outcome.spec)), None
+    for refined in range(FINER_DIGITS):
+        rounded = {path: _in_digits(text, decimals + refined) for path, text in chosen.items()}
         changes = {path: text for path, text in rounded.items() if text != chosen[path]}
         if not changes:
-            return found
+            return outcome
         try:
-            spec = found.spec.replace(changes)
-            if _has_chosen_rates(given, found.spec) and (again := finish(spec)).spec is not None:
+            spec = outcome.spec.replace(changes)
+            if _has_chosen_rates(original, outcome.spec) and (again := finish(spec)).spec is not None:
                 spec = again.spec.replace(changes)
         except SpecError:  # values that must agree with others to more digits
             continue
         outcomes = _outcomes(spec, run)
         if not all(outcomes):
-            before = _outcomes(found.spec, run) if before is None else before
+            before = _outcomes(outcome.spec, run) if before is None else before
         if all(now or not then for now, then in zip(outcomes, before or outcomes, strict=True)):
-            return replace(found, spec=spec)
-    return found
+            return replace(outcome, spec=spec)
+    return outcome
 
 
-def _has_chosen_rates(given: Spec, designed: Spec) -> bool:
+def _has_chosen_rates(original: Spec, designed: Spec) -> bool:
     """Return True if a design has changed the rate of a spring."""
-    springs = [dict(one.leaves()) for one in (given, designed)]
+    springs = [dict(entry.leaves()) for entry in (original, designed)]
     paths = [path for path in springs[1] if path.startswith("mechanism.springs.") and "wound" not in path]
     return any(springs[0].get(path) != springs[1][path] for path in paths)
 
@@ -249,10 +251,10 @@ def _texts(value: Any, path: str = "") -> Iterator[tuple[str, str]]:
         yield path, value
 
 
-def _rounded(text: str, decimals: int) -> str:
+def _in_digits(text: str, decimals: int) -> str:
     """Return a length or an angle with so many decimals: 0.001 deg move the end of 57 mm by 0.001 mm.
 
-    >>> _rounded("44.4195213186294 mm", 3), _rounded("6.3793702084428034 deg", 3), _rounded("6 mm", 3)
+    >>> _in_digits("44.4195213186294 mm", 3), _in_digits("6.3793702084428034 deg", 3), _in_digits("6 mm", 3)
     ('44.42 mm', '6.379 deg', '6 mm')
     """
     number, unit = text.split()
@@ -267,4 +269,4 @@ def _outcomes(spec: Spec, run: Run) -> list[bool]:
     record = family(spec.family)
     result = record.analyze(spec, run)
     met = check(spec.part_requirements, result, values_of_family(record.values))
-    return [result.status is Status.COMPLETE, *(bool(one.ok) for one in met)]
+    return [result.status is Status.COMPLETE, *(bool(entry.ok) for entry in met)]

@@ -7,7 +7,7 @@ import pytest
 
 from cfmkit.cli.main import main
 from cfmkit.stock import MATERIALS
-from cfmkit.stock.assumed_lasting import ASSUMED, steel
+from cfmkit.stock.assumed_lasting import ASSUMED_DATA, steel
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -15,12 +15,12 @@ STEELS = ("steel-1.4310", "steel-304", "steel-s235")
 
 
 def test_only_materials_of_the_library_are_assumed_to_last():
-    assert set(ASSUMED) <= set(MATERIALS)
+    assert set(ASSUMED_DATA) <= set(MATERIALS)
 
 
-@pytest.mark.parametrize("name", ASSUMED)
+@pytest.mark.parametrize("name", ASSUMED_DATA)
 def test_each_assumption_says_that_it_is_one_and_from_where(name):
-    one = ASSUMED[name]
+    one = ASSUMED_DATA[name]
     for law in filter(None, (one.fatigue, one.relaxation)):
         assert law.source.startswith("assumed: ")
         assert len(law.source) <= 300
@@ -37,7 +37,7 @@ def test_the_points_of_a_steel_are_those_of_a_hand_calculation():
 
 @pytest.mark.parametrize("name", STEELS)
 def test_the_limit_of_a_steel_is_within_its_spread(name):
-    law = ASSUMED[name].fatigue
+    law = ASSUMED_DATA[name].fatigue
     assert law.spread[0] < law.points[-1][1] < law.spread[1]
 
 

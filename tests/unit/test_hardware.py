@@ -71,7 +71,7 @@ def test_an_eye_and_a_rod_that_are_chosen_bear_their_loads():
 
 
 def test_what_is_not_stated_is_assumed_and_said():
-    strength = PartStrength.of(None, 1.0)
+    strength = PartStrength.from_material(None, 1.0)
     assert (strength.name, strength.assumed) == ("steel-s235", True)
     assert strength.allowable == pytest.approx(235e6 / 1.5)
     rod = guide_rod(0.0, 100.0, 0.2, 0.02, None, None, strength)

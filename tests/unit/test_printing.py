@@ -7,7 +7,7 @@ from cfmkit.cli.main import main
 from cfmkit.runs.files_a_run_writes import part_of
 from cfmkit.runs.part_on_paper import how_to_print
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.printing import LAYERED, strands
+from cfmkit.stock.printing import LAYER_STRENGTHS, strands
 
 STRIP = """
 cfmkit: 1
@@ -57,7 +57,7 @@ def test_layers_of_a_material_without_strengths_of_layers_are_refused_in_one_lin
 
 
 def test_each_strength_has_a_source_and_is_lower_between_the_layers():
-    for one in LAYERED.values():
+    for one in LAYER_STRENGTHS.values():
         assert one.across < one.along
         assert one.source
 

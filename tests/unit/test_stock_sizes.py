@@ -10,7 +10,7 @@ from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.metrics import check
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.stock.stock_series import ALL_SERIES, BEARINGS, SCREWS, bearings_of, screw_through, series_of
+from cfmkit.stock.stock_series import ALL_SERIES, BALL_BEARINGS, SOCKET_SCREWS, bearings_of, screw_through, series_of
 from cfmkit.studies.stock_and_digits import decimals_of
 
 
@@ -23,8 +23,8 @@ def test_every_series_increases_and_says_where_it_was_read(series):
 
 
 def test_bearings_and_screws_have_room_for_what_is_in_them():
-    assert all(one.bore < one.outer and one.width < one.outer - one.bore for one in BEARINGS)
-    assert all(one.diameter < one.hole < one.head for one in SCREWS)
+    assert all(one.bore < one.outer and one.width < one.outer - one.bore for one in BALL_BEARINGS)
+    assert all(one.diameter < one.hole < one.head for one in SOCKET_SCREWS)
     assert [one.name for one in bearings_of(0.010)] == ["6000", "16100", "6200", "6300"]
     assert screw_through(0.0055).name == "M5"
     assert screw_through(0.001) is None

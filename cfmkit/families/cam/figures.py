@@ -111,8 +111,8 @@ def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None 
 
 def assembly(result: Result) -> Figure:
     """Return all parts half way through the travel, numbered as in the parts list."""
-    found = hardware(result.state)
-    return assembly_figure(result.spec.name, found.drawn, found.parts, len(result.state.travel) // 2)
+    outcome = hardware(result.state)
+    return assembly_figure(result.spec.name, outcome.drawn, outcome.parts, len(result.state.travel) // 2)
 
 
 def loop(result: Result) -> Figure:

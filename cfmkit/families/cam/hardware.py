@@ -15,7 +15,7 @@ from cfmkit.export.contours import TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.cam.bought_parts import springs_in_words
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.part_sizes import BRACE, PLATE, count_of, pin_path, roller_path
+from cfmkit.families.cam.part_sizes import BRACE_WIDTH, PLATE_THICKNESS, count_of, pin_path, roller_path
 from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
@@ -33,7 +33,7 @@ from cfmkit.families.hardware import (
 )
 from cfmkit.stock.joint_strength import pin_that_bears
 from cfmkit.stock.parts_list import ListedPart
-from cfmkit.stock.stock_series import BEARINGS, bearings_of, screw_through
+from cfmkit.stock.stock_series import BALL_BEARINGS, bearings_of, screw_through
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,9 +50,11 @@ def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
     mechanism = solution.assembly.spec.mechanism
     plate, system = mechanism.plate, mechanism.plate.stock
-    strength = PartStrength.of(mechanism.contact.material if mechanism.contact else None, mechanism.safety_factor)
-    thick = plate.thickness or (mechanism.contact.width if mechanism.contact else PLATE)
-    brace, arm = min(thick, BRACE), 0.5 * (thick + min(thick, BRACE))
+    strength = PartStrength.from_material(
+        mechanism.contact.material if mechanism.contact else None, mechanism.safety_factor
+    )
+    thick = plate.thickness or (mechanism.contact.width if mechanism.contact else PLATE_THICKNESS)
+    brace, arm = min(thick, BRACE_WIDTH), 0.5 * (thick + min(thick, BRACE_WIDTH))
     pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))
     pin, bears = pin_for(pull, arm, brace, strength, system)
     faults = {} if bears else {"slider pin": f"no pin of the series bears the {newton(pull)} of a brace"}
@@ -83,13 +85,13 @@ def hardware(solution: Solution) -> Hardware:
     if holes:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
     standing = tuple(_standing(solution, rod.bush, rod.diameter, holes, screw))
-    drawn = tuple(_drawn(solution, standing, (width, pin, shaft)))
+    drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft)))
     return Hardware(with_faults(parts, faults), standing, drawn, pin)
 
 
 def _largest(solution: Solution, name: str) -> float:
     """Return the largest finite force of a kind on both branches [N]."""
-    values = np.concatenate([np.ravel(getattr(one, name)) for one in (solution.up, solution.down)])
+    values = np.concatenate([np.ravel(getattr(entry, name)) for entry in (solution.up, solution.down)])
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
@@ -106,9 +108,11 @@ def _shaft(
     least, _ = pin_for(press, arm, thick, strength, mechanism.plate.stock)
     most = BEARING_IN_ROLLER * 2.0 * mechanism.roller_radius
     if mechanism.bearings is not None:
-        found = [one for one in bearings_of(mechanism.bearings.bore) if one.outer <= most]
-        return mechanism.bearings.bore, next(iter(found), None)
-    fitting = sorted((one for one in BEARINGS if one.bore >= least and one.outer <= most), key=lambda one: one.outer)
+        result = [entry for entry in bearings_of(mechanism.bearings.bore) if entry.outer <= most]
+        return mechanism.bearings.bore, next(iter(result), None)
+    fitting = sorted(
+        (entry for entry in BALL_BEARINGS if entry.bore >= least and entry.outer <= most), key=lambda entry: entry.outer
+    )
     return (fitting[0].bore, fitting[0]) if fitting else (least, None)
 
 
@@ -163,7 +167,7 @@ def _standing(solution: Solution, bush: float, diameter: float, holes: list[Arc]
     yield from (PosedBody.line("screw", "held", np.array([hole.center]), 0.5 * screw.head) for hole in holes)
 
 
-def _drawn(
+def _drawn_bodies(
     solution: Solution, standing: tuple[PosedBody, ...], sizes: tuple[float, float, float]
 ) -> Iterator[PosedBody]:
     """Yield all parts as the assembly shows them, the lowest first: for braces, slider pin and shafts their widths."""

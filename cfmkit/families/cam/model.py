@@ -39,7 +39,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import findings_of_one, stacked, values_of_one
 from cfmkit.results import Result, Status
-from cfmkit.stock.parts_list import listed
+from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -119,7 +119,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         closed=loop,
         effort_error=solution.effort_error,
         part_efforts=loop.part_efforts,
-        tables=listed(lambda: hardware(solution).parts),
+        tables=parts_tables(lambda: hardware(solution).parts),
         state=solution,
     )
 

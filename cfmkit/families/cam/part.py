@@ -12,7 +12,7 @@ from cfmkit.export.contours import polygons
 from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.part_sizes import BRACE, PLATE, count_of, depth_of, pin_path, roller_path
+from cfmkit.families.cam.part_sizes import BRACE_WIDTH, PLATE_THICKNESS, count_of, depth_of, pin_path, roller_path
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
 
@@ -37,19 +37,19 @@ def part_over_motion(result: Result) -> PosedPart | None:
     if not hasattr(solution, "states"):
         return None
     mechanism = result.spec.at("mechanism")
-    thick = PLATE if mechanism.contact is None else mechanism.contact.width
+    thick = PLATE_THICKNESS if mechanism.contact is None else mechanism.contact.width
     depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
     wound = (
         f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
     )
-    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, {wound}"
+    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE_WIDTH):.4g} mm each, {wound}"
     if depth is None:
         reported = "no steel spring fits between the rollers"
     # plate, two rollers, two braces, slider
     pieces = 6 + count_of(mechanism.springs)
-    found = hardware(solution)
-    all_bodies = (*bodies(solution), *found.bodies)
-    return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=found.pin)
+    joining = hardware(solution)
+    all_bodies = (*bodies(solution), *joining.bodies)
+    return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=joining.pin)
 
 
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:

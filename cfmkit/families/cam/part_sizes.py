@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.springs_spec import Springs
 
-PLATE = 0.008
+PLATE_THICKNESS = 0.008
 """Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
 
 
@@ -28,7 +28,7 @@ def pin_path(solution: Solution) -> FloatArray:
     return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
 
 
-BRACE = 0.010
+BRACE_WIDTH = 0.010
 """Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
 
 
@@ -38,7 +38,7 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
     Parameters
     ----------
     thick : float
-        Of the plate, and of each brace up to `BRACE` [m].
+        Of the plate, and of each brace up to `BRACE_WIDTH` [m].
     springs : Springs
         How many of what stiffness: half of them on either side, above each other.
     stretch, half_width : float
@@ -52,7 +52,7 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
         if coil is None:
             return None
         outer = coil.outer_diameter
-    return thick + 2.0 * min(thick, BRACE) + min(count, 2) * outer
+    return thick + 2.0 * min(thick, BRACE_WIDTH) + min(count, 2) * outer
 
 
 def count_of(springs: Springs) -> int:

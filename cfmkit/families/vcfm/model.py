@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
 from cfmkit.results import ROUND_OFF, Result, Status
-from cfmkit.stock.parts_list import listed
+from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence
@@ -91,7 +91,7 @@ def result_of(solution: Solution) -> Result:
         tables={
             "adjustability": partial(adjustability, solution),
             "readings": partial(readings, solution),
-            **listed(partial(parts_of, spec)),
+            **parts_tables(partial(parts_of, spec)),
         },
         state=solution,
     )

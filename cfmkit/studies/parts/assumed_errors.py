@@ -67,11 +67,11 @@ def accuracy_of(spec: Spec, process: str | None = None) -> ProcessAccuracy:
     named = process or getattr(getattr(spec, "design", None), "process", None)
     if named:
         return PROCESSES[named]
-    usually = [usual(one.name, one.modulus) for group in _materials(spec) for one in group]
+    usually = [usual(entry.name, entry.modulus) for group in _materials(spec) for entry in group]
     # one process makes the whole part: that of the material that is made least exactly
-    accuracy = max(usually, key=lambda one: one.thickness, default=PROCESSES[OF_PLATES])
-    own = process_of_part(spec)
-    return accuracy if own is None else own.accuracy(accuracy)
+    accuracy = max(usually, key=lambda entry: entry.thickness, default=PROCESSES[OF_PLATES])
+    private = process_of_part(spec)
+    return accuracy if private is None else private.accuracy(accuracy)
 
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:

@@ -153,10 +153,10 @@ class SuggestBlock(Model):
             return ()
         return self.material if isinstance(self.material, tuple) else (self.material,)
 
-    def _lasting(self, one: MaterialSpec) -> dict[str, Any]:
+    def _lasting(self, entry: MaterialSpec) -> dict[str, Any]:
         """Return a material as a specification states it; with S-N data, assumed ones too, for the cycles asked for."""
-        block = one.model_dump(exclude_unset=True)
-        law = one.fatigue
+        block = entry.model_dump(exclude_unset=True)
+        law = entry.fatigue
         if self.cycles is None or law is None or (law.points is not None and self.cycles > law.points[-1][0]):
             return block
         return block | {"fatigue": law.model_dump(exclude_unset=True) | {"cycles": float(self.cycles)}}

@@ -168,8 +168,8 @@ def motion_scale(solution: Solution) -> Scale:
 def assembly(result: Result) -> Figure:
     """Return all parts half way through the motion, numbered as in the parts list."""
     spec: Any = result.spec
-    found = hardware(spec, result.state)
-    return assembly_figure(spec.name, found.drawn, found.parts, result.state.motion.shape[1] // 2)
+    outcome = hardware(spec, result.state)
+    return assembly_figure(spec.name, outcome.drawn, outcome.parts, result.state.motion.shape[1] // 2)
 
 
 @styled

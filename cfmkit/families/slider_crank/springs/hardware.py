@@ -52,7 +52,7 @@ N_SCREWS = 4
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism, of all legs together."""
     mechanism, legs = spec.mechanism, spec.mechanism.sets
-    strength = PartStrength.of(mechanism.material, mechanism.safety_factor)
+    strength = PartStrength.from_material(mechanism.material, mechanism.safety_factor)
     motion = np.linspace(float(solution.motion[0, 0]), float(solution.motion[0, -1]), N_LOADS)
     loads = link_loads(solution.assembly, motion, solution.legs[:1, 0])
     eye, hole = eye_and_hole(spec)
@@ -65,12 +65,12 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     if pin_that_bears(load, sheet, sheet, strength.allowable, strength.pins, (pin,)) is None:
         cure = f"use at least {length_in_words(least)} ('mechanism.pins.diameter')" if bears else "use thicker links"
         faults["joints"] = f"too weak for {newton(load)} in links of {length_in_words(sheet)}: {cure}"
-    across, force, travel, rod_at = _guided(spec, solution)
+    across, force, travel, rod_at = _guide_loads(spec, solution)
     rod = guide_rod(across, force, travel, 2.0 * eye, mechanism.guide, system, strength)
     screw = screw_for(load * legs, sheet, N_SCREWS, strength)
     ends = rod_at + np.array([[-0.5 * rod.bush, 0.0], [0.5 * rod.bush, 0.0]])
     low, high = np.minimum(ends.min(axis=0), 0.0) - eye, np.maximum(ends.max(axis=0), 0.0) + eye
-    ground, moving = rectangle(*low, *high), tuple(_drawn(spec, solution, eye, pin))
+    ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
     places = clear_places(ground, moving, screw.head)
     bodies = (
         PosedBody.polygon("ground", "held", ground),
@@ -88,7 +88,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin)
 
 
-def _drawn(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:
+def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:
     """Yield links, slider, springs and pins as the assembly shows them, the lowest first."""
     rates, joints = solution.assembly.rates, _joints(solution)
     for name, k in (("crank", 0), ("coupler", 1)):
@@ -123,11 +123,11 @@ def _of(strength: PartStrength) -> str:
     return strength.name + (", assumed" if strength.assumed else "")
 
 
-def _guided(spec: SliderCrankSpec, solution: Solution) -> tuple[float, float, float, Any]:
+def _guide_loads(spec: SliderCrankSpec, solution: Solution) -> tuple[float, float, float, Any]:
     """Return loads across the guide and along it [N], the slider's travel [m], and both ends of its pin's way [m]."""
     slid = np.atleast_2d(solution.units.position)[0]
-    coupler, guide = (np.ravel(one) for one in solution.reactions)
-    across, pulled = (float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in (guide, coupler))
+    coupler, guide = (np.ravel(entry) for entry in solution.reactions)
+    across, pulled = (float(np.abs(entry[np.isfinite(entry)]).max(initial=0.0)) for entry in (guide, coupler))
     legs, offset = spec.mechanism.sets, float(solution.assembly.linkage.offset)
     at = np.array([[float(slid.min()), offset], [float(slid.max()), offset]])
     return across * legs, pulled * legs, float(np.ptp(slid)), at
@@ -146,19 +146,19 @@ def _parts(
         "on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", mm(width, width, sheet), "", "slider"
     )
     yield pin_part("joints", 3 * legs, pin, 2.0 * sheet, load, "joint")
-    for one in mechanism.springs.bought:
-        value = getattr(mechanism.springs, one.at)
-        rate = format_short(value, "stiffness" if one.at == "slider" else "rotational_stiffness")
-        kind = f"{one.loaded or ''} spring".strip() if one.at == "slider" else "torsion spring"
-        data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(one)])
-        wound = one.wound
+    for entry in mechanism.springs.bought:
+        value = getattr(mechanism.springs, entry.at)
+        rate = format_short(value, "stiffness" if entry.at == "slider" else "rotational_stiffness")
+        kind = f"{entry.loaded or ''} spring".strip() if entry.at == "slider" else "torsion spring"
+        data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(entry)])
+        wound = entry.wound
         size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
         yield ListedPart(
-            one.at.replace("_", " "), one.name, one.count * legs, data, "buy", size, "", f"spring-{one.at}"
+            entry.at.replace("_", " "), entry.name, entry.count * legs, data, "buy", size, "", f"spring-{entry.at}"
         )
-    known = {one.at for one in mechanism.springs.bought}
+    reference = {entry.at for entry in mechanism.springs.bought}
     for name, stiffness in zip(JOINTS, mechanism.springs.rates, strict=True):
-        if stiffness > 0.0 and name not in known:
+        if stiffness > 0.0 and name not in reference:
             kind = "spring" if name == "slider" else "torsion spring"
             value = format_short(float(stiffness), "stiffness" if name == "slider" else "rotational_stiffness")
             yield ListedPart(

@@ -38,7 +38,7 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
-from cfmkit.stock.parts_list import listed
+from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -97,7 +97,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         closed=model,
         effort_error=float(solution.effort_error[0]),
         part_efforts=model.part_efforts,
-        tables=listed(lambda: hardware(spec, solution).parts),
+        tables=parts_tables(lambda: hardware(spec, solution).parts),
         state=solution,
     )
 

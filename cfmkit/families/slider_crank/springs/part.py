@@ -32,14 +32,14 @@ def part_over_motion(result: Result) -> PosedPart:
     solution: Solution = result.state
     rates = solution.assembly.rates
     depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0])
-    found = hardware(spec, solution)
+    joining = hardware(spec, solution)
     return PosedPart(
-        (*bodies(spec, solution, solution.units), *found.bodies),
+        (*bodies(spec, solution, solution.units), *joining.bodies),
         direction=0.0,
         depth=depth,
         pieces=3 + int(np.count_nonzero(rates)),
         assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
-        pin=found.pin,
+        pin=joining.pin,
     )
 
 
