@@ -10,7 +10,7 @@ from cfmkit.documents.document import Field, field
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from cfmkit.stock.assumed_lasting import Assumed
+    from cfmkit.stock.assumed_lasting import LastingData
 
     Section = tuple[str, Sequence[Mapping[str, Any]], tuple[Field, ...]]
 
@@ -58,7 +58,7 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
     return "materials", PAGE_TEXT, sections, {"materials": records}
 
 
-def assumed_rows(name: str, entry: Assumed) -> list[dict[str, str]]:
+def assumed_rows(name: str, entry: LastingData) -> list[dict[str, str]]:
     """Return what is assumed of a material, a row for each property.
 
     Examples

@@ -61,7 +61,7 @@ def weight_in_words(drawing: Drawing, spec: Spec) -> str:
         mass = reference.density * volume(drawing)
     except GeometryError:
         return "not known: no thickness"
-    return f"{1e3 * mass:.3g} g, without what is bought"
+    return f"{1e3 * mass:.3g} g, cut part"
 
 
 def stated_tolerances(spec: Spec) -> tuple[str, ...]:

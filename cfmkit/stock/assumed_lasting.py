@@ -1,4 +1,4 @@
-"""Assumed data on how materials last and creep, for where a specification states nothing better.
+"""LastingData data on how materials last and creep, for where a specification states nothing better.
 
 S-N data of steels follow the rule of a text book from their least tensile strength; creep is that of a data sheet. Each
 says its source and how far it may be off. Materials that are missing here have no such data: printed plastics,
@@ -46,8 +46,8 @@ class AssumedCreep:
 
 
 @dataclass(frozen=True)
-class Assumed:
-    """Assumed data of one material; None: nothing is assumed."""
+class LastingData:
+    """LastingData data of one material; None: nothing is assumed."""
 
     fatigue: AssumedFatigue | None = None
     relaxation: AssumedCreep | None = None
@@ -117,27 +117,27 @@ def _creep(moduli: tuple[float, float, float], source: str) -> AssumedCreep:
 
 _LOSS_LECTURE = "NPTEL course 112104040, lecture 9, Table 9.1, order of size"
 
-ASSUMED_DATA: Mapping[str, Assumed] = MappingProxyType(
+ASSUMED_DATA: Mapping[str, LastingData] = MappingProxyType(
     {
-        "steel-1.4310": Assumed(steel(1300e6, "EN 10151, +C1300"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
-        "steel-304": Assumed(steel(515e6, "ASTM A240"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
-        "steel-s235": Assumed(steel(360e6, "EN 10025-2"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
-        "aluminium-6061-t6": Assumed(loss_factor=1e-5, loss_source=_LOSS_LECTURE),
-        "aluminium-7075-t6": Assumed(loss_factor=1e-5, loss_source=_LOSS_LECTURE),
-        "pom": Assumed(
+        "steel-1.4310": LastingData(steel(1300e6, "EN 10151, +C1300"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
+        "steel-304": LastingData(steel(515e6, "ASTM A240"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
+        "steel-s235": LastingData(steel(360e6, "EN 10025-2"), loss_factor=1e-3, loss_source=_LOSS_LECTURE),
+        "aluminium-6061-t6": LastingData(loss_factor=1e-5, loss_source=_LOSS_LECTURE),
+        "aluminium-7075-t6": LastingData(loss_factor=1e-5, loss_source=_LOSS_LECTURE),
+        "pom": LastingData(
             relaxation=_creep(
                 (2850e6, 2500e6, 1300e6),
                 "Hostaform C 9021, data sheet; C 27021 keeps 45 % after 1000 h, this one 46 %; other grades and "
                 "temperatures differ more",
             )
         ),
-        "pa66": Assumed(
+        "pa66": LastingData(
             relaxation=_creep(
                 (1400e6, 1190e6, 540e6),
                 "Zytel 103HSL NC010, conditioned, data sheet; spread not stated: humidity changes it much",
             )
         ),
-        "pc": Assumed(
+        "pc": LastingData(
             relaxation=_creep((2400e6, 2200e6, 1900e6), "Makrolon 2405, data sheet; spread not stated"),
         ),
     }

@@ -116,7 +116,7 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
     for changes in neighbours:
         try:
             levers = _levers(original, leaves, changes)
-            stated = {path: value for path, value in original.leaves() if path in levers}  # what is asked for stays
+            stated = {path: value for path, value in original.leaves() if path in levers}  # the stated ones stay
             again = finish(original.replace({**changes, **levers}))
             spec = None if again.spec is None else again.spec.replace({**changes, **stated})
         except SpecError:

@@ -162,7 +162,7 @@ def test_a_drawing_has_a_title_block_whose_weight_is_volume_times_density():
     drawing = part_of(spec)
     long = sum(one.value for one in drawing.dimensions)
     area = 2 * np.pi * 0.010**2 + 0.020 * long - 4 * np.pi * 0.003**2  # two links with round ends, four holes
-    assert weight_in_words(drawing, spec) == f"{1e3 * 7850.0 * 0.005 * area:.3g} g, without what is bought"
+    assert weight_in_words(drawing, spec) == f"{1e3 * 7850.0 * 0.005 * area:.3g} g, cut part"
     found = texts(part_on_paper(drawing, spec))
     for word in ("revision", "date", "weight", "scale", "projection", "first angle"):
         assert word in found

@@ -154,7 +154,7 @@ class SuggestBlock(Model):
         return self.material if isinstance(self.material, tuple) else (self.material,)
 
     def _lasting(self, entry: MaterialSpec) -> dict[str, Any]:
-        """Return a material as a specification states it; with S-N data, assumed ones too, for the cycles asked for."""
+        """Return a material as a specification states it; with S-N data, assumed ones too, for the requested cycles."""
         block = entry.model_dump(exclude_unset=True)
         law = entry.fatigue
         if self.cycles is None or law is None or (law.points is not None and self.cycles > law.points[-1][0]):
