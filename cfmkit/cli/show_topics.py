@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
+from cfmkit.cli.guide import list_terms
 from cfmkit.cli.show_materials import materials_page_parts, properties
 from cfmkit.cli.show_stock import stock_page_parts
 from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
@@ -76,6 +77,7 @@ BY_NAME = {
     "force_ripple": "a metric",
     "pla": "a material",
     "MPa": "a unit",
+    "envelope": "a term",
     "undercut": "a warning or failure",
     "lan-2010": "a paper",
 }
@@ -93,7 +95,7 @@ def overview() -> Document:
         ("topics", topics, columns),
         ("anything else by its name, such as", by_name, columns),
     )
-    text = "explains one of these; `cfmkit show FAMILY --figure` draws a mechanism with its dimensions named"
+    text = "explains one of these, or a word by its meaning (creep, BOM); `cfmkit show FAMILY --figure` draws a family"
     return _page("cfmkit show", text, sections, {"families": mechanisms, "topics": topics})
 
 
@@ -223,7 +225,7 @@ def _default(key: Record) -> str:
 def found(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
-    for kind, (records, fields) in _KINDS.items():
+    for kind, (records, fields) in KINDS.items():
         every = records()
         if known := [one for key in _keys(kind, name) for one in every.get(key, ())]:
             sections.append((kind, known, fields or SPEC_KEY_FIELDS))
@@ -252,7 +254,7 @@ def _symbols(name: str) -> list[Record]:
 
 def names() -> list[str]:
     """Return every name that `found` knows, but for the paths of keys and symbols."""
-    return [name for records, _ in _KINDS.values() for name in records() if "." not in name]
+    return [name for records, _ in KINDS.values() for name in records() if "." not in name]
 
 
 def references() -> list[dict[str, str]]:
@@ -393,7 +395,8 @@ def _references() -> Records:
 
 
 _ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
-_KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
+KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
+    "terms": (list_terms, (field("name", "word"), field("meaning", wraps=True))),
     "materials": (
         _materials,
         (field("name", "material"), Field("properties", properties, wraps=True), field("source", wraps=True)),
