@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
 from cfmkit.cli.guide import list_terms
+from cfmkit.cli.show_materials import materials_page_parts, properties
+from cfmkit.cli.show_stock import stock_page_parts
 from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.errors import UsageError
 
@@ -56,7 +58,7 @@ def explain(name: str | None) -> Document:
 
 def skipped(name: str | None) -> tuple[str, ...]:
     """Return the families of other packages that are missing from a page on all families; none for other pages."""
-    whole = name not in {*families.names(), "units", "metrics", "materials"}
+    whole = name not in {*families.names(), "units", "metrics", "materials", "stock"}
     return families.skipped() if whole else ()
 
 
@@ -152,38 +154,6 @@ def metrics_page() -> Document:
     return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 
 
-NO_SPREAD = "none stated"
-"""Of a property for which the sources of a material state no range."""
-
-
-def materials_page() -> Document:
-    """Return the material library."""
-    from cfmkit.stock import MATERIALS
-
-    records = [asdict(item) for item in MATERIALS.values()]
-    columns = (
-        field("name", "material", wraps=True),
-        Field("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
-        Field("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
-        Field("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
-        Field("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
-    )
-    text = (
-        "At room temperature, under short-term loads; the ranges are what to expect in practice. With --json in SI "
-        "units."
-    )
-    sources = (
-        field("name", "material", wraps=True),
-        field("poisson_ratio", "nu"),
-        Field("from ... to", lambda item: _spread(item["scatter"]["poisson_ratio"]), wraps=True),
-        Field("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
-        Field("from ... to", lambda item: _spread(item["scatter"]["density"]), wraps=True),
-        field("source", wraps=True),
-    )
-    sections = (("", records, columns), ("sources", records, sources))
-    return _page("materials", text, sections, {"materials": records})
-
-
 def references_page() -> Document:
     """Return the papers behind all families, and their BibTeX."""
     records = references()
@@ -241,14 +211,6 @@ def _key_sections(known: Sequence[Record]) -> list[Section]:
 def _when_read(block: str) -> int:
     """Return the place of a block in the order in which a file is written."""
     return READ_FIRST.get(block.partition(".")[0].removesuffix("[]"), len(READ_FIRST))
-
-
-def _number(value: float | None, size: float) -> str:
-    return "" if value is None else f"{value / size:.4g}"
-
-
-def _range(ends: Iterable[float] | None, size: float) -> str:
-    return "" if ends is None else " ... ".join(f"{end / size:.4g}" for end in ends)
 
 
 def _kind(key: Record) -> str:
@@ -432,30 +394,12 @@ def _references() -> Records:
     return _gathered((name, one) for one in each for name in {one["name"], re.sub(r"-[0-9]{4}$", "", one["name"])})
 
 
-def _spread(ends: Sequence[float] | None) -> str:
-    """Return a range, or that its source states none."""
-    return NO_SPREAD if ends is None else _range(ends, 1.0)
-
-
-def _property(item: Mapping[str, Any]) -> str:
-    """Return the numbers of a material in words."""
-    scatter, strength = item["scatter"], item["yield_strength"]
-    reported = [
-        f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_range(scatter['youngs_modulus'], 1e9)})",
-        f"nu = {item['poisson_ratio']:.4g} ({_spread(scatter['poisson_ratio'])})",
-        f"density {item['density']:.4g} kg/m^3 ({_spread(scatter['density'])})",
-    ]
-    if strength is not None:
-        reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_range(scatter['yield_strength'], 1e6)})")
-    return ", ".join(reported)
-
-
 _ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
 KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
     "terms": (list_terms, (field("name", "word"), field("meaning", wraps=True))),
     "materials": (
         _materials,
-        (field("name", "material"), Field("properties", _property, wraps=True), field("source", wraps=True)),
+        (field("name", "material"), Field("properties", properties, wraps=True), field("source", wraps=True)),
     ),
     "metrics": (_metrics, (field("name"), field("unit"), field("definition", wraps=True))),
     "values": (_values, _ABOUT),
@@ -491,6 +435,7 @@ METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wra
 TOPICS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
-    "materials": ("the named materials, with scatter and source", materials_page),
+    "materials": ("the named materials, with scatter and source", lambda: _page(*materials_page_parts())),
+    "stock": ("sizes of sheets, wire, pins, bearings and screws that are sold", lambda: _page(*stock_page_parts())),
     "references": ("the papers behind the families", references_page),
 }

@@ -13,6 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import GeometryError
+from cfmkit.export.arc_outlines import outlines
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.export.arc_outlines import Outline
-    from cfmkit.export.contours import Sheet
+    from cfmkit.export.contours import Drawing, Sheet
 
 SPECK = 1e-12
 """Faces smaller than this are rounding, where the edge of a region runs along the edge of the part, in squares of its
@@ -83,6 +84,18 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[La
         holes = [ring.exterior for one, ring in rings if one.hole and solid.contains(ring)]
         found.append(_faces(Polygon(solid.exterior, holes), sheet))
     return tuple(found)
+
+
+def volume(drawing: Drawing) -> float:
+    """Return the volume of everything that is cut [m^3].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        As `plates`.
+    """
+    result = plates(outlines(drawing, drawing.tolerance), drawing.sheet, drawing.tolerance)
+    return float(sum(face.area * thickness for plate in result for face, thickness in plate.faces))
 
 
 def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:

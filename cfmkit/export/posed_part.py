@@ -25,6 +25,9 @@ MIRROR = np.array([-1.0, 1.0])
 
 N_CIRCLE_POINTS = 73
 
+N_PLACES, N_COVERING = 26, 41
+"""Places of a screw along half an edge that are tried, and poses that they must be clear of."""
+
 
 @dataclass(frozen=True, eq=False)
 class PosedBody:
@@ -131,6 +134,7 @@ class PosedPart:
     depth: float | None = None  # out of the plane [m]; None if nothing is known of it
     pieces: int = 1  # separate pieces that the mechanism is put together from, bought ones included
     assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
+    pin: float | None = None  # diameter of its pins, which rub as they turn [m]; None without pins
 
 
 def box(bodies: Iterable[PosedBody], direction: float = 0.5 * math.pi) -> FloatArray:
@@ -154,3 +158,40 @@ def swept(bodies: Iterable[PosedBody]) -> Any:
     from shapely import union_all
 
     return union_all([body.shape(pose) for body in bodies for pose in range(len(body.core))])
+
+
+def clear_places(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
+    """Return a place next to each corner of a rectangle where a screw is reached beside all that moves, in all poses.
+
+    Places along the edges are tried, the nearest to the corner first; a corner from which half of both edges is covered
+    has no screw. Where fewer than two are left, the screws are in the corners, below what moves.
+
+    Parameters
+    ----------
+    ground : (4, 2) array
+        Rectangle along the axes [m].
+    moving : sequence of PosedBody
+        What passes over it.
+    head : float
+        Diameter of the screw's head, which is also its distance from the edge [m].
+    """
+    from shapely import Point
+
+    covered = swept([replace(body, core=body.core[_evenly_moved(body.core)]) for body in moving])
+    (x0, y0), (x1, y1) = (ground.min(axis=0) + head).tolist(), (ground.max(axis=0) - head).tolist()
+    shares = np.linspace(0.0, 0.5, N_PLACES).tolist()
+    result: list[FloatArray] = []
+    for x, far_x in ((x0, x1), (x1, x0)):
+        for y, far_y in ((y0, y1), (y1, y0)):
+            pairs = [((x + share * (far_x - x), y), (x, y + share * (far_y - y))) for share in shares]
+            along = [at for pair in pairs for at in pair]
+            clear = [at for at in along if covered.distance(Point(at)) >= 0.5 * head]
+            result += [np.array(clear[0])] if clear else []
+    return result if len(result) > 1 else [np.array([x, y]) for x in (x0, x1) for y in (y0, y1)]
+
+
+def _evenly_moved(core: FloatArray) -> Any:
+    """Return the numbers of poses (p, k, 2) between which a body moves by equal distances, the ends included."""
+    steps = np.hypot(*np.moveaxis(np.diff(core, axis=0), -1, 0)).max(axis=1)
+    path = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.unique(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))

@@ -109,6 +109,7 @@ class Durability:
     fatigue: FatigueLaw | None = None
     relaxation: RelaxationLaw | None = None
     holds: tuple[float, ...] = ()
+    assumed: tuple[str, ...] = ()  # where the data come from that no specification states
 
 
 def hold_text(time: float) -> str:

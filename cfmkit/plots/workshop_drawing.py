@@ -1,12 +1,13 @@
-"""The part on a sheet of paper: its outline to scale, main dimensions, holes, and what it is made of.
+"""The part on a sheet of paper: its outline to scale, main dimensions, holes, what it is made of, and a title block.
 
-What is cut is drawn in black, centre lines are dash-dotted. The datum of the hole table is the lower left corner of
-everything that is cut. Dimensions stand outside of the part: along x below it, along y to its left, others on
-their line.
+The thickness of every kind of beam is drawn across it: the force goes with its cube. What is cut is drawn in black,
+centre lines are dash-dotted. The datum of the hole table is the lower left corner of everything that is cut. Dimensions
+stand outside of the part: along x below it, along y to its left, others on their line.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from cfmkit.export.contours import UNCUT, Arc, DrawnDimension, Line, Smooth
 from cfmkit.export.layers import HELD
 from cfmkit.plots.parts import mm
 from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.specs.units import format_short
+from cfmkit.stock.stock_series import SIZE_RTOL, screw_through
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour, Drawing, Edge
 
 PAPER = (240.0, 165.0)
@@ -52,6 +54,25 @@ MOST_HOLES = 12
 """Rows of the hole table; more are counted."""
 
 
+TITLE_BLOCK = 33.0
+"""Height of the title block [mm]."""
+
+MAX_THICKNESSES = 2
+"""Thicknesses that are drawn of one beam: of more, the smallest and the largest."""
+
+STUB_LENGTH, LEADER_LENGTH = 4.0, 7.0
+"""Lengths of the arrows that point at a beam from both sides, and of the line to its text [mm of print]."""
+
+
+@dataclass(frozen=True)
+class TitleBlock:
+    """Words of a drawing on itself."""
+
+    revision: str
+    weight: str
+    decimals: int = 3  # of a millimetre, of every dimension
+
+
 @dataclass(frozen=True)
 class _Hole:
     """A round hole: where its centre is from the datum, and its diameter [m]."""
@@ -62,7 +83,9 @@ class _Hole:
 
 
 @styled
-def drawing_figure(drawing: Drawing, title: str, tolerances: Sequence[str] = ()) -> Figure:
+def drawing_figure(
+    drawing: Drawing, title: str, tolerances: Sequence[str] = (), block: TitleBlock | None = None
+) -> Figure:
     """Return a part's drawing.
 
     Parameters
@@ -73,7 +96,10 @@ def drawing_figure(drawing: Drawing, title: str, tolerances: Sequence[str] = ())
         What the mechanism is called.
     tolerances : sequence of str
         One line for each that the specification states.
+    block : TitleBlock, optional
+        Without it there is none, and dimensions have three decimals.
     """
+    decimals = block.decimals if block else TitleBlock.decimals
     figure = new_figure(*PAPER)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
     overall = _overall(drawing)
@@ -100,10 +126,61 @@ def drawing_figure(drawing: Drawing, title: str, tolerances: Sequence[str] = ())
         _hole(ax, hole, number, drawing, scale)
     if found:
         ax.plot(x0, y0, marker="+", markersize=9, color=VERMILLION, zorder=6, gid="datum")
-    _dimensions(ax, dimensions, (x0, y0, x1, y1), scale)
+    _dimensions(ax, dimensions, (x0, y0, x1, y1), scale, decimals)
+    for section in thicknesses(drawing):
+        _thickness(ax, section, scale, decimals)
     ratio = f"{scale:g} : 1" if scale >= 1 else f"1 : {1 / scale:g}"
-    _words(figure, drawing, found, (title, ratio), tolerances)
+    _words(figure, drawing, found, (title, ratio), tolerances, block)
     return figure
+
+
+def thicknesses(drawing: Drawing) -> Iterator[BeamSection]:
+    """Yield one section for each thickness of each beam that is dimensioned, of a tapered one the ends of its range."""
+    beams: dict[str, dict[float, BeamSection]] = {}
+    for section in drawing.sections:
+        beams.setdefault(section.beam, {}).setdefault(round(section.thickness, 7), section)
+    drawn = set()
+    for result in beams.values():
+        ordered = sorted(result)
+        for thickness in ordered if len(ordered) <= MAX_THICKNESSES else (ordered[0], ordered[-1]):
+            if thickness not in drawn:  # equal beams are alike
+                drawn.add(thickness)
+                yield result[thickness]
+
+
+def length_in_words(value: float, decimals: int) -> str:
+    """Return a length [m] with so many decimals of a millimetre, without zeros at its end.
+
+    >>> length_in_words(0.0442, 3), length_in_words(0.1000004, 3)
+    ('44.2 mm', '100 mm')
+    """
+    return f"{1e3 * value:.{decimals}f}".rstrip("0").rstrip(".") + " mm"
+
+
+def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> None:
+    """Draw the thickness of a beam across it: arrows from both sides, and the text beyond one of them."""
+    middle, across = mm(section.at), np.asarray(section.across)
+    if across[1] < 0:
+        across = -across
+    half = 0.5e3 * section.thickness * across
+    look = {"arrowstyle": "-|>", "linewidth": 0.5, "color": INK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
+    for side, far in ((1.0, STUB_LENGTH + LEADER_LENGTH), (-1.0, STUB_LENGTH)):
+        tip = middle + side * half
+        (x, y), (x_far, y_far) = tip.tolist(), (tip + side * far / scale * across).tolist()
+        ax.annotate("", xy=(x, y), xytext=(x_far, y_far), arrowprops=look, zorder=5)
+    place = middle + half + (STUB_LENGTH + LEADER_LENGTH) / scale * across
+    ax.text(
+        float(place[0]),
+        float(place[1]),
+        f"t {length_in_words(section.thickness, decimals)}",
+        ha="left" if across[0] >= 0 else "right",
+        va="center",
+        fontsize=SMALL,
+        color=INK,
+        zorder=7,
+        gid="thickness",
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
+    )
 
 
 def holes(drawing: Drawing) -> Iterator[_Hole]:
@@ -197,7 +274,7 @@ def _is_clear(
 
 
 def _dimensions(
-    ax: Axes, dimensions: Sequence[DrawnDimension], box: tuple[float, float, float, float], scale: float
+    ax: Axes, dimensions: Sequence[DrawnDimension], box: tuple[float, float, float, float], scale: float, decimals: int
 ) -> None:
     """Draw dimensions: those along x below the part, those along y at its left, the short ones nearest to it."""
     across = sorted((one for one in dimensions if one.along == "x"), key=lambda one: one.value)
@@ -205,21 +282,21 @@ def _dimensions(
     for number, one in enumerate(across, start=1):
         y = box[1] - number * STEP / scale
         (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
-        _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(one), scale)
+        _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(one, decimals), scale)
         _extension(ax, [(xa, ya), (xa, y)], [(xb, yb), (xb, y)])
     for number, one in enumerate(up, start=1):
         x = box[0] - number * STEP / scale
         (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
-        _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(one), scale)
+        _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(one, decimals), scale)
         _extension(ax, [(xa, ya), (x, ya)], [(xb, yb), (x, yb)])
     for one in dimensions:
         if one.along == "line":
             start, end = mm([one.start, one.end]).tolist()
-            _line(ax, (start[0], start[1]), (end[0], end[1]), _text(one), scale)
+            _line(ax, (start[0], start[1]), (end[0], end[1]), _text(one, decimals), scale)
 
 
-def _text(one: DrawnDimension) -> str:
-    return f"{one.name} {format_short(one.value, 'length')}"
+def _text(one: DrawnDimension, decimals: int) -> str:
+    return f"{one.name} {length_in_words(one.value, decimals)}"
 
 
 def _extension(ax: Axes, *lines: list[tuple[float, float]]) -> None:
@@ -256,7 +333,12 @@ def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: 
 
 
 def _words(
-    figure: Figure, drawing: Drawing, found: Sequence[_Hole], about: tuple[str, str], tolerances: Sequence[str]
+    figure: Figure,
+    drawing: Drawing,
+    found: Sequence[_Hole],
+    about: tuple[str, str],
+    tolerances: Sequence[str],
+    block: TitleBlock | None,
 ) -> None:
     """Write the column of words: title, what it is made of, dimensions that are no lines, holes, notes."""
     ax = axes_mm(figure, (PAPER[0] - COLUMN, 0.0, COLUMN, PAPER[1]))
@@ -264,7 +346,11 @@ def _words(
     ax.axis("off")
     ax.plot([0, 0], [6, PAPER[1] - 6], color=GREY, linewidth=0.6)
     title, ratio = about
-    rows = [*drawing.facts, ("sheet", _sheet(drawing)), ("scale", ratio)]
+    decimals = block.decimals if block else TitleBlock.decimals
+    floor = 0.0 if block is None else TITLE_BLOCK + 15.0
+    if block is not None:
+        _title_block(ax, block, title, ratio)
+    rows = [*drawing.facts, ("sheet", _sheet(drawing, decimals)), ("scale", ratio)]
     y = PAPER[1] - 10.0
     y = _written(ax, 4.0, y, title, NORMAL + 1.0, "bold") - 2.0
     for word, text in rows:
@@ -273,8 +359,10 @@ def _words(
     if found:
         y = _written(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL)
         for number, hole in enumerate(found[:MOST_HOLES], start=1):
-            place = f"x {format_short(hole.x, 'length')}, y {format_short(hole.y, 'length')}"
-            y = _written(ax, 4.0, y, f"{number}   \u2300 {format_short(hole.diameter, 'length')}   {place}")
+            x, up, across = (length_in_words(size, decimals) for size in (hole.x, hole.y, hole.diameter))
+            screw = screw_through(hole.diameter)
+            fits = f" ({screw.name})" if screw and math.isclose(screw.hole, hole.diameter, rel_tol=SIZE_RTOL) else ""
+            y = _written(ax, 4.0, y, f"{number}   \u2300 {across}{fits}   x {x}, y {up}")
         if len(found) > MOST_HOLES:
             y = _written(ax, 4.0, y, f"and {len(found) - MOST_HOLES} more, in the DXF file")
     for heading, lines in (
@@ -284,16 +372,43 @@ def _words(
         if lines:
             y = _written(ax, 4.0, y - 2.0, heading, NORMAL)
             for line in lines:
+                if y < floor:
+                    _written(ax, 4.0, y, "more: in the page of the run")
+                    return
                 y = _written(ax, 4.0, y, line)
 
 
-def _sheet(drawing: Drawing) -> str:
+def _title_block(ax: Axes, block: TitleBlock, title: str, ratio: str) -> None:
+    """Draw the block at the foot of the column: name, revision, date to be filled in, weight, scale, projection."""
+    left, right, low = 4.0, COLUMN - 3.0, 5.0
+    rows = (("name", title), ("revision", block.revision), ("date", ""), ("weight", block.weight), ("scale", ratio))
+    high = TITLE_BLOCK / (len(rows) + 1)
+    ax.plot([left, right, right, left, left], [low, low, *[low + TITLE_BLOCK] * 2, low], color=INK, linewidth=0.7)
+    for number, (word, text) in enumerate(rows, start=1):
+        y = low + TITLE_BLOCK - number * high
+        ax.plot([left, right], [y, y], color=GREY, linewidth=0.4)
+        ax.text(left + 1.5, y + 0.5 * high, word, fontsize=SMALL, color=GREY, va="center")
+        fit = int((right - left - 22.0) / (LETTERS * SMALL))
+        short = text if len(text) <= fit else f"{text[: fit - 3]}..."
+        ax.text(left + 20.0, y + 0.5 * high, short, fontsize=SMALL, color=INK, va="center")
+    y, radius = low + 0.5 * high, 0.32 * high
+    ax.text(left + 1.5, y, "projection", fontsize=SMALL, color=GREY, va="center")
+    # first angle (ISO 5456-2): a truncated cone, and to its right how it looks from the left
+    cone = np.array([[0.0, 0.5], [4.0, 1.0], [4.0, -1.0], [0.0, -0.5], [0.0, 0.5]]) * [1.0, radius] + [left + 20.5, y]
+    ax.plot(*cone.T, color=INK, linewidth=0.6, gid="first-angle")
+    turn = np.linspace(0.0, 2.0 * np.pi, ARC_POINTS)
+    for size in (radius, 0.5 * radius):
+        ax.plot(left + 29.0 + size * np.cos(turn), y + size * np.sin(turn), color=INK, linewidth=0.6)
+    ax.text(left + 33.0, y, "first angle", fontsize=SMALL, color=INK, va="center")
+
+
+def _sheet(drawing: Drawing, decimals: int) -> str:
     sheet = drawing.sheet
     others = sorted({region.thickness for region in sheet.regions})
     if sheet.thickness is None:
         return "thickness not stated" + (f" ('{sheet.key}')" if sheet.key else "")
-    found = format_short(sheet.thickness, "length")
-    more = [format_short(one, "length") for one in others if one != sheet.thickness]
+    found = length_in_words(sheet.thickness, decimals)
+    more = [length_in_words(one, decimals) for one in others if one != sheet.thickness]
     return found + (f"; in part {', '.join(more)}" if more else "")
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from cfmkit.errors import GeometryError
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -13,11 +15,53 @@ if TYPE_CHECKING:
 
 def part_on_paper(drawing: Drawing, spec: Spec) -> Figure:
     """Return the dimensioned drawing of a part, with the tolerances that are stated or assumed for it."""
-    from cfmkit.plots.workshop_drawing import drawing_figure
+    from cfmkit.plots.workshop_drawing import TitleBlock, drawing_figure
+    from cfmkit.store import stable_hash
+    from cfmkit.studies.parts.assumed_errors import accuracy_of
+    from cfmkit.studies.stock_and_digits import decimals_of
 
     stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
     reported = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
-    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", reported)
+    reported = (*reported, *how_to_print(drawing, spec))
+    # a date would make other bytes of the same part; the revision changes with any value of the mechanism
+    revision = stable_hash(spec.model_dump(mode="json", include={"family", "mechanism"}))[:8]
+    block = TitleBlock(revision, weight_in_words(drawing, spec), decimals_of(accuracy_of(spec)))
+    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", reported, block)
+
+
+def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
+    """Return how a part lies on the bed of a printer, and of how many strands its leaves are; nothing if it is cut."""
+    from cfmkit.plots.workshop_drawing import thicknesses
+    from cfmkit.stock.printing import strands_in_words
+    from cfmkit.studies.parts.assumed_errors import accuracy_of
+
+    accuracy = accuracy_of(spec)
+    if accuracy.name != "fdm":
+        return ()
+    material = getattr(getattr(spec, "mechanism", None), "material", None)
+    sizes = dict.fromkeys(round(section.thickness, 7) for section in thicknesses(drawing))
+    if getattr(material, "layers", None) == "across":
+        laid = "print standing: layers across the leaves, whose strength is that between layers"
+    else:
+        laid = "print lying flat: layers in the plane of this sheet" + (", strands along the leaves" if sizes else "")
+    return (laid, *(strands_in_words(size, accuracy.least_feature) for size in list(sizes)[:3]))
+
+
+def weight_in_words(drawing: Drawing, spec: Spec) -> str:
+    """Return the mass of what is cut, by the density of its named material, or what is missing to know it."""
+    from cfmkit.export.extrusion import volume
+    from cfmkit.stock import MATERIALS
+
+    mechanism: Any = getattr(spec, "mechanism", None)
+    material = getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
+    reference = MATERIALS.get(getattr(material, "name", None) or "")
+    if reference is None:
+        return "not known: no named material"
+    try:
+        mass = reference.density * volume(drawing)
+    except GeometryError:
+        return "not known: no thickness"
+    return f"{1e3 * mass:.3g} g, cut part"
 
 
 def stated_tolerances(spec: Spec) -> tuple[str, ...]:

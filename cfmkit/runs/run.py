@@ -275,7 +275,14 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
 
 def analysed(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
-    return run_outcome.report_on(api.analyze(spec, run))
+    found = run_outcome.report_on(api.analyze(spec, run))
+    return found.beside({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
+
+
+def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
+    """Return where the data on life and creep come from that a specification leaves to the library."""
+    lasting = getattr(spec, "durability", None)
+    return () if lasting is None else tuple(("lasting", text) for text in lasting.assumed)
 
 
 def designed(spec: Spec, run: Run) -> Report:
@@ -292,7 +299,8 @@ def designed(spec: Spec, run: Run) -> Report:
     drawn = warnings_of_part(result.spec) if design.spec is not None and result.status.usable else ()
     known = {one.name for one in result.warnings}
     more = tuple(one for one in drawn if one.name not in known)
-    found = found.beside({}, run_outcome.Supplement(files=tables, lines=design.notes, warnings=more))
+    lines = (*design.notes, *_assumed_lines(result.spec))
+    found = found.beside({}, run_outcome.Supplement(files=tables, lines=lines, warnings=more))
     if design.spec is None or result.status is not Status.COMPLETE:
         return found
     # as it was written: what follows from other values follows from those of each part
@@ -301,11 +309,12 @@ def designed(spec: Spec, run: Run) -> Report:
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
+    from cfmkit.studies.assumed_friction import friction_note
     from cfmkit.studies.parts.expected_forces import expected_forces
 
     found = _with_yield(found, nominal, given, run)
-    reported = expected_forces(nominal, run)
-    return found.beside({}, run_outcome.Supplement(lines=(("test plan", reported),))) if reported else found
+    lines = ("test plan", expected_forces(nominal, run)), ("friction", friction_note(nominal, run))
+    return found.beside({}, run_outcome.Supplement(lines=tuple((word, text) for word, text in lines if text)))
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:

@@ -8,121 +8,32 @@ One rule: the allowable stress is the yield strength over `safety_factor`, which
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from cfmkit.errors import QuantityError
-from cfmkit.metrics.fatigue_and_relaxation import Durability, FatigueLaw, RelaxationLaw
+from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
+from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
 from cfmkit.specs.units.fields import described
+from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed_laws
 from cfmkit.stock.materials import UnknownMaterial, material
+from cfmkit.stock.printing import LAYER_STRENGTHS, Layers
 from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
+from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.stock.stock_series import StockSize
 
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
-PositiveTime = Annotated[Time, Field(gt=0)]
-PositiveRatio = Annotated[Ratio, Field(gt=0, lt=1)]
-PositiveNumber = Annotated[float, Field(gt=0)]
 SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this factor")]
 
 _POISSON_RATIO = 0.3
 """Of a material described by its values alone: between that of metals and that of plastics."""
-
-
-class Fatigue(Model):
-    """Fatigue of a material: S-N points or Basquin's line, with Goodman's line for the mean stress."""
-
-    points: tuple[tuple[PositiveNumber, PositiveStress], ...] | None = Field(
-        None, min_length=2, description="S-N points [[cycles, amplitude], ...], fully reversed, cycles increasing"
-    )
-    coefficient: PositiveStress | None = Field(None, description="instead of points: s_f' of Basquin's s_f' (2 N)^b")
-    exponent: Annotated[Ratio, Field(gt=-1, lt=0)] | None = Field(None, description="b of the same, negative")
-    ultimate_strength: PositiveStress = Field(description="s_u, at which Goodman's line ends")
-    cycles: Annotated[float, Field(gt=0)] | None = Field(
-        None,
-        description="required life in cycles: the allowable stress is then at most the one that "
-        "can be applied so often, from 0 and back",
-    )
-    source: str | None = Field(None, max_length=300, description="where the values were read")
-
-    @model_validator(mode="after")
-    def _one_line(self) -> Self:
-        basquin = self.coefficient is not None and self.exponent is not None
-        if (self.coefficient is None) != (self.exponent is None):
-            raise ValueError("'coefficient' and 'exponent' belong together")
-        if basquin == (self.points is not None):
-            raise ValueError("give either 'points' or 'coefficient' and 'exponent'")
-        for (before, above), (after, below) in pairwise(self.points or ()):
-            if after <= before or below > above:
-                raise ValueError("'points' must have increasing cycles and amplitudes that do not rise")
-        if self.points is not None:
-            self._within_points(self.points)
-        return self
-
-    def _within_points(self, points: tuple[tuple[float, float], ...]) -> None:
-        """Raise if an amplitude is more than the material bears once, or more cycles are wanted than were shown."""
-        if points[0][1] > self.ultimate_strength:
-            reported = (
-                f"{format_short(points[0][1], 'stress')} is above {format_short(self.ultimate_strength, 'stress')}"
-            )
-            raise ValueError(f"an amplitude of 'points' is above 'ultimate_strength': {reported}")
-        if self.cycles is not None and self.cycles > points[-1][0] * (1 + 1e-12):
-            raise ValueError(
-                f"'cycles' is {self.cycles:g}, more than the {points[-1][0]:g} at which 'points' end: add points, or "
-                "give Basquin's line"
-            )
-
-    @property
-    def law(self) -> FatigueLaw:
-        """The same as numbers."""
-        line = None if self.coefficient is None or self.exponent is None else (self.coefficient, self.exponent)
-        return FatigueLaw(self.points or (), line, self.ultimate_strength)
-
-    @classmethod
-    def of(cls, law: FatigueLaw) -> Self:
-        """Return a law as a specification says it."""
-        coefficient, exponent = law.basquin or (None, None)
-        return cls(
-            points=law.points or None, coefficient=coefficient, exponent=exponent, ultimate_strength=law.ultimate
-        )
-
-
-class Relaxation(Model):
-    """Relaxation of the modulus while a strain is held: Prony terms, or the modulus at some times."""
-
-    terms: tuple[tuple[PositiveRatio, PositiveTime], ...] | None = Field(
-        None, min_length=1, description="Prony terms [[share, relaxation time], ...]: [[20 %, 10 h], [15 %, 500 h]]"
-    )
-    points: tuple[tuple[Annotated[Time, Field(ge=0)], PositiveStress], ...] | None = Field(
-        None, min_length=2, description="or the modulus after some times [[0 h, 1.5 GPa], [1000 h, 1.1 GPa]]"
-    )
-    hold: tuple[PositiveTime, ...] = Field(
-        (3.6e6,), min_length=1, description="after which the force is reported as `force_after[...]`; default: 1000 h"
-    )
-    temperature: str | None = Field(None, max_length=100, description="of the data, in words")
-    source: str | None = Field(None, max_length=300, description="where the values were read")
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        if (self.terms is None) == (self.points is None):
-            raise ValueError("give either 'terms' or 'points'")
-        if self.terms is not None and sum(share for share, _ in self.terms) >= 1:
-            raise ValueError("the shares of 'terms' must add up to less than 100 %: part of the modulus must remain")
-        for (before, above), (after, below) in pairwise(self.points or ()):
-            if after <= before or below > above:
-                raise ValueError("'points' must have increasing times and moduli that do not rise")
-        return self
-
-    @property
-    def law(self) -> RelaxationLaw:
-        """The same as numbers."""
-        return RelaxationLaw(self.terms or (), self.points or ())
 
 
 class MaterialSpec(Model):
@@ -141,35 +52,67 @@ class MaterialSpec(Model):
     yield_strength: PositiveStress | None = Field(
         None, description="for the allowable stress; default: the named material's, if known"
     )
+    layers: Layers | None = Field(
+        None,
+        description="of a printed part: 'along' if it lies flat and its leaves bend along the layers, 'across' if it "
+        "stands; the strength, and the modulus if known, are then those of this direction",
+    )
     law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
         "st-venant-kirchhoff",
         description="at large strain, for fidelity 'solid': Hooke's law in Green's strain, or rubber-like; beams bend "
         "with small strains, for which both are Hooke's",
     )
-    fatigue: Fatigue | None = Field(None, description="S-N points or Basquin's line, for `fatigue_life`; default: none")
+    fatigue: Fatigue | None = Field(
+        None,
+        description="S-N points or Basquin's line, for `fatigue_life`; default: as "
+        "assumed in `show materials`, if it has any; null: none",
+    )
     relaxation: Relaxation | None = Field(
-        None, description="Prony terms or moduli over time, for `force_after[1000 h]`; default: none"
+        None,
+        description="Prony terms or moduli over time, for `force_after[1000 h]`; default: as assumed in `show "
+        "materials`, if it has any; null: none",
     )
 
     @model_validator(mode="after")
     def _filled_in(self) -> Self:
-        given: dict[str, float | None] = {"poisson_ratio": _POISSON_RATIO}
+        filled: dict[str, Any] = {"poisson_ratio": _POISSON_RATIO}
         if self.name is not None:
             try:
                 known = material(self.name)
             except UnknownMaterial as error:
                 refuse("Material", {("name",): str(error)})
                 raise
-            given = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
+            filled = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
+            filled |= {key: law for key, law in assumed_laws(known.name).items() if key not in self.model_fields_set}
+            filled |= self._of_layers(known.name)
         elif self.youngs_modulus is None:
             raise ValueError("needs 'name' or 'youngs_modulus'")
-        for key, value in given.items():
+        else:
+            self._of_layers("these values")
+        for key, value in filled.items():
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
         if self.law == "neo-hookean" and self.poisson >= 0.5:
             reported = "'neo-hookean' needs a poisson_ratio below 0.5: at 0.5 it has no finite bulk modulus"
             refuse("Material", {("law",): reported})
         return self
+
+    def _of_layers(self, name: str) -> dict[str, float]:
+        """Return strength and modulus of a print in the direction that is stated, by their keys."""
+        reference = LAYER_STRENGTHS.get(name)
+        if self.layers is None or self.yield_strength is not None:
+            return {}
+        if reference is None:
+            named = ", ".join(LAYER_STRENGTHS)
+            reported = (
+                f"no strength along and across the layers is known of {name}: state 'yield_strength'; known: {named}"
+            )
+            refuse("Material", {("layers",): reported})
+            return {}
+        if self.layers == "along":
+            return {"yield_strength": reference.along}
+        modulus = {} if reference.modulus_across is None else {"youngs_modulus": reference.modulus_across}
+        return {"yield_strength": reference.across, **modulus}
 
     @property
     def modulus(self) -> float:
@@ -208,7 +151,15 @@ class MaterialSpec(Model):
             self.fatigue.law if self.fatigue else None,
             self.relaxation.law if self.relaxation else None,
             self.relaxation.hold if self.relaxation else (),
+            self.assumed_sources,
         )
+
+    @property
+    def assumed_sources(self) -> tuple[str, ...]:
+        """The sources of what is assumed, because only the name is stated."""
+        laws = (("fatigue", self.fatigue), ("relaxation", self.relaxation))
+        stated = self.model_fields_set
+        return tuple(law.source or "" for key, law in laws if law is not None and key not in stated)
 
 
 Friction = Annotated[Ratio, Field(ge=0, lt=1)]
@@ -297,6 +248,11 @@ class PartProcess(Model):
         return PROCESSES[self.name].least_radius if self.name else None
 
     @property
+    def prints(self) -> bool:
+        """True if it builds a part up: its width is no sheet's."""
+        return self.name in ("fdm", "sls")
+
+    @property
     def thinnest(self) -> float | None:
         """Thinnest wall [m]; None if neither a name nor a value says it."""
         if self.least_feature is not None:
@@ -356,6 +312,11 @@ class CutPart(Model):
         description="radius of inside corners, at least that of the cutter; 0: sharp, the stress there has no "
         "value; default: the smallest radius of `process` if stated, or half of the smallest thickness",
     )
+    stock: System | None = Field(
+        None,
+        description="metric or inch: sheets, pins and wire are of sizes that are sold (`show stock`); a design takes "
+        "the nearest sheet and is repeated for it, and stated sizes that are not sold are refused",
+    )
     sheet: AboveZero | None = Field(
         None,
         description="thickness of the sheet that everything is cut from: every width must be equal to it, and a design "
@@ -413,6 +374,12 @@ def usual_fillet(thinnest: float) -> str:
 def sheet_of(part: CutPart | None) -> float | None:
     """Return the thickness of the sheet that everything is cut from [m]; None if none is stated."""
     return None if part is None else part.sheet
+
+
+def stated_sheet(part: CutPart | None) -> Iterator[StockSize]:
+    """Yield the sheet that a part is cut from, unless it is printed."""
+    if part is not None and (part.process is None or not part.process.prints):
+        yield ("part", "sheet"), "sheet", part.sheet
 
 
 def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> dict[tuple[str | int, ...], str]:

@@ -1,32 +1,42 @@
-"""The list of parts to buy for a mechanism: `parts.csv`."""
+"""The list of parts to make and to buy for a mechanism: `parts.csv`, numbered as the assembly drawing numbers them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from cfmkit.tables import Table, TableColumn, text_column
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
 
 @dataclass(frozen=True)
-class BoughtPart:
-    """A part that is bought."""
+class ListedPart:
+    """One line of the list: equal parts that are made or bought."""
 
     place: str  # what it does in the mechanism
-    name: str  # by which it is ordered; empty where none is stated
+    name: str  # by which it is ordered or drawn; empty where none is stated
     count: int  # how many of it
     data: str = ""  # what decides whether another one would do
+    source: Literal["buy", "make"] = "buy"
+    size: str = ""  # main dimensions
+    standard: str = ""  # of its sizes
+    body: str = ""  # name of its bodies in the assembly drawing; empty if it is not drawn
 
 
-def parts_table(parts: Sequence[BoughtPart]) -> Table:
-    """Return the list as a table: place, name, count, data."""
-    place, name, data = (text_column(key, (getattr(one, key) for one in parts)) for key in ("place", "name", "data"))
-    return Table((place, name, TableColumn("count", tuple(one.count for one in parts)), data))
+def parts_table(parts: Sequence[ListedPart]) -> Table:
+    """Return the list as a table: item, place, name, count, data, source, size, standard."""
+    columns = {
+        key: text_column(key, (getattr(one, key) for one in parts))
+        for key in ("place", "name", "data", "source", "size", "standard")
+    }
+    item = TableColumn("item", tuple(range(1, len(parts) + 1)))
+    count = TableColumn("count", tuple(one.count for one in parts))
+    first = [columns.pop(key) for key in ("place", "name")]
+    return Table((item, *first, count, *columns.values()))
 
 
-def listed(parts: Sequence[BoughtPart]) -> dict[str, Callable[[], Table]]:
-    """Return the list as a result carries it; empty where nothing is bought by name."""
-    return {"parts": lambda: parts_table(parts)} if parts else {}
+def parts_tables(parts: Callable[[], Iterable[ListedPart]]) -> dict[str, Callable[[], Table]]:
+    """Return the list as a result carries it, computed when it is written."""
+    return {"parts": lambda: parts_table(tuple(parts()))}

@@ -1,5 +1,8 @@
 """A design as it is delivered: what the family makes of a specification, moved for its yield, verified as a solid.
 
+At the end its widths are those of a sheet that is sold, where that is wanted, and its dimensions have the digits that
+its process can hold.
+
 `cfmkit design` and the points of a study that designs take the same way.
 """
 
@@ -29,14 +32,27 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
         that for its margins what is left. A part from a sheet is designed again for its solid, with the whole budget:
         with what is left, the finished design could be lost.
     """
+    from cfmkit.studies.stock_and_digits import with_digits_of_process, with_stock_sheet, with_whole_strands
+
+    found = _finished_design(spec, designer, run)
+
+    def finish(variant: Spec) -> Design:
+        return _finished_design(variant, designer, run)
+
+    found = with_whole_strands(spec, with_stock_sheet(spec, found, finish, run), finish, run)
+    return with_digits_of_process(spec, found, finish, run)
+
+
+def _finished_design(spec: Spec, designer: Designer, run: Run) -> Design:
+    """Return the design of a specification with its margins, verified."""
     asked = getattr(spec, "design", None)
     plain = getattr(asked, "yield", None) is None
-    found = designer(spec, run) if plain else _with_yield(spec, designer, run)
+    result = designer(spec, run) if plain else _with_yield(spec, designer, run)
     if getattr(asked, "verify", None) is not None:
         from cfmkit.studies.verify_design_by_solid_model import verified
 
-        found = verified(spec, found, run)
-    return found
+        result = verified(spec, result, run)
+    return result
 
 
 def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:

@@ -21,7 +21,8 @@ def test_analyze_writes_curve_metrics_resolved_spec_and_manifest_in_the_default_
     done = cli("analyze", cam, *QUICK)
     assert (done.code, done.err) == (0, "")
     assert written(cli.folder) == {cam} | {
-        f"cfm-out/cam-analyze/{name}" for name in ("curve.csv", "metrics.json", "resolved.yaml", "manifest.json")
+        f"cfm-out/cam-analyze/{name}"
+        for name in ("curve.csv", "metrics.json", "parts.csv", "resolved.yaml", "manifest.json")
     }
 
 
@@ -94,7 +95,7 @@ def test_the_manifest_is_the_only_file_with_a_time_and_says_how_the_run_was_made
         "complete",
         0,
     )
-    assert set(manifest["files"]) == {"curve.csv", "metrics.json", "resolved.yaml"}
+    assert set(manifest["files"]) == {"curve.csv", "metrics.json", "parts.csv", "resolved.yaml"}
     assert manifest["spec"]["source"] == cam
     assert manifest["started"] <= manifest["finished"]
 
@@ -249,7 +250,7 @@ def test_a_strange_name_is_only_a_name(cli, cam, name):
     option = f"name={json.dumps(name)}"
     assert cli("analyze", cam, "-o", "out", *QUICK, "--set", option, "--json").document["name"] == name
     assert written(cli.folder) == {cam} | {
-        f"out/{item}" for item in ("curve.csv", "metrics.json", "resolved.yaml", "manifest.json")
+        f"out/{item}" for item in ("curve.csv", "metrics.json", "parts.csv", "resolved.yaml", "manifest.json")
     }
     page = cli("analyze", cam, "-o", "out", *QUICK, "--set", option).out
     assert page.splitlines()[0].startswith(f"{' '.join(name.split())}   50.7 N")

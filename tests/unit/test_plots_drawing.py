@@ -7,9 +7,8 @@ import pytest
 
 import cfmkit
 from cfmkit.documents.run_outcome import report_on
-from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes
+from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes, length_in_words
 from cfmkit.runs.files_a_run_writes import files, part_of
-from cfmkit.specs.units import format_short
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 EXAMPLES = ("cam", "vcfm_ding2022", "beam_lan2010", "slider_crank_li2019", "slider_crank_strip", "slider_crank_lumped")
@@ -32,7 +31,7 @@ def test_every_part_is_drawn_to_a_scale_of_paper_with_its_dimensions(name):
     assert "overall" in found
     assert "sheet" in found
     for one in drawing.dimensions:
-        assert format_short(one.value, "length") in found
+        assert length_in_words(one.value, 3) in found
     x0, y0, x1, y1 = drawing.extents
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     assert left < 1e3 * x0 < 1e3 * x1 < right
@@ -46,7 +45,7 @@ def test_holes_are_given_from_the_lower_left_corner_of_the_plate():
     x0, _, x1, _ = drawing.extents
     assert found[0].x + found[1].x == pytest.approx(x1 - x0)  # symmetric
     assert found[0].y == pytest.approx(0.020)  # half of a tab of 40 mm
-    assert "x 89.26 mm, y 20 mm" in texts(drawing_figure(drawing, "cam"))
+    assert "6.6 mm (M6)   x 89.256 mm, y 20 mm" in texts(drawing_figure(drawing, "cam"))
 
 
 def test_what_a_leaf_measures_is_what_its_drawing_says():
@@ -136,3 +135,45 @@ def test_the_overall_size_of_a_part_with_fillets_is_that_of_its_material(name):
     drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml").replace({"mechanism.part.fillet": "0.4 mm"}))
     points = np.concatenate([one.points(1e-9) for one in drawing.contours if one.layer == "cut"])
     assert drawing.extents == pytest.approx((*points.min(axis=0), *points.max(axis=0)), abs=2e-9)
+
+
+@pytest.mark.parametrize("name", ["vcfm_titanium", "slider_crank_strip", "slider_crank_tapered", "beam_lan2010"])
+def test_the_thickness_on_which_the_force_depends_is_drawn_across_its_beam(name):
+    """It was said in words at most: the force goes with its cube."""
+    drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml"))
+    drawn = [one.get_text() for one in drawing_figure(drawing, name).axes[0].texts if one.get_gid() == "thickness"]
+    wanted = {one.thickness for one in drawing.sections}
+    assert {f"t {length_in_words(min(wanted), 3)}", f"t {length_in_words(max(wanted), 3)}"} <= set(drawn)
+    assert len(drawn) == len(set(drawn))
+
+
+def test_a_drawing_has_a_title_block_whose_weight_is_volume_times_density():
+    from cfmkit.runs.part_on_paper import part_on_paper, weight_in_words
+
+    spec = cfmkit.load(
+        CONFIGS / "slider_crank_li2019.yaml",
+        [
+            "mechanism.material=steel-s235",
+            "mechanism.part.sheet=5 mm",
+            "mechanism.pins={diameter: 6 mm}",
+            "mechanism.links={width: 20 mm}",
+        ],
+    )
+    drawing = part_of(spec)
+    long = sum(one.value for one in drawing.dimensions)
+    area = 2 * np.pi * 0.010**2 + 0.020 * long - 4 * np.pi * 0.003**2  # two links with round ends, four holes
+    assert weight_in_words(drawing, spec) == f"{1e3 * 7850.0 * 0.005 * area:.3g} g, cut part"
+    found = texts(part_on_paper(drawing, spec))
+    for word in ("revision", "date", "weight", "scale", "projection", "first angle"):
+        assert word in found
+
+
+def test_the_revision_of_a_drawing_changes_with_a_dimension_and_not_with_a_name():
+    from cfmkit.runs.part_on_paper import part_on_paper
+
+    def revision(*changes):
+        spec = cfmkit.load(CONFIGS / "slider_crank_strip.yaml", changes)
+        drawn = [one.get_text() for one in part_on_paper(part_of(spec), spec).axes[1].texts]
+        return drawn[drawn.index("revision") + 1]
+
+    assert revision() == revision("name=other") != revision("mechanism.beam.thickness=0.95 mm")

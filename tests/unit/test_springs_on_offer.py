@@ -103,13 +103,21 @@ def test_the_generic_series_serves_and_says_what_is_bought():
     assert springs.stiffness == offer.rate
     assert offer.stress(result.state.elongation.max()) <= offer.wound.stress(offer.rate * offer.largest) * (1 + 1e-9)
     table = result.tables["parts"]()
-    assert [column.name for column in table.columns] == ["place", "name", "count", "data"]
-    assert table.columns[1].cells() == [springs.name]
-    assert table.columns[2].cells() == [springs.count]
+    names = ["item", "place", "name", "count", "data", "source", "size", "standard"]
+    assert [column.name for column in table.columns] == names
+    rows = list(zip(*(column.cells() for column in table.columns), strict=True))
+    assert [row[2:4] for row in rows if row[1] == "between the rollers"] == [(springs.name, springs.count)]
+    assert [row[0] for row in rows] == list(range(1, len(rows) + 1))
 
 
-def test_nothing_is_listed_where_nothing_is_named():
-    assert not analyze(cam()).tables
+def test_all_parts_are_listed_where_nothing_is_named():
+    """Nothing was: plate, braces, rollers, slider, pins, guide and screws are to be made or bought in any case."""
+    place, source = (
+        next(column.cells() for column in analyze(cam()).tables["parts"]().columns if column.name == key)
+        for key in ("place", "source")
+    )
+    assert {"cam", "roller to slider", "slider pin", "guide of the slider", "plate to its base"} <= set(place)
+    assert set(source) == {"make", "buy"}
 
 
 def test_a_list_may_be_a_file(tmp_path):
@@ -382,5 +390,9 @@ def test_where_no_set_keeps_the_tolerance_the_nearest_three_are_told():
 def test_a_pair_needs_every_spring_twice():
     spec, _ = cranked()
     pair = spec.replace({"mechanism.copies": "mirrored"})
-    counts = [family("slider-crank").analyze(one, Run()).tables["parts"]().columns[2].cells() for one in (spec, pair)]
+    tables = [family("slider-crank").analyze(one, Run()).tables["parts"]() for one in (spec, pair)]
+    columns = [{column.name: column.cells() for column in table.columns} for table in tables]
+    counts = [
+        [count for count, data in zip(one["count"], one["data"], strict=True) if "torsion" in data] for one in columns
+    ]
     assert counts == [[2, 2, 2], [4, 4, 4]]

@@ -25,8 +25,8 @@ class ShowOptions(Common):
         str | None,
         argument(
             "WORD",
-            "What to explain: a family, units, metrics, materials, references, anything by its name: brace_length, "
-            "pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
+            "What to explain: a family, units, metrics, materials, stock, references, anything by its name: "
+            "brace_length, pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
             shell_completion.topics,
         ),
     ] = None
@@ -41,7 +41,7 @@ class ShowOptions(Common):
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Document:
-    """Explain a family with every key of its spec; list units, metrics, materials or papers; or explain one word."""
+    """Explain a family with every key; list units, metrics, materials, stock or papers; or explain one word."""
     from cfmkit.cli.show_by_meaning import explain_by_meaning
     from cfmkit.cli.show_topics import explain, skipped
 

@@ -19,7 +19,9 @@ from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, Positi
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque, format_short
 from cfmkit.specs.units.fields import LARGEST
-from cfmkit.stock.material_and_part_spec import sheet_faults, sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_faults, sheet_of, stated_sheet
+from cfmkit.stock.springs.spec import is_made
+from cfmkit.stock.stock_series import stock_faults
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 EXTENTS = tuple(dict.fromkeys(kind.extent for kind in Drive.__subclasses__()))
@@ -227,6 +229,13 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _goes_as_far_as_the_drive_says(self) -> Self:
         refuse("BeamSpec", {("analysis", *place): message for place, message in _extent_faults(self)})
+        return self
+
+    @model_validator(mode="after")
+    def _stock_is_sold(self, info: ValidationInfo) -> Self:
+        part, material = self.mechanism.part, self.mechanism.material
+        if part is not None and not is_made(info):
+            refuse("BeamSpec", stock_faults(part.stock, stated_sheet(part), material.name))
         return self
 
     @model_validator(mode="after")

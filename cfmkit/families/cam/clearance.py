@@ -14,7 +14,7 @@ from cfmkit.arrays import FloatArray
 from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.part import pin_path
+from cfmkit.families.cam.part_sizes import pin_path
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.families.findings import mm
 from cfmkit.results import Quantity

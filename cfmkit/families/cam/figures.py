@@ -10,8 +10,8 @@ import numpy as np
 
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.clearance import nearest_pairs
+from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.part import (
-    count_of,
     moment,
     pivoting,
     pose,
@@ -19,8 +19,10 @@ from cfmkit.families.cam.part import (
     start_curve,
     swallowtail,
 )
+from cfmkit.families.cam.part_sizes import count_of
 from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
+from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
@@ -65,7 +67,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
         return draw_dynamics.figures(result)
     if result.spec.at("mechanism.profile.file"):
         return built_figures(result)
-    makers = [loop, mechanism, curvature, contact, springs]
+    makers = [loop, mechanism, curvature, contact, springs, assembly]
     if solution.corner_travel > 0:
         makers.append(undercut)
     if solution.assembly.spec.mechanism.envelope is not None:
@@ -105,6 +107,12 @@ def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None 
     parts.force_arrow(ax, (x, y + 0.02 * height), (x, y + 0.11 * height))
     parts.to_scale(ax, view.box)
     return ax
+
+
+def assembly(result: Result) -> Figure:
+    """Return all parts half way through the travel, numbered as in the parts list."""
+    outcome = hardware(result.state)
+    return assembly_figure(result.spec.name, outcome.drawn, outcome.parts, len(result.state.travel) // 2)
 
 
 def loop(result: Result) -> Figure:

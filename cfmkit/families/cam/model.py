@@ -22,10 +22,10 @@ from cfmkit.arrays import LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import Problem, SpecError
 from cfmkit.families.cam.assembly import CLOSE, Assembly, target_force
-from cfmkit.families.cam.bought_parts import parts_of
 from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
+from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
     check_first_pose,
@@ -39,7 +39,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import findings_of_one, stacked, values_of_one
 from cfmkit.results import Result, Status
-from cfmkit.stock.parts_list import listed
+from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -119,7 +119,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         closed=loop,
         effort_error=solution.effort_error,
         part_efforts=loop.part_efforts,
-        tables=listed(parts_of(spec)),
+        tables=parts_tables(lambda: hardware(solution).parts),
         state=solution,
     )
 

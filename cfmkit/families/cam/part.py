@@ -10,26 +10,22 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.export.contours import polygons
 from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
+from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.part_sizes import BRACE_WIDTH, PLATE_THICKNESS, count_of, depth_of, pin_path, roller_path
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.made_to_measure import extension_spring
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
-    from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.results import Result
 
 Point = tuple[float, float]
 
 SLENDER = 0.2
 """A picture of the mechanism is at least this fraction of its height wide to each side: words need room."""
-
-
-PLATE = 0.008
-"""Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
 
 
 def part_over_motion(result: Result) -> PosedPart | None:
@@ -41,17 +37,19 @@ def part_over_motion(result: Result) -> PosedPart | None:
     if not hasattr(solution, "states"):
         return None
     mechanism = result.spec.at("mechanism")
-    thick = PLATE if mechanism.contact is None else mechanism.contact.width
+    thick = PLATE_THICKNESS if mechanism.contact is None else mechanism.contact.width
     depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
     wound = (
         f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
     )
-    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, {wound}"
+    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE_WIDTH):.4g} mm each, {wound}"
     if depth is None:
         reported = "no steel spring fits between the rollers"
     # plate, two rollers, two braces, slider
     pieces = 6 + count_of(mechanism.springs)
-    return PosedPart(bodies(solution), depth=depth, pieces=pieces, assumed=reported)
+    joining = hardware(solution)
+    all_bodies = (*bodies(solution), *joining.bodies)
+    return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=joining.pin)
 
 
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:
@@ -66,49 +64,6 @@ def _plate(solution: Solution) -> tuple[Contour, ...]:
     """Return the outline of the plate and its holes."""
     profile = solution.assembly.track.profile
     return plate_contours((profile, profile), solution.assembly.spec.mechanism.plate)
-
-
-def roller_path(solution: Solution) -> FloatArray:
-    """Return the positions of the right roller's axis over the solution, (n, 2) [m]."""
-    return np.column_stack([solution.states.x, solution.states.y])
-
-
-def pin_path(solution: Solution) -> FloatArray:
-    """Return the positions of the slider's pin over the solution, (n, 2) [m]."""
-    (x, y), length = roller_path(solution).T, solution.assembly.track.brace_length
-    return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
-
-
-BRACE = 0.010
-"""Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
-
-
-def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
-    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits.
-
-    Parameters
-    ----------
-    thick : float
-        Of the plate, and of each brace up to `BRACE` [m].
-    springs : Springs
-        How many of what stiffness: half of them on either side, above each other.
-    stretch, half_width : float
-        Their largest elongation, and half their length at rest [m].
-    """
-    count = count_of(springs)
-    if springs.wound is not None:
-        outer = springs.wound.coil + springs.wound.wire
-    else:
-        coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
-        if coil is None:
-            return None
-        outer = coil.outer_diameter
-    return thick + 2.0 * min(thick, BRACE) + min(count, 2) * outer
-
-
-def count_of(springs: Springs) -> int:
-    """Return how many springs there are."""
-    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1
 
 
 # --- for pictures -----------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
-from cfmkit.families.cam.part import count_of, depth_of
+from cfmkit.families.cam.part_sizes import count_of, depth_of
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm

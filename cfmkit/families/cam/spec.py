@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.families.cam.springs_spec import Springs
@@ -21,7 +21,8 @@ from cfmkit.stock.material_and_part_spec import (
     ProcessField,
     SafetyFactor,
 )
-from cfmkit.stock.springs.spec import Catalogue, Life
+from cfmkit.stock.springs.spec import Catalogue, Life, is_made
+from cfmkit.stock.stock_series import StockSize, System, stock_faults
 
 Positive = Field(gt=0)
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
@@ -68,6 +69,11 @@ class Plate(Model):
     )
     process: ProcessField | None = Field(
         None, description="manufacturing process: laser, wire-edm, fdm, sls or mill, or your own values; default: laser"
+    )
+    stock: System | None = Field(
+        None,
+        description="metric or inch: sheet, pins, bearings and wire that are stated must be of sizes that are sold "
+        "(`show stock`)",
     )
 
 
@@ -399,6 +405,20 @@ class CamSpec(Spec):
     mechanism: Mechanism
     design: CamDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: CamAnalysis = Field(default_factory=CamAnalysis, description="how it is run")
+
+    @model_validator(mode="after")
+    def _stock_is_sold(self, info: ValidationInfo) -> Self:
+        mechanism, plate, wound = self.mechanism, self.mechanism.plate, self.mechanism.springs.wound
+        sizes: list[StockSize] = [
+            (("pins", "diameter"), "pin", mechanism.pins.diameter if mechanism.pins else None),
+            (("bearings", "bore"), "bearing", mechanism.bearings.bore if mechanism.bearings else None),
+            (("springs", "wound", "wire"), "wire", wound.wire if wound else None),
+        ]
+        if plate.process is None or not plate.process.prints:
+            sizes += [(("plate", "thickness"), "sheet", plate.thickness)]
+        material = mechanism.contact.material.name if mechanism.contact else None
+        refuse("Spec", {} if is_made(info) else stock_faults(plate.stock, sizes, material))
+        return self
 
     @model_validator(mode="after")
     def _gravity_needs_masses(self) -> Self:

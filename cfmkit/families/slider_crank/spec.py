@@ -6,14 +6,16 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio, format_short
-from cfmkit.stock.material_and_part_spec import Guide, Pins, sheet_faults
+from cfmkit.stock.material_and_part_spec import Guide, Pins, sheet_faults, stated_sheet
+from cfmkit.stock.springs.spec import is_made
+from cfmkit.stock.stock_series import StockSize, stock_faults
 
 
 class Mechanism(Printed):
@@ -153,6 +155,20 @@ class SliderCrankSpec(Spec):
     def piece(self) -> Literal["prb", "lumped", "beam"]:
         """Kind: links and springs, flexures or a strip; of a solid the finest that there is data for."""
         return self.mechanism.finest if self.fidelity == "solid" else self.fidelity
+
+    @model_validator(mode="after")
+    def _stock_is_sold(self, info: ValidationInfo) -> Self:
+        mechanism = self.mechanism
+        if mechanism.part is None or is_made(info):
+            return self
+        sizes: list[StockSize] = [*stated_sheet(mechanism.part)]
+        sizes += [(("pins", "diameter"), "pin", mechanism.pins.diameter if mechanism.pins else None)]
+        for number, spring in enumerate(mechanism.springs.bought):
+            wire = spring.wound.wire if spring.wound else None
+            sizes += [(("springs", "bought", number, "wound", "wire"), "wire", wire)]
+        material = mechanism.material.name if mechanism.material else None
+        refuse("Spec", stock_faults(mechanism.part.stock, sizes, material))
+        return self
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:

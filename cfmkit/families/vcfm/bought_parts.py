@@ -7,20 +7,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm, newton, rate
-from cfmkit.stock.parts_list import BoughtPart
+from cfmkit.families.hardware import mm as exact
+from cfmkit.stock.parts_list import ListedPart
 from cfmkit.stock.springs.guides import guide_cure, guide_needed, guide_words
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
-def parts_of(spec: VcfmSpec) -> tuple[BoughtPart, ...]:
-    """Return the bought parts; none where the spring is a structure of leaves."""
-    springs = spec.mechanism.springs
-    if springs is None:
-        return ()
+def parts_of(spec: VcfmSpec) -> tuple[ListedPart, ...]:
+    """Return the leaves, and their spring: made, or bought."""
+    mechanism, springs = spec.mechanism, spec.mechanism.springs
+    material, leaves, flexures = mechanism.material.words, mechanism.bistable, mechanism.positive
+    data = f"{leaves.half_beams} {leaves.structure}, {material}; geometry/vcfm.dxf"
+    made = [ListedPart("shuttle, leaves and walls", "leaves", 1, data, "make", f"{exact(leaves.width)} deep")]
+    if flexures is not None:
+        data = f"{flexures.structure}, {material}; geometry/vcfm.dxf"
+        made.append(ListedPart("below the shuttle", "spring", 1, data, "make", f"{exact(flexures.width)} deep"))
+    return (*made, *([] if springs is None else [_bought(springs)]))
+
+
+def _bought(springs: BoughtSprings) -> ListedPart:
+    """Return the bought springs of the list."""
     data = [f"{springs.kind} spring, {rate(springs.rate)}"]
     if springs.initial_tension:
         data.append(f"initial tension {newton(springs.initial_tension)}")
@@ -28,11 +39,13 @@ def parts_of(spec: VcfmSpec) -> tuple[BoughtPart, ...]:
         data.append(f"up to {mm(springs.max_elongation)}")
     if springs.free_length:
         data.append(f"{mm(springs.free_length)} relaxed")
+    size = ""
     if wire := springs.wound:
+        size = f"wire {exact(wire.wire)}, coil {exact(wire.coil)}, {wire.turns:g} turns"
         data.append(f"wire {mm(wire.wire)}, mean coil {mm(wire.coil)}, {wire.turns:g} turns")
     data += guide_words(springs)
     place = "below the shuttle" if springs.kind == "compression" else "above the shuttle"
-    return (BoughtPart(place, springs.name or "", springs.count, ", ".join(data)),)
+    return ListedPart(place, springs.name or "", springs.count, ", ".join(data), "buy", size)
 
 
 def _worst(solution: Solution) -> tuple[FloatArray, FloatArray]:

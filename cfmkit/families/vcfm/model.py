@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
 from cfmkit.results import ROUND_OFF, Result, Status
-from cfmkit.stock.parts_list import listed
+from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence
@@ -88,8 +88,11 @@ def result_of(solution: Solution) -> Result:
         closed=dense,
         effort_error=float(solution.effort_error[0]),
         part_efforts=dense.part_efforts,
-        tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)}
-        | listed(parts_of(spec)),
+        tables={
+            "adjustability": partial(adjustability, solution),
+            "readings": partial(readings, solution),
+            **parts_tables(partial(parts_of, spec)),
+        },
         state=solution,
     )
 

@@ -124,13 +124,14 @@ def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
     """Yield what both parts are made of, and their leaves."""
     leaves, spring = spec.mechanism.bistable, spec.mechanism.positive
     yield "material", spec.mechanism.material.words
-    for part in parts_of(spec):
+    for part in (one for one in parts_of(spec) if one.source == "buy"):
         yield "springs", f"{part.count} x {f'{part.name}, ' if part.name else ''}{part.data}"
     for word, one, count in (("leaves", leaves, leaves.half_beams), ("spring", spring, None)):
         if one is None:
             continue
-        size = f"{mm(one.length)} long, {mm(one.thickness)} thick, {mm(one.width)} wide"
-        angle = f", at {format_short(one.angle, 'angle')}" if one.angle else ""
+        length, thick, width = (format_short(size, "length", 7) for size in (one.length, one.thickness, one.width))
+        size = f"{length} long, {thick} thick, {width} wide"
+        angle = f", at {format_short(one.angle, 'angle', 6)}" if one.angle else ""
         yield word, f"{f'{count} {one.structure}' if count else one.structure}: {size}{angle}"
 
 

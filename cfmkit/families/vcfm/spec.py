@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import sin
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
@@ -25,8 +25,9 @@ from cfmkit.specs.spec import (
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.material_and_part_spec import MaterialField, SafetyFactor, sheet_faults
-from cfmkit.stock.springs.spec import Catalogue, Life
+from cfmkit.stock.material_and_part_spec import MaterialField, SafetyFactor, sheet_faults, stated_sheet
+from cfmkit.stock.springs.spec import Catalogue, Life, is_made
+from cfmkit.stock.stock_series import StockSize, stock_faults
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -260,6 +261,15 @@ class VcfmSpec(Spec):
         return dict(blocks) | {"analysis": {"fidelity": fidelity} | dict(keys_of(analysis))}
 
     @model_validator(mode="after")
+    def _stock_is_sold(self, info: ValidationInfo) -> Self:
+        part, springs = self.mechanism.part, self.mechanism.springs
+        if part is not None and not is_made(info):
+            wire = springs.wound.wire if springs and springs.wound else None
+            sizes: list[StockSize] = [*stated_sheet(part), (("springs", "wound", "wire"), "wire", wire)]
+            refuse("Spec", stock_faults(part.stock, sizes, self.mechanism.material.name))
+        return self
+
+    @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
         part = self.mechanism
         sheet = None if part.part is None else part.part.sheet
@@ -363,7 +373,9 @@ class VcfmSpec(Spec):
         found = self.mechanism.material.durability
         if found is None or self.mechanism.springs is None:
             return found
-        return None if found.fatigue is None else Durability(found.fatigue)
+        if found.fatigue is None:
+            return None
+        return Durability(found.fatigue, assumed=found.assumed if found.relaxation is None else ())
 
     @property
     def travel(self) -> float:

@@ -15,7 +15,7 @@ from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import AS_MADE, Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.unit_size import is_unit
-from cfmkit.stock.material_and_part_spec import Fatigue
+from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
 from cfmkit.stock.springs.helical_spring_formulas import Wound
 from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport

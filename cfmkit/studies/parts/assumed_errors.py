@@ -55,20 +55,23 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
     kinds: Mapping[str, str] = {} if errors is None else function_named(errors)(spec)
     if not kinds:
         return None
-    named = process or getattr(getattr(spec, "design", None), "process", None)
-    shared, owned = _materials(spec)
-    usually = [usual(one.name, one.modulus) for one in (*shared, *owned)]
-    # one process makes the whole part: that of the material that is made least exactly
-    accuracy = max(usually, key=lambda one: one.thickness, default=PROCESSES[OF_PLATES])
-    own = process_of_part(spec)
-    if named:
-        accuracy = PROCESSES[named]
-    elif own is not None:
-        accuracy = own.accuracy(accuracy)
+    accuracy, (shared, owned) = accuracy_of(spec, process), _materials(spec)
     band = next((found for one in shared if (found := _band(one))), None)
     rates = {path: float(spec.at(path)) for path, kind in kinds.items() if kind == "rate"}
     made = {path: kind for path, kind in kinds.items() if kind != "rate"}
     return Assumed(accuracy, made, band, any(map(_band, owned)), rates)
+
+
+def accuracy_of(spec: Spec, process: str | None = None) -> ProcessAccuracy:
+    """Return what is held by a process, by the one that the specification names, or by the usual one."""
+    named = process or getattr(getattr(spec, "design", None), "process", None)
+    if named:
+        return PROCESSES[named]
+    usually = [usual(entry.name, entry.modulus) for group in _materials(spec) for entry in group]
+    # one process makes the whole part: that of the material that is made least exactly
+    accuracy = max(usually, key=lambda entry: entry.thickness, default=PROCESSES[OF_PLATES])
+    private = process_of_part(spec)
+    return accuracy if private is None else private.accuracy(accuracy)
 
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def _of_loss(request: Request, result: Result) -> Iterator[dict[str, Any]]:
 def _of_lives(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     if request.cycles is None:
         return
-    if _bends(result) and "fatigue_life" in found:
+    if _bends(result) and "fatigue_life" in found and getattr(_block(result.spec), "fatigue", None) is not None:
         yield {"metric": "fatigue_life", "min": f"{request.cycles}", "over": pressed(request, result.spec)}
     if _known(found, "spring_life") is not None:
         yield {"metric": "spring_life", "min": f"{request.cycles}"}

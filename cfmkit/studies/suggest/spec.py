@@ -11,7 +11,7 @@ from cfmkit.families.base import article
 from cfmkit.families.suggestion_request import Request, Springs
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
-from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor  # noqa: TC001 - pydantic
+from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor
 from cfmkit.stock.processes import PROCESSES, ProcessName, why_not_made
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
@@ -153,6 +153,14 @@ class SuggestBlock(Model):
             return ()
         return self.material if isinstance(self.material, tuple) else (self.material,)
 
+    def _lasting(self, entry: MaterialSpec) -> dict[str, Any]:
+        """Return a material as a specification states it; with S-N data, assumed ones too, for the requested cycles."""
+        block = entry.model_dump(exclude_unset=True)
+        law = entry.fatigue
+        if self.cycles is None or law is None or (law.points is not None and self.cycles > law.points[-1][0]):
+            return block
+        return block | {"fatigue": law.model_dump(exclude_unset=True) | {"cycles": float(self.cycles)}}
+
     @property
     def ends(self) -> tuple[float, float]:
         """The band in which every force has to lie, or of what the mean may be [N or N m]."""
@@ -164,10 +172,8 @@ class SuggestBlock(Model):
         value: Any = self.force if self.force is not None else self.torque
         thinnest = PROCESSES[self.process].least_feature if self.process else None
         usual = USUAL[self.process] if self.process else ()
-        blocks: tuple[dict[str, Any], ...] = tuple(one.model_dump(exclude_unset=True) for one in self._materials)
-        for block in blocks:
-            if self.cycles is not None and block.get("fatigue"):
-                block["fatigue"]["cycles"] = float(self.cycles)
+        materials = self._materials or tuple(MaterialSpec(name=name) for name in usual)
+        blocks = tuple(self._lasting(one) for one in materials)
         low, high = self.ends
         return Request(
             kind="force" if self.force is not None else "torque",
@@ -178,7 +184,7 @@ class SuggestBlock(Model):
             travel=float(self.travel if self.travel is not None else self.angle or 0.0),
             ripple=self.ripple,
             envelope=self.envelope,
-            materials=blocks or tuple({"name": name} for name in usual),
+            materials=blocks,
             adjustable=self.adjustable,
             hysteresis=self.hysteresis,
             cycles=self.cycles,

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE
+from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.part import bodies
 from cfmkit.families.slider_crank.springs.part import joints as joints_at
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
+from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
@@ -151,7 +153,8 @@ COLOURS = (BLUE, VERMILLION, PURPLE, BROWN)
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a solved mechanism, by file stem."""
-    makers = [curve, energy, springs, joints, linkage] if result.state.assembly.rates.any() else [joints, linkage]
+    sprung = result.state.assembly.rates.any()
+    makers = [curve, energy, springs, joints, linkage, assembly] if sprung else [joints, linkage]
     return {maker.__name__: partial(maker, result) for maker in makers}
 
 
@@ -160,6 +163,13 @@ def motion_scale(solution: Solution) -> Scale:
     if solution.drive == "torque":
         return Scale("crank angle", "angle")
     return Scale("travel of the slider", "length")
+
+
+def assembly(result: Result) -> Figure:
+    """Return all parts half way through the motion, numbered as in the parts list."""
+    spec: Any = result.spec
+    outcome = hardware(spec, result.state)
+    return assembly_figure(spec.name, outcome.drawn, outcome.parts, result.state.motion.shape[1] // 2)
 
 
 @styled

@@ -19,13 +19,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
+from cfmkit.stock.joint_strength import (
+    SHEAR_SHARE,
+    bearing_pressure,
+    euler_load,
+    link_stress,
+    pin_bending,
+    shear_out,
+)
+from cfmkit.stock.stock_series import ALL_SERIES
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -81,16 +89,15 @@ class LinkBar:
     def stress(self, loads: LinkLoads) -> Any:
         """Return the largest tension and bending in the section through a hole [Pa]."""
         w, d, s = (np.asarray(size)[..., None] for size in (self.width, self.hole, self.sheet))
-        both = np.abs(loads.axial) / ((w - d) * s) + 6.0 * w * loads.moment / (s * (w**3 - d**3))
-        return both.max(axis=(0, -1))
+        return link_stress(loads.axial, loads.moment, w, s, d).max(axis=(0, -1))
 
     def bearing(self, loads: LinkLoads) -> Any:
         """Return the largest pressure of a pin [Pa]."""
-        return loads.pin_max / (self.hole * self.sheet)
+        return bearing_pressure(loads.pin_max, self.hole, self.sheet)
 
     def shear_out(self, loads: LinkLoads) -> Any:
         """Return the largest shear stress behind a pin [Pa]."""
-        return loads.pin_max / (self.sheet * (self.width - self.hole))
+        return shear_out(loads.pin_max, self.width, self.sheet, self.hole)
 
     def turn_share(self, loads: LinkLoads) -> Any:
         """Return the largest elastic turn of a link over that of the torsion spring at its end."""
@@ -100,13 +107,12 @@ class LinkBar:
 
     def safety(self, loads: LinkLoads, allowable: Any) -> Any:
         """Return by what all loads may grow, at least 1 where the links bear them; infinite without any."""
-        euler = pi**2 * self.modulus * self.width * self.sheet**3 / 12.0
-        crank, coupler = np.maximum(-loads.axial, 0.0).max(axis=-1)
+        pressed = zip(np.maximum(-loads.axial, 0.0).max(axis=-1), loads.lengths, strict=True)
         used = (
             self.stress(loads) / allowable,
             self.bearing(loads) / allowable,
-            sqrt(3.0) * self.shear_out(loads) / allowable,
-            np.maximum(crank * loads.lengths[0] ** 2, coupler * loads.lengths[1] ** 2) / euler,
+            self.shear_out(loads) / (SHEAR_SHARE * allowable),
+            *(force / euler_load(self.modulus, self.width, self.sheet, length) for force, length in pressed),
         )
         with np.errstate(divide="ignore"):
             return 1.0 / np.max(np.broadcast_arrays(*used), axis=0)
@@ -149,8 +155,10 @@ def allowable_of(spec: SliderCrankSpec) -> float | None:
     return None if material is None else material.allowable(spec.mechanism.safety_factor)
 
 
-PIN_DIAMETERS = tuple(1e-3 * d for d in (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30))
-"""Dowel pins that are made [m]: the diameters of ISO 2338."""
+PIN_DIAMETERS = tuple(
+    one for series in ALL_SERIES if series.standard == "ISO 2338" for one in series.sizes if one >= 1e-3
+)
+"""Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
 
 PIN_STRENGTH = 235e6
 """Yield strength of pins [Pa]: plain carbon steel, EN 10025-2 S235; hardened ones bear more."""
@@ -209,6 +217,6 @@ def least_sheet(loads: LinkLoads, modulus: float, allowable: float) -> float:
 
 def _pin_bears(diameter: float, loads: LinkLoads, sheet: float, allowable: float) -> bool:
     """Return True if a pin bears its load: in its hole, and bent between two links, whose middles are a sheet apart."""
-    pressure = loads.pin_max / (diameter * sheet)
-    bent = 32.0 * loads.pin_max * sheet / (pi * diameter**3)
+    pressure = bearing_pressure(loads.pin_max, diameter, sheet)
+    bent = pin_bending(loads.pin_max, sheet, diameter)
     return bool(SPARE * pressure <= allowable and SPARE * bent <= PIN_STRENGTH)

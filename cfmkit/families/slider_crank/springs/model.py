@@ -29,6 +29,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.findings import rules_of
+from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import is_wide
 from cfmkit.families.slider_crank.springs.scalar_results import QUANTITIES
 from cfmkit.families.slider_crank.springs.solution import ClosedFormEffort, Solution, target_of
@@ -37,9 +38,7 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
-from cfmkit.specs.units import format_short
-from cfmkit.stock.parts_list import BoughtPart, listed
-from cfmkit.stock.springs.guides import guide_words
+from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -98,7 +97,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         closed=model,
         effort_error=float(solution.effort_error[0]),
         part_efforts=model.part_efforts,
-        tables=listed(parts_of(spec)),
+        tables=parts_tables(lambda: hardware(spec, solution).parts),
         state=solution,
     )
 
@@ -152,20 +151,6 @@ def _is_complete(solution: Solution) -> NDArray[np.bool_]:
     """Return which mechanisms have an effort at every point and place of the grid, (m,)."""
     curves = [solution.curve.value, *(branch.samples.values for branch in solution.branches.values())]
     return np.asarray(np.all([np.isfinite(values).all(axis=1) for values in curves], axis=0))
-
-
-def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
-    """Return the bought parts: springs that the specification names, and pins; of all legs together."""
-    mechanism, found = spec.mechanism, []
-    for one in mechanism.springs.bought:
-        value = getattr(mechanism.springs, one.at)
-        rate = format_short(value, "stiffness" if one.at == "slider" else "rotational_stiffness")
-        kind = f"{one.loaded or ''} spring".strip() if one.at == "slider" else "torsion spring"
-        data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(one)])
-        found.append(BoughtPart(one.at.replace("_", " "), one.name, one.count * mechanism.sets, data))
-    if mechanism.pins:
-        found.append(BoughtPart("joints", "", 3 * mechanism.sets, f"pin, diameter {mm(mechanism.pins.diameter)}"))
-    return tuple(found)
 
 
 def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Finding, ...]]:

@@ -10,6 +10,7 @@ from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, 
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
+from cfmkit.stock.stock_series import series_of
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -29,6 +30,12 @@ EYE_OF_HOLE = 2.0
 """Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
 
 
+def pin_within(largest: float) -> float:
+    """Return the thickest pin that is sold up to a diameter [m], or that diameter where all are thicker."""
+    series = series_of("pin", "metric")
+    return max((size for size in series.sizes if size <= largest), default=largest) if series else largest
+
+
 def eye_and_hole(spec: SliderCrankSpec) -> tuple[float, float]:
     """Return the radii of the links' eyes, half their width, and of their pin holes [m]."""
     linkage = linkage_of(spec.mechanism)
@@ -36,9 +43,9 @@ def eye_and_hole(spec: SliderCrankSpec) -> tuple[float, float]:
     pins, links = spec.mechanism.pins, spec.mechanism.links
     coils = [coil for name in JOINTS[:3] for coil in spec.mechanism.springs.coils_at(name)]
     around = min((0.5 * PIN_IN_COIL * coil.inner_diameter for coil in coils), default=short)
-    hole = min(HOLE_SHARE * short, around) if pins is None else 0.5 * pins.diameter
+    hole = 0.5 * (pin_within(2.0 * min(HOLE_SHARE * short, around)) if pins is None else pins.diameter)
     if links is not None:
-        return 0.5 * links.width, min(hole, 0.25 * links.width) if pins is None else hole
+        return 0.5 * links.width, 0.5 * pin_within(min(2.0 * hole, 0.5 * links.width)) if pins is None else hole
     return max(EYE_SHARE * short, EYE_OF_HOLE * hole), hole
 
 

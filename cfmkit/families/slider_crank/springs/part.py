@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.posed_part import PosedBody, PosedPart
+from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
@@ -31,12 +32,14 @@ def part_over_motion(result: Result) -> PosedPart:
     solution: Solution = result.state
     rates = solution.assembly.rates
     depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0])
+    joining = hardware(spec, solution)
     return PosedPart(
-        tuple(bodies(spec, solution, solution.units)),
+        (*bodies(spec, solution, solution.units), *joining.bodies),
         direction=0.0,
         depth=depth,
         pieces=3 + int(np.count_nonzero(rates)),
         assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
+        pin=joining.pin,
     )
 
 

@@ -1,0 +1,60 @@
+"""Sizes and paths of the parts of a cam mechanism, and how deep they lie beside each other; lengths in metres."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.stock.springs.made_to_measure import extension_spring
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.springs_spec import Springs
+
+PLATE_THICKNESS = 0.008
+"""Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
+
+
+def roller_path(solution: Solution) -> FloatArray:
+    """Return the positions of the right roller's axis over the solution, (n, 2) [m]."""
+    return np.column_stack([solution.states.x, solution.states.y])
+
+
+def pin_path(solution: Solution) -> FloatArray:
+    """Return the positions of the slider's pin over the solution, (n, 2) [m]."""
+    (x, y), length = roller_path(solution).T, solution.assembly.track.brace_length
+    return np.column_stack([0.0 * x, y + np.sqrt((length - x) * (length + x))])
+
+
+BRACE_WIDTH = 0.010
+"""Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
+
+
+def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
+    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits.
+
+    Parameters
+    ----------
+    thick : float
+        Of the plate, and of each brace up to `BRACE_WIDTH` [m].
+    springs : Springs
+        How many of what stiffness: half of them on either side, above each other.
+    stretch, half_width : float
+        Their largest elongation, and half their length at rest [m].
+    """
+    count = count_of(springs)
+    if springs.wound is not None:
+        outer = springs.wound.coil + springs.wound.wire
+    else:
+        coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
+        if coil is None:
+            return None
+        outer = coil.outer_diameter
+    return thick + 2.0 * min(thick, BRACE_WIDTH) + min(count, 2) * outer
+
+
+def count_of(springs: Springs) -> int:
+    """Return how many springs there are."""
+    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1

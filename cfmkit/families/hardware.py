@@ -1,0 +1,200 @@
+"""Parts that join a mechanism of rigid parts: links, pins, guide and screws, sized for the loads of its motion.
+
+Sizes that the specification states are kept; others are the smallest of their series that bear the load. What is
+assumed where nothing is stated: links and plates of S235, pins and rods of the same strength, a safety factor of
+`DEFAULT_SAFETY`, and a guide that carries at least `SIDE_SHARE` of the largest force across its rod, because no force
+acts exactly in its line. Friction is in the force only where it is stated.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from cfmkit.specs.units import format_short
+from cfmkit.stock import MATERIALS
+from cfmkit.stock.joint_strength import eye_that_bears, pin_that_bears, rod_that_guides
+from cfmkit.stock.parts_list import ListedPart
+from cfmkit.stock.stock_series import SOCKET_SCREWS, series_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from cfmkit.export.posed_part import PosedBody
+    from cfmkit.stock.material_and_part_spec import Guide, MaterialSpec
+    from cfmkit.stock.stock_series import Screw, System
+
+DEFAULT_MATERIAL = "steel-s235"
+"""Of links and plates that state none."""
+
+DEFAULT_SAFETY = 1.5
+"""Against yield, where `safety_factor` is not above 1."""
+
+PIN_STRENGTH = 235e6
+"""Yield strength of pins and rods [Pa]: plain carbon steel, EN 10025-2 S235; hardened ones bear more."""
+
+PIN_MODULUS = 210e9
+"""Young's modulus of pins and rods [Pa]: EN 1993-1-1, sec. 3.2.6."""
+
+SIDE_SHARE = 0.1
+"""Load across a guide over the largest force on its slider, at least: assumed."""
+
+SAG_SHARE = 1e-3
+"""Sag of a guide's rod over its span, at most: assumed."""
+
+LEAST_WALL = 0.25
+"""Wall beside a hole over its diameter, at least."""
+
+
+LEAST_SCREW = 3e-3
+"""Thinnest screw of a plate or a ground [m]: thinner ones are hard to handle."""
+
+
+@dataclass(frozen=True)
+class PartStrength:
+    """Material of links and plates, and the stresses that parts may have."""
+
+    name: str
+    modulus: float  # [Pa]
+    allowable: float  # of links and plates [Pa]
+    pins: float  # of pins and rods [Pa]
+    assumed: bool  # whether the material is not stated
+
+    @classmethod
+    def from_material(cls, material: MaterialSpec | None, safety_factor: float) -> PartStrength:
+        """Return that of a stated material, or of the default one where none with a strength is stated."""
+        safety = safety_factor if safety_factor > 1.0 else DEFAULT_SAFETY
+        allowable = None if material is None else material.allowable(safety)
+        if material is None or allowable is None:
+            reference = MATERIALS[DEFAULT_MATERIAL]
+            strength = float(reference.yield_strength or 0.0)
+            return cls(reference.name, reference.youngs_modulus, strength / safety, PIN_STRENGTH / safety, True)
+        return cls(material.name or material.words, material.modulus, allowable, PIN_STRENGTH / safety, False)
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Parts of a mechanism, numbered in their order, with what of them is drawn."""
+
+    parts: tuple[ListedPart, ...]
+    bodies: tuple[PosedBody, ...] = ()  # guide, ground, fasteners: what stands beside what moves
+    drawn: tuple[PosedBody, ...] = ()  # all parts as the assembly drawing shows them, the lowest first
+    pin: float | None = None  # diameter of the pins that rub [m]
+
+
+def with_faults(parts: Iterable[ListedPart], faults: Mapping[str, str]) -> tuple[ListedPart, ...]:
+    """Return parts that say what their stated sizes do not bear, by the place of each."""
+    return tuple(
+        replace(part, data=f"{part.data}; {faults[part.place]}") if part.place in faults else part for part in parts
+    )
+
+
+def series_sizes(kind: str, system: System | None) -> tuple[float, ...]:
+    """Return the diameters of a series of pins or dowels [m], metric ones unless inches are requested."""
+    result = series_of("dowel" if kind == "dowel" else "pin", system or "metric")
+    return () if result is None else tuple(size for size in result.sizes if size >= 1e-3)
+
+
+def pin_for(
+    force: float, arm: float, thickness: float, strength: PartStrength, system: System | None
+) -> tuple[float, bool]:
+    """Return the pin that bears a load at an arm [m], and whether there is one: where not, the thickest."""
+    sizes = series_sizes("pin", system)
+    result = pin_that_bears(force, arm, thickness, strength.allowable, strength.pins, sizes)
+    return (sizes[-1], False) if result is None else (result, True)
+
+
+def link_width(force: float, thickness: float, hole: float, strength: PartStrength) -> float:
+    """Return the width of a link that bears a tension around its holes, in whole millimetres [m]."""
+    width = eye_that_bears(force, thickness, hole, strength.allowable, LEAST_WALL * hole)
+    return 1e-3 * math.ceil(1e3 * width - 1e-9)
+
+
+def screw_for(load: float, thickness: float, count: int, strength: PartStrength) -> Screw:
+    """Return the smallest screw that a plate bears when so many share a load: bearing, and shear of the screw."""
+    share = load / count
+    for screw in (entry for entry in SOCKET_SCREWS if entry.diameter >= LEAST_SCREW):
+        shear = share / (0.25 * math.pi * screw.diameter**2)
+        if share / (screw.diameter * thickness) <= strength.allowable and shear <= strength.pins / math.sqrt(3.0):
+            return screw
+    return SOCKET_SCREWS[-1]
+
+
+@dataclass(frozen=True)
+class GuideRod:
+    """Rod that guides a slider."""
+
+    diameter: float  # [m]
+    length: float  # between its supports [m]
+    bush: float  # length of the slider on it [m]
+    load: float  # across it [N]
+    pressure: float  # of the bush on the rod, the load over its shadow [Pa]
+
+
+def guide_rod(
+    across: float,
+    force: float,
+    travel: float,
+    bush: float,
+    guide: Guide | None,
+    system: System | None,
+    strength: PartStrength,
+) -> GuideRod:
+    """Return the rod for a load across it, at least a share of the force along it, over a travel.
+
+    Parameters
+    ----------
+    across, force : float
+        Largest loads across the guide and along it [N].
+    travel, bush : float
+        Of the slider, and its length where `guide` states none [m].
+    guide : Guide or None
+        As stated.
+    system : {"metric", "inch"} or None
+        Of its diameter.
+    strength : PartStrength
+        Of the rod.
+    """
+    length = bush if guide is None or guide.length is None else guide.length
+    couple = 0.0 if guide is None else 2.0 * force * guide.offset / length  # at each end of the bush
+    load = max(across + couple, SIDE_SHARE * force)
+    span, sizes = travel + length, series_sizes("pin", system)
+    result = rod_that_guides(load, span, PIN_MODULUS, strength.pins, SAG_SHARE, sizes)
+    diameter = sizes[-1] if result is None else result
+    return GuideRod(diameter, span, length, load, load / (diameter * length))
+
+
+def mm(*sizes: float) -> str:
+    """Return sizes as a list writes them: ``6 x 40 mm``."""
+    return " x ".join(f"{1e3 * size:.3f}".rstrip("0").rstrip(".") for size in sizes) + " mm"
+
+
+def pin_part(place: str, count: int, diameter: float, length: float, load: float, body: str = "") -> ListedPart:
+    """Return a pin of the list, as long as what it joins."""
+    result = next(
+        (entry for entry in (series_of("pin", "metric"), series_of("pin", "inch")) if entry and entry.holds(diameter)),
+        None,
+    )
+    data = f"pin, diameter {format_short(diameter, 'length')}, bears {format_short(load, 'force', 3)}"
+    standard = "" if result is None else result.standard
+    return ListedPart(place, "", count, data, "buy", mm(diameter, length), standard, body)
+
+
+def screw_part(place: str, count: int, screw: Screw, grip: float, body: str = "") -> ListedPart:
+    """Return screws of the list that reach through a grip [m] and as deep as they are thick."""
+    length = 1e-3 * math.ceil(1e3 * (grip + screw.diameter))
+    return ListedPart(
+        place, f"{screw.name} x {1e3 * length:g}", count, f"hexagon socket head cap screw, hole {mm(screw.hole)}",
+        "buy", mm(screw.diameter, length), "ISO 4762, holes ISO 273", body,
+    )  # fmt: skip
+
+
+def guide_part(rod: GuideRod, count: int, assumed: bool) -> ListedPart:
+    """Return the guide of the list, with what is assumed of it."""
+    said = ", side load and friction assumed" if assumed else ""
+    data = (
+        f"rod for the slider, {format_short(rod.load, 'force', 3)} across it, "
+        f"{format_short(rod.pressure, 'stress', 3)} in the bush{said}"
+    )
+    return ListedPart("guide of the slider", "guide", count, data, "make", mm(rod.diameter, rod.length), "", "guide")

@@ -1,0 +1,166 @@
+"""Links, pins, guide, ground and screws of a slider-crank with springs, dimensioned for the loads of its motion.
+
+Links are as they are drawn; their pins, the guide's rod and the screws of the ground bear what they take. Crank and
+coupler lie a sheet apart, and so do the crank and the ground that carries its pivot.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.export.posed_part import PosedBody, clear_places, rectangle
+from cfmkit.families.findings import mm as length_in_words
+from cfmkit.families.findings import newton
+from cfmkit.families.hardware import (
+    DEFAULT_MATERIAL,
+    Hardware,
+    PartStrength,
+    guide_part,
+    guide_rod,
+    mm,
+    pin_for,
+    pin_part,
+    screw_for,
+    screw_part,
+    with_faults,
+)
+from cfmkit.families.slider_crank.springs.link_strength import link_loads
+from cfmkit.families.slider_crank.springs.outline import eye_and_hole
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.specs.units import format_short
+from cfmkit.stock.joint_strength import link_stress, pin_that_bears
+from cfmkit.stock.parts_list import ListedPart
+from cfmkit.stock.springs.guides import guide_words
+from cfmkit.stock.stock_series import series_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
+    from cfmkit.families.slider_crank.springs.solution import Solution
+
+N_LOADS = 201
+"""Places of the motion at which loads are computed."""
+
+N_SCREWS = 4
+"""Of the ground."""
+
+
+def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
+    """Return the parts of a solved mechanism, of all legs together."""
+    mechanism, legs = spec.mechanism, spec.mechanism.sets
+    strength = PartStrength.from_material(mechanism.material, mechanism.safety_factor)
+    motion = np.linspace(float(solution.motion[0, 0]), float(solution.motion[0, -1]), N_LOADS)
+    loads = link_loads(solution.assembly, motion, solution.legs[:1, 0])
+    eye, hole = eye_and_hole(spec)
+    system = mechanism.part.stock if mechanism.part else None
+    stated = mechanism.part.sheet if mechanism.part else None
+    sheet = stated or _sheet(loads, 2.0 * eye, 2.0 * hole, strength, system)
+    load, pin = float(np.max(loads.pin_max)), 2.0 * hole
+    least, bears = pin_for(load, sheet, sheet, strength, system)
+    faults = {}
+    if pin_that_bears(load, sheet, sheet, strength.allowable, strength.pins, (pin,)) is None:
+        cure = f"use at least {length_in_words(least)} ('mechanism.pins.diameter')" if bears else "use thicker links"
+        faults["joints"] = f"too weak for {newton(load)} in links of {length_in_words(sheet)}: {cure}"
+    across, force, travel, rod_at = _guide_loads(spec, solution)
+    rod = guide_rod(across, force, travel, 2.0 * eye, mechanism.guide, system, strength)
+    screw = screw_for(load * legs, sheet, N_SCREWS, strength)
+    ends = rod_at + np.array([[-0.5 * rod.bush, 0.0], [0.5 * rod.bush, 0.0]])
+    low, high = np.minimum(ends.min(axis=0), 0.0) - eye, np.maximum(ends.max(axis=0), 0.0) + eye
+    ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
+    places = clear_places(ground, moving, screw.head)
+    bodies = (
+        PosedBody.polygon("ground", "held", ground),
+        PosedBody.line("guide", "held", ends, 0.5 * rod.diameter),
+        *(PosedBody.line("screw", "held", at[None], 0.5 * screw.diameter) for at in places),
+    )
+    parts = (
+        *_parts(spec, solution, strength, (sheet, 2.0 * eye, pin), load),
+        ListedPart(
+            "carries pivot and guide", "ground", 1, _of(strength), "make", mm(*(high - low), sheet), "", "ground"
+        ),
+        guide_part(rod, 1, mechanism.guide is None),
+        screw_part("ground to its base, countersunk", len(places), screw, sheet, "screw"),
+    )
+    return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin)
+
+
+def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:
+    """Yield links, slider, springs and pins as the assembly shows them, the lowest first."""
+    rates, joints = solution.assembly.rates, _joints(solution)
+    for name, k in (("crank", 0), ("coupler", 1)):
+        yield PosedBody.line(name, "free", np.stack(joints[k : k + 2], axis=1), eye, round=True)
+    corners = eye * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    yield PosedBody.polygon("slider", "driven", joints[2][:, None] + corners)
+    for joint, name, rate in zip(joints, JOINTS, rates[:3], strict=False):
+        if np.any(rate > 0.0):
+            coils = [0.5 * coil.outer_diameter for coil in spec.mechanism.springs.coils_at(name)]
+            yield PosedBody.line(f"spring-{name}", "free", joint[:, None], max(coils, default=0.8 * eye))
+        yield PosedBody.line("joint", "free", joint[:, None], 0.5 * pin)
+
+
+def _joints(solution: Solution) -> list[Any]:
+    """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
+    link, angle = solution.assembly.linkage, np.atleast_2d(solution.units.angle)[0]
+    slid = np.atleast_2d(solution.units.position)[0]
+    crank = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
+    return [np.zeros_like(crank), crank, np.column_stack([slid, np.full(slid.size, link.offset)])]
+
+
+def _sheet(loads: LinkLoads, width: float, hole: float, strength: PartStrength, system: Any) -> float:
+    """Return the thinnest sheet of links as wide as drawn that bears tension and bending [m]."""
+    series = series_of("sheet", system or "metric", strength.name) or series_of("sheet", "metric", DEFAULT_MATERIAL)
+    assert series is not None
+    worst = [float(np.max(link_stress(loads.axial, loads.moment, width, sheet, hole))) for sheet in series.sizes]
+    bearing = (size for size, stress in zip(series.sizes, worst, strict=True) if stress <= strength.allowable)
+    return next(bearing, series.sizes[-1])
+
+
+def _of(strength: PartStrength) -> str:
+    return strength.name + (", assumed" if strength.assumed else "")
+
+
+def _guide_loads(spec: SliderCrankSpec, solution: Solution) -> tuple[float, float, float, Any]:
+    """Return loads across the guide and along it [N], the slider's travel [m], and both ends of its pin's way [m]."""
+    slid = np.atleast_2d(solution.units.position)[0]
+    coupler, guide = (np.ravel(entry) for entry in solution.reactions)
+    across, pulled = (float(np.abs(entry[np.isfinite(entry)]).max(initial=0.0)) for entry in (guide, coupler))
+    legs, offset = spec.mechanism.sets, float(solution.assembly.linkage.offset)
+    at = np.array([[float(slid.min()), offset], [float(slid.max()), offset]])
+    return across * legs, pulled * legs, float(np.ptp(slid)), at
+
+
+def _parts(
+    spec: SliderCrankSpec, solution: Solution, strength: PartStrength, sizes: tuple[float, float, float], load: float
+) -> Iterator[ListedPart]:
+    """Yield links, slider, pins and springs."""
+    mechanism, legs, link = spec.mechanism, spec.mechanism.sets, solution.assembly.linkage
+    sheet, width, pin = sizes
+    for name, length in (("crank", link.crank), ("coupler", link.coupler)):
+        data = f"{_of(strength)}; {mm(float(length))} between holes of {mm(pin)}; geometry/slider-crank.dxf"
+        yield ListedPart("link", name, legs, data, "make", mm(float(length) + width, width, sheet), "", name)
+    yield ListedPart(
+        "on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", mm(width, width, sheet), "", "slider"
+    )
+    yield pin_part("joints", 3 * legs, pin, 2.0 * sheet, load, "joint")
+    for entry in mechanism.springs.bought:
+        value = getattr(mechanism.springs, entry.at)
+        rate = format_short(value, "stiffness" if entry.at == "slider" else "rotational_stiffness")
+        kind = f"{entry.loaded or ''} spring".strip() if entry.at == "slider" else "torsion spring"
+        data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(entry)])
+        wound = entry.wound
+        size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
+        yield ListedPart(
+            entry.at.replace("_", " "), entry.name, entry.count * legs, data, "buy", size, "", f"spring-{entry.at}"
+        )
+    reference = {entry.at for entry in mechanism.springs.bought}
+    for name, stiffness in zip(JOINTS, mechanism.springs.rates, strict=True):
+        if stiffness > 0.0 and name not in reference:
+            kind = "spring" if name == "slider" else "torsion spring"
+            value = format_short(float(stiffness), "stiffness" if name == "slider" else "rotational_stiffness")
+            yield ListedPart(
+                name.replace("_", " "), "", legs, f"{kind}, {value}, not chosen", "buy", "", "", f"spring-{name}"
+            )

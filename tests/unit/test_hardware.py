@@ -1,0 +1,152 @@
+"""Links, pins, guides and screws: formulas against hand calculations, sizes that bear, lists, and the assembly."""
+
+import math
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.export.posed_part import PosedBody, clear_places, rectangle, swept
+from cfmkit.families.cam.hardware import hardware as cam_hardware
+from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rod, link_width, screw_for
+from cfmkit.families.slider_crank.springs.hardware import hardware as crank_hardware
+from cfmkit.stock.joint_strength import (
+    SHEAR_SHARE,
+    bearing_pressure,
+    euler_load,
+    eye_that_bears,
+    link_stress,
+    pin_bending,
+    pin_shear,
+    pin_that_bears,
+    rod_bending,
+    rod_sag,
+    rod_that_guides,
+    shear_out,
+)
+from cfmkit.stock.stock_series import series_of
+
+PINS = series_of("pin", "metric").sizes
+
+
+def table(result):
+    """Return the parts list as one dictionary per line."""
+    columns = {column.name: column.cells() for column in result.tables["parts"]().columns}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def test_formulas_are_those_of_a_hand_calculation():
+    # a link of 12 x 3 mm with a hole of 4 mm: 24 mm2, and (12^3 - 4^3)/12*3/6 = 69.33 mm3
+    assert link_stress(200.0, 0.0, 0.012, 0.003, 0.004) == pytest.approx(200 / 24e-6)
+    assert link_stress(0.0, 0.3, 0.012, 0.003, 0.004) == pytest.approx(0.3 / (3e-3 * (12e-3**3 - 4e-3**3) / 12 / 6e-3))
+    assert bearing_pressure(200.0, 0.004, 0.003) == pytest.approx(200 / 12e-6)
+    assert shear_out(200.0, 0.012, 0.003, 0.004) == pytest.approx(200 / (2 * 4e-3 * 3e-3))  # two walls of 4 mm
+    assert euler_load(200e9, 0.012, 0.003, 0.1) == pytest.approx(math.pi**2 * 200e9 * (0.012 * 27e-9 / 12) / 0.01)
+    section, inertia = math.pi * 4e-3**3 / 32, math.pi * 4e-3**4 / 64
+    assert pin_bending(200.0, 0.005, 0.004) == pytest.approx(200 * 0.005 / section)
+    assert pin_shear(200.0, 0.004) == pytest.approx(4 / 3 * 200 / (math.pi * 2e-3**2))
+    assert rod_bending(20.0, 0.2, 0.004) == pytest.approx(20 * 0.2 / 4 / section)
+    assert rod_sag(20.0, 0.2, 0.004, 210e9) == pytest.approx(20 * 0.2**3 / (48 * 210e9 * inertia))
+
+
+@pytest.mark.parametrize("force", [1.0, 50.0, 1500.0])
+def test_a_chosen_pin_bears_and_the_next_thinner_one_does_not(force):
+    found = pin_that_bears(force, 0.008, 0.008, 150e6, 150e6, PINS)
+    bears = [
+        bearing_pressure(force, d, 0.008) <= 150e6 and pin_bending(force, 0.008, d) <= 150e6
+        and pin_shear(force, d) <= SHEAR_SHARE * 150e6
+        for d in PINS
+    ]  # fmt: skip
+    assert found == PINS[bears.index(True)]
+    assert pin_that_bears(1e9, 0.008, 0.008, 150e6, 150e6, PINS) is None
+
+
+def test_an_eye_and_a_rod_that_are_chosen_bear_their_loads():
+    width = eye_that_bears(1500.0, 0.004, 0.005, 100e6, 0.001)
+    assert link_stress(1500.0, 0.0, width, 0.004, 0.005) <= 100e6 * (1 + 1e-12)
+    assert shear_out(1500.0, width, 0.004, 0.005) <= SHEAR_SHARE * 100e6 * (1 + 1e-12)
+    found = rod_that_guides(30.0, 0.25, 210e9, 150e6, 1e-3, PINS)
+    thinner = PINS[PINS.index(found) - 1]
+    assert rod_sag(30.0, 0.25, found, 210e9) <= 0.25e-3 < rod_sag(30.0, 0.25, thinner, 210e9)
+
+
+def test_what_is_not_stated_is_assumed_and_said():
+    strength = PartStrength.from_material(None, 1.0)
+    assert (strength.name, strength.assumed) == ("steel-s235", True)
+    assert strength.allowable == pytest.approx(235e6 / 1.5)
+    rod = guide_rod(0.0, 100.0, 0.2, 0.02, None, None, strength)
+    assert rod.load == pytest.approx(10.0)
+    assert screw_for(10.0, 0.003, 4, strength).name == "M3"
+    assert link_width(34.0, 0.008, 0.005, strength) == pytest.approx(8e-3)
+
+
+def test_the_parts_of_a_cam_bear_its_forces():
+    result = cfmkit.analyze(cfmkit.load("configs/cam_preloaded.yaml"))
+    rows = {row["place"]: row for row in table(result)}
+    pull = max(np.nanmax(np.abs(one.brace)) for one in (result.state.up, result.state.down))
+    length, width, thick = (1e-3 * float(size) for size in rows["roller to slider"]["size"][:-3].split(" x "))
+    pin = 1e-3 * float(rows["slider pin"]["size"].split(" x ")[0])
+    assert link_stress(pull, 0.0, width, thick, pin) <= 235e6 / 1.5
+    assert pin_bending(pull, thick, pin) <= PIN_STRENGTH / 1.5
+    assert length == pytest.approx(result.spec.mechanism.brace_length + width)
+    assert {"steel-s235, assumed" in row["data"] for row in (rows["cam"], rows["roller to slider"])} == {True}
+    assert "side load and friction assumed" in rows["guide of the slider"]["data"]
+
+
+def test_a_stated_pin_that_is_too_thin_is_named_with_one_that_is_not():
+    spec = cfmkit.load("configs/cam.yaml", ["mechanism.pins={diameter: 1 mm}"])
+    (row,) = [row for row in table(cfmkit.analyze(spec)) if row["place"] == "slider pin"]
+    assert "too weak" in row["data"]
+    least = row["data"].rpartition("at least ")[2].partition(" (")[0]
+    again = cfmkit.analyze(spec.replace({"mechanism.pins.diameter": least}))
+    assert not [row for row in table(again) if "too weak" in row["data"] and row["place"] == "slider pin"]
+
+
+def test_numbers_of_the_assembly_are_those_of_the_list():
+    for name, of in (("cam_friction", cam_hardware), ("slider_crank_bought", None)):
+        result = cfmkit.analyze(cfmkit.load(f"configs/{name}.yaml"))
+        found = of(result.state) if of else crank_hardware(result.spec, result.state)
+        drawn = {body.name for body in found.drawn}
+        assert {part.body for part in found.parts if part.body} <= drawn
+        figure = cfmkit.figures(result)["assembly"]()
+        shown = {text.get_gid(): text.get_text() for ax in figure.axes for text in ax.texts if text.get_gid()}
+        wanted = {f"item-{k}": str(k) for k, part in enumerate(found.parts, start=1) if part.body}
+        assert shown == wanted
+        assert len(table(result)) == len(found.parts)
+
+
+def test_the_box_of_a_cam_contains_a_guide_as_long_as_stated():
+    short, long = (
+        cfmkit.families.family("cam").envelope(
+            cfmkit.analyze(cfmkit.load("configs/cam_friction.yaml", [f"mechanism.guide.length={length}"]))
+        )
+        for length in ("40 mm", "60 mm")
+    )
+    assert long.along - short.along == pytest.approx(10e-3, abs=1e-9)
+
+
+def test_screws_of_the_ground_are_reached_beside_what_moves():
+    result = cfmkit.analyze(cfmkit.load("configs/slider_crank_bought.yaml"))
+    found = crank_hardware(result.spec, result.state)
+    moving = [body for body in found.drawn if body.role != "held"]
+    covered = swept(moving)
+    from shapely import Point
+
+    places = [body.core[0, 0] for body in found.bodies if body.name == "screw"]
+    assert len(places) == 3  # the crank covers the fourth corner
+    assert [row["count"] for row in table(result) if row["place"].startswith("ground")] == [3]
+    assert min(covered.distance(Point(*at)) for at in places) > 2e-3
+    ground = rectangle(0.0, 0.0, 0.1, 0.05)
+    corners = clear_places(ground, [PosedBody.line("far", "free", np.array([[1.0, 1.0]]), 0.01)], 0.005)
+    assert sorted(map(tuple, np.round(corners, 6))) == [(0.005, 0.005), (0.005, 0.045), (0.095, 0.005), (0.095, 0.045)]
+
+
+def test_a_design_without_stated_friction_says_what_pins_and_guide_take():
+    from cfmkit.families.run_control import Run
+    from cfmkit.studies.assumed_friction import friction_note
+
+    plain = cfmkit.analyze(cfmkit.load("configs/slider_crank_bilancia2019.yaml"))
+    note = friction_note(plain, Run())
+    assert note.startswith("with 0.15 assumed in pins (")
+    rubbing = cfmkit.load("configs/slider_crank_friction.yaml")
+    assert friction_note(cfmkit.analyze(rubbing), Run()) == ""
