@@ -342,7 +342,7 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
         if width > UNKNOWN * item.size and not calibration.fit.at_bound[k]:
-            lines.append(("fitted", f"{item.path} {CANNOT}"))
+            lines.append(("fitted", f"{item.label} {CANNOT}"))
             continue
         low, high = max(value - width, item.low), min(value + width, item.high)
         reported = f"± {_exact(width, item.dimension, 2)} (95 %)"
@@ -351,7 +351,7 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
         lines.append(
             (
                 "fitted",
-                f"{item.path} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
+                f"{item.label} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
             )
         )
     lines += _loss_lines(calibration.after)

@@ -124,7 +124,7 @@ def unidentifiable(problem: LeastSquares, values: FloatArray) -> tuple[tuple[int
     """
     if not np.isfinite(problem.residuals(values)).all():
         raise NotFinite
-    return dependent_columns(problem.jacobian(values), problem.level)
+    return dependent_columns(problem.jacobian(values), problem.level) if len(values) else ()
 
 
 def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ...], ...]:
@@ -171,6 +171,15 @@ def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> FittedValues:
     if loss != "linear" and noise > 1e-12 * problem.level:
         best = _minimum(problem, best.x * problem.size, loss, 2.0 * noise)
     return _fit(problem, best, loss)
+
+
+def nothing_fitted(problem: LeastSquares) -> FittedValues:
+    """Return the residuals of a problem without parameters, as the outcome of a fit."""
+    empty = np.zeros(0)
+    residuals = problem.residuals(empty)
+    rms, inflation = float(np.sqrt(np.mean(residuals**2))), correlation_time(residuals) * problem.design_effect
+    freedom = max(len(residuals) / inflation, 1.0)
+    return FittedValues(empty, np.zeros((0, 0)), residuals, rms, inflation, np.zeros(0, dtype=bool), freedom, True)
 
 
 def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float) -> Any:

@@ -36,7 +36,8 @@ PLACES = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.rolle
 
 
 def errors(spec: CamSpec) -> dict[str, str]:
-    """Return which values err: where the process puts holes and the contour, and the rates of bought springs."""
+    """Return which values err: where the process puts holes and the contour, rates of bought springs, and friction."""
     rate = spec.mechanism.springs.stiffness
     listed = [f".{number}" for number in range(len(rate))] if isinstance(rate, tuple) else [""]
-    return dict.fromkeys(PLACES, "position") | {f"mechanism.springs.stiffness{one}": "rate" for one in listed}
+    rates = {f"mechanism.springs.stiffness{item}": "rate" for item in listed}
+    return dict.fromkeys(PLACES, "position") | rates | {"mechanism.rolling_friction": "friction"}
