@@ -65,6 +65,9 @@ DIGITS = 5
 CLOSE = 2e-3
 """Root mean square departure from the aim, over its level, with which no more values are changed."""
 
+MEAN_WEIGHT = 3.0
+"""How much a departure of the mean force counts, over one of the same size from the curve."""
+
 MISSED_WEIGHT = 3.0
 """How much missing another requirement by a share counts, over missing the force by as much."""
 
@@ -136,6 +139,9 @@ class Correction(ShortRepr):
 
     drawn: Spec  # that the part was made of, resolved
     corrected: Spec  # to make the next part of
+    # made, will_be_made: the parts of both with their errors
+    made: Spec
+    will_be_made: Spec
     explanations: tuple[Explanation, ...]  # what differs in the part, the best first
     aim: Aim
     nominal: Result  # of a perfect part of the old drawing
@@ -201,17 +207,19 @@ def correct(
     best = explanations[0]
     nominal = _analyzed(spec)
     aim = aim_of(nominal)
-    built = _analyzed(best.part_of(spec))
+    made = best.part_of(spec)
+    built = _analyzed(made)
     before = _force(explanations, spec, aim)
     off = _largest_departure(explanations, spec, aim)
     if any(not one.errors for one in explanations) or off <= LEAST_CORRECTION:
-        return Correction(spec, spec, explanations, aim, nominal, built, built, before, before)
+        return Correction(spec, spec, made, made, explanations, aim, nominal, built, built, before, before)
     run.progress(0.6, "moving what is drawn")
     redesign = Redesign(spec, explanations, aim, limits_of(spec), _missed(nominal))
     x = redesign.solve()
     corrected = redesign.drawing(x)
     after = _force(explanations, corrected, aim)
-    predicted = _analyzed(best.part_of(corrected))
+    will_be_made = best.part_of(corrected)
+    predicted = _analyzed(will_be_made)
     off = _largest_departure(explanations[:1], corrected, aim)
     if off > LEAST_CORRECTION:
         raise redesign.not_makeable(x, after)
@@ -222,7 +230,7 @@ def correct(
     }
     stated = _with_modulus(corrected, best) if len(explanations) == 1 else corrected
     return Correction(
-        spec, stated, explanations, aim, nominal, built, predicted, before, after, changes,
+        spec, stated, made, will_be_made, explanations, aim, nominal, built, predicted, before, after, changes,
         tuple(_warnings(spec, explanations)),
     )  # fmt: skip
 
@@ -469,10 +477,11 @@ class Redesign:
         for one in self.explanations:
             try:
                 result = _analyzed(one.part_of(self.drawing(x)))
-                departures.append(share * self.aim.departure(result.curves))
+                departure = share * self.aim.departure(result.curves)
+                departures += [departure, [MEAN_WEIGHT * float(np.nanmean(departure)) / share * len(self.explanations) ** -0.5]]
                 missed = max(missed, _missed(result) - self.missed_before)
             except (CfmError, ValueError):
-                departures.append(np.full(len(self.aim.places) * len(self.aim.efforts), NO_CURVE * share))
+                departures.append(np.full(len(self.aim.places) * len(self.aim.efforts) + 1, NO_CURVE * share))
         found = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)
         reluctance = np.array([RELUCTANCE.get(_kind(path), OTHER_RELUCTANCE) for path in self.limits])
         moved: FloatArray = reluctance * (x / self.start - 1.0)

@@ -368,7 +368,8 @@ def _loss_lines(after: Comparison) -> list[tuple[str, str]]:
     """Return what is said where the model has no losses and the measurement has."""
     if not after.branches:
         return []
-    area, half = (item.value for item in after.loss().values())
+    loss = after.loss()
+    area, half = (loss[name].value for name in ("data_loss", "data_half_gap"))
     if area is None or half is None:
         return [("loss", "the model has no losses: it is fitted to the mean of the branches")]
     gap = f"{format_short(half, after.curve.kind)} to either side"
