@@ -7,7 +7,7 @@ is fitted; those that they determine badly are fitted and named as such.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -167,7 +167,11 @@ def calibrate(
 
 
 def fitted_to(
-    before: Comparison, curves: ModelCurves, parameters: Sequence[FitParameter], loss: Loss = "soft_l1"
+    before: Comparison,
+    curves: ModelCurves,
+    parameters: Sequence[FitParameter],
+    loss: Loss = "soft_l1",
+    tolerance: float = LeastSquares.tolerance,
 ) -> Calibration:
     """Return a specification whose model fits measured samples.
 
@@ -179,13 +183,15 @@ def fitted_to(
         Of the specification that is fitted.
     parameters, loss
         As for `calibrate`.
+    tolerance : float
+        Relative change of values at which the search ends.
 
     Raises
     ------
     cfmkit.errors.SolutionError
         If the data do not determine the parameters, which are named.
     """
-    problem = _problem(curves, before, parameters)
+    problem = replace(_problem(curves, before, parameters), tolerance=tolerance)
     _check(problem, problem.start, parameters)
     fit = solve(problem, loss) if parameters else nothing_fitted(problem)
     _check(problem, fit.values, parameters)

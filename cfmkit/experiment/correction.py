@@ -8,7 +8,7 @@ apart, the values suit all of them, and the interval of the predicted force cont
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.errors import CfmError, SolutionError
 from cfmkit.experiment.branches import LOAD, UNLOAD
 from cfmkit.experiment.errors_of_made_part import explain, is_thickness, name_of
+from cfmkit.experiment.parameters_to_fit import DATA
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from cfmkit.experiment.errors_of_made_part import Explanation
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
+
+UNKNOWN_ZERO = 0.01
+"""Standard deviation of a zero of the force that neither the recording nor the user tells, over the largest force."""
 
 N_PLACES = 65
 """Places of the window at which the corrected curve is to be the one that was designed."""
@@ -209,19 +213,23 @@ def correct(
     aim = aim_of(nominal)
     made = best.part_of(spec)
     built = _analyzed(made)
-    before = _force(explanations, spec, aim)
+    told = tared or fit is not None or any(item.path.startswith(DATA) for item in best.calibration.parameters)
+    zero = 0.0 if told else UNKNOWN_ZERO * float(np.abs(source.recording.effort).max())
+    before = _force(explanations, spec, aim, zero)
     off = _largest_departure(explanations, spec, aim)
     if any(not one.errors for one in explanations) or off <= LEAST_CORRECTION:
         return Correction(spec, spec, made, made, explanations, aim, nominal, built, built, before, before)
     run.progress(0.6, "moving what is drawn")
     redesign = Redesign(spec, explanations, aim, limits_of(spec), _missed(nominal))
     x = redesign.solve()
+    if _largest_departure(explanations[:1], redesign.drawing(x), aim) > LEAST_CORRECTION:
+        # a requirement stands in the way: the force comes first, and the page says what is missed
+        x = replace(redesign, missed_before=np.inf).solve()
     corrected = redesign.drawing(x)
-    after = _force(explanations, corrected, aim)
+    after = _force(explanations, corrected, aim, zero)
     will_be_made = best.part_of(corrected)
     predicted = _analyzed(will_be_made)
-    off = _largest_departure(explanations[:1], corrected, aim)
-    if off > LEAST_CORRECTION:
+    if _largest_departure(explanations[:1], corrected, aim) > LEAST_CORRECTION:
         raise redesign.not_makeable(x, after)
     changes = {
         path: (float(spec.at(path)), float(value))
@@ -269,13 +277,16 @@ def _largest_departure(explanations: Sequence[Explanation], drawn: Spec, aim: Ai
     )
 
 
-def _force(explanations: Sequence[Explanation], drawn: Spec, aim: Aim) -> PredictedForce:
-    """Return the mean force of the part of a drawing, with an interval that contains that of every explanation."""
-    each = [_interval(one, drawn, aim) for one in explanations]
+def _force(explanations: Sequence[Explanation], drawn: Spec, aim: Aim, zero: float) -> PredictedForce:
+    """Return the mean force of the part of a drawing, with an interval that contains that of every explanation.
+
+    `zero`: standard deviation of a zero of the sensor that is not known [N or N m].
+    """
+    each = [_interval(one, drawn, aim, zero) for one in explanations]
     return PredictedForce(each[0].value, min(one.low for one in each), max(one.high for one in each))
 
 
-def _interval(explanation: Explanation, drawn: Spec, aim: Aim) -> PredictedForce:
+def _interval(explanation: Explanation, drawn: Spec, aim: Aim, zero: float) -> PredictedForce:
     """Return the mean force of a part with one set of errors, and its interval by linear estimate."""
 
     def mean(values: FloatArray) -> float:
@@ -290,7 +301,7 @@ def _interval(explanation: Explanation, drawn: Spec, aim: Aim) -> PredictedForce
         moved = values.copy()
         moved[k] += step
         slopes[k] = (mean(moved) - here) / step
-    half = explanation.quantile * float(np.sqrt(slopes @ explanation.covariance @ slopes))
+    half = explanation.quantile * float(np.sqrt(slopes @ explanation.covariance @ slopes + zero**2))
     return PredictedForce(here, here - half, here + half)
 
 
@@ -383,7 +394,8 @@ class Redesign:
     explanations: tuple[Explanation, ...]
     aim: Aim
     limits: Mapping[str, Limit]
-    missed_before: float = 0.0  # by what share of its bound a requirement is missed by the design itself
+    # by what share of its bound a requirement is missed by the design itself; infinite: requirements do not matter
+    missed_before: float = 0.0
 
     @cached_property
     def start(self) -> FloatArray:
@@ -474,12 +486,13 @@ class Redesign:
         count = N_PLACES * len(self.aim.efforts)
         share = (len(self.aim.places) * len(self.aim.efforts) * len(self.explanations)) ** -0.5
         departures, missed = [], 0.0
-        for one in self.explanations:
+        for number, one in enumerate(self.explanations):
             try:
                 result = _analyzed(one.part_of(self.drawing(x)))
                 departure = share * self.aim.departure(result.curves)
                 departures += [departure, [MEAN_WEIGHT * float(np.nanmean(departure)) / share * len(self.explanations) ** -0.5]]
-                missed = max(missed, _missed(result) - self.missed_before)
+                if number == 0 and np.isfinite(self.missed_before):
+                    missed = max(missed, _missed(result) - self.missed_before)
             except (CfmError, ValueError):
                 departures.append(np.full(len(self.aim.places) * len(self.aim.efforts) + 1, NO_CURVE * share))
         found = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)

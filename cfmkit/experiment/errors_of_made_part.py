@@ -3,7 +3,8 @@
 Candidates are what errs in a part of that family: the moduli of its materials, one error of thickness all over the
 part, one coefficient of friction, and the rates of springs. All sets of them are fitted, with the zero of the force,
 the smaller sets first. They are compared by Schwarz's criterion, n ln(S / n) + k ln n, for n independent residuals with
-the sum of squares S and k fitted values. Sets within `EVIDENCE` of the best one explain the recording as well: the
+the sum of squares S and k fitted values; errors larger than usual of material and process add their squares over the
+usual ones. Sets within `EVIDENCE` of the best one explain the recording as well: the
 recording cannot tell them apart, and whoever corrects the part must allow for each.
 
 Reference
@@ -21,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import CfmError, DataError, SolutionError
-from cfmkit.experiment.calibration import ModelCurves, fitted_to, has_no_loss, scaled_jacobian
+from cfmkit.experiment.calibration import POOR, ModelCurves, fitted_to, has_no_loss, scaled_jacobian
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.parameters_to_fit import DATA, ZEROS, FitParameter, parameters
 from cfmkit.families import family
@@ -30,6 +31,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import robust_scale
 from cfmkit.specs.units import format_short
+from cfmkit.studies.parts.assumed_errors import assumed
 from cfmkit.studies.variable_paths import leaf
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.comparison import Comparison
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.parts.assumed_errors import Assumed
 
 EVIDENCE = 10.0
 """Difference of Schwarz's criterion from which one explanation is preferred to another."""
@@ -64,6 +67,12 @@ LARGEST_OVERTRAVEL = 1.25
 
 LARGEST_UNCERTAINTY_OF_ZERO = 0.003
 """Standard deviation of the zero of the force, over the largest force, beyond which it is not fitted."""
+
+UNUSUAL = 0.1
+"""Standard deviation of a modulus or a rate of which nothing else is known, as a share of it."""
+
+TOLERANCE = 1e-7
+"""Relative change of values at which fits end: far below their intervals."""
 
 LEAST_FRICTION = 1e-6
 """Where a model without friction is compared with a loop: with it the model has both branches."""
@@ -239,14 +248,15 @@ def explain(
     if has_no_loss(curves, before, candidates):
         before = before.of_the_mean()
         candidates = tuple(item for item in candidates if not item.path.endswith("friction"))
-    zeros = () if tared or fit is not None else _zeros(spec, source, before, curves, candidates)
     if fit is not None:
-        found = {(): fitted_to(before, curves, candidates, "linear")}
+        found = {(): fitted_to(before, curves, candidates, "linear", TOLERANCE)}
     else:
-        found = dict(_fits(before, curves, candidates, zeros, tell))
+        zeros = () if tared else _zeros(spec, source, before)
+        told = Distinction.of(curves, before, (*candidates, *zeros))
+        found = dict(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
     if not found:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
-    explanations = _ranked(list(found.values()), before)
+    explanations = _ranked(list(found.values()), before, assumed(curves.spec))
     best = explanations[0]
     _check_best(best, before, source)
     return tuple(_irreducible([one for one in explanations if one.criterion <= best.criterion + EVIDENCE]))
@@ -280,27 +290,53 @@ def _rubbing(
     )
 
 
-def _zeros(
-    spec: Spec, source: MeasuredCurves, before: Comparison, curves: ModelCurves, candidates: tuple[FitParameter, ...]
-) -> tuple[FitParameter, ...]:
-    """Return the zero of the force, to be fitted, where the recording tells it from the errors of the part.
+def _zeros(spec: Spec, source: MeasuredCurves, before: Comparison) -> tuple[FitParameter, ...]:
+    """Return the zero of the force as a parameter."""
+    return parameters(spec, [f"{DATA}{next(iter(ZEROS[before.curve.kind]))}"], None, source.recording)
 
-    It does not where the force is the same everywhere: then the zero is that of a stronger or a weaker part.
-    """
-    zeros = parameters(spec, [f"{DATA}{next(iter(ZEROS[before.curve.kind]))}"], None, source.recording)
-    every = (*candidates, *zeros)
-    try:
-        jacobian = scaled_jacobian(curves, before, every)
-    except CfmError:
-        return ()
-    *errors, zero = (column for column, item in zip(jacobian.T, every, strict=True) if item in zeros or column.any())
-    alone = zero
-    if errors:
-        basis, _ = np.linalg.qr(np.array(errors).T)
-        alone = zero - basis @ (basis.T @ zero)
-    level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
-    uncertain = zeros[0].size * _noise(before) / float(np.linalg.norm(alone))
-    return zeros if uncertain <= LARGEST_UNCERTAINTY_OF_ZERO * level else ()
+
+@dataclass(frozen=True)
+class Distinction:
+    """How well a recording tells parameters from each other, by linear estimate at the start."""
+
+    parameters: tuple[FitParameter, ...]
+    jacobian: FloatArray  # (n, p) derivatives of the residuals by the parameters in their sizes [N or N m]
+    noise: float  # standard deviation of a residual [N or N m]
+    level: float  # largest force or torque [N or N m]
+
+    @classmethod
+    def of(cls, curves: ModelCurves, before: Comparison, parameters: tuple[FitParameter, ...]) -> Distinction:
+        """Return it for the samples of a recording beside the start.
+
+        Raises
+        ------
+        cfmkit.errors.SolutionError
+            If the model has no value at some of the samples.
+        """
+        level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
+        noise = max(_noise(before), RESOLUTION * level)
+        return cls(parameters, scaled_jacobian(curves, before, parameters), noise, level)
+
+    def deviations(self, chosen: Sequence[FitParameter]) -> FloatArray:
+        """Return the standard deviations of parameters that are fitted together, in their sizes, (m,)."""
+        columns = self.jacobian[:, [self.parameters.index(item) for item in chosen]]
+        _, singular, right = np.linalg.svd(columns, full_matrices=False)
+        least = 1e-12 * float(singular.max(initial=0.0)) or 1e-300
+        found: FloatArray = self.noise * np.sqrt((right.T**2 / np.maximum(singular, least) ** 2).sum(axis=1))
+        return found
+
+    def zero_is_told(self, zeros: Sequence[FitParameter]) -> bool:
+        """Return True if the zero of the force is told from all errors of a part that have an effect."""
+        if not zeros:
+            return False
+        having = [item for item, column in zip(self.parameters, self.jacobian.T, strict=True) if column.any()]
+        uncertain = float(self.deviations(having)[-1]) * zeros[0].size
+        return uncertain <= LARGEST_UNCERTAINTY_OF_ZERO * self.level
+
+    def are_told(self, errors: Sequence[FitParameter], zeros: Sequence[FitParameter]) -> bool:
+        """Return True if the recording determines each of some errors beside the others and the zeros."""
+        deviations = self.deviations((*errors, *zeros))[: len(errors)]
+        return bool((2.0 * deviations <= POOR).all())
 
 
 def _noise(before: Comparison) -> float:
@@ -319,29 +355,39 @@ def _fits(
     curves: ModelCurves,
     candidates: tuple[FitParameter, ...],
     zeros: tuple[FitParameter, ...],
+    told: Distinction,
     tell: Callable[[str], None],
 ) -> Iterator[tuple[tuple[FitParameter, ...], Calibration]]:
-    """Yield the sets of errors that the recording determines, with their fits; larger sets as long as they are better.
-
-    Where it does not determine the zero of the force beside them, the zero is taken as it is.
-    """
+    """Yield the sets of errors that the recording determines, with their fits; larger sets as long as they are better."""
     best = np.inf
     for count in range(min(MOST_ERRORS, len(candidates)) + 1):
         level = best
         for chosen in combinations(candidates, count):
+            if chosen and not told.are_told(chosen, zeros):
+                continue
             tell(" and ".join(name_of(item) for item in chosen) or "no error")
-            for with_zeros in dict.fromkeys((zeros, ())):
-                try:
-                    fit = fitted_to(before, curves, (*chosen, *with_zeros), "linear") if chosen or with_zeros else None
-                except CfmError:
-                    continue
-                if fit is not None:
-                    level = min(level, _criterion(fit, before, 1.0))
-                    yield chosen, fit
-                break
+            try:
+                fit = fitted_to(before, curves, (*chosen, *zeros), "linear", TOLERANCE)
+            except CfmError:  # no such part exists, or none that could be measured so
+                continue
+            level = min(level, _criterion(fit, before, 1.0))
+            yield chosen, fit
         if count and level >= best - EVIDENCE:
             return
         best = level
+
+
+def _surprise(fit: Calibration, expected: Assumed | None) -> float:
+    """Return the squares of fitted errors over what is usual of material and process, added up."""
+    found = 0.0
+    for item, value in zip(fit.parameters, fit.fit.values, strict=True):
+        usual = item.size if item.path.endswith("friction") else UNUSUAL * item.size
+        if item.path.endswith(".youngs_modulus") and expected is not None and expected.modulus is not None:
+            usual = max(abs(end - item.start) for end in expected.modulus) / 2.0
+        elif is_thickness(item) and expected is not None:
+            usual = expected.process.thickness
+        found += 0.0 if item.path.startswith(DATA) else ((float(value) - item.start) / usual) ** 2
+    return found
 
 
 def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
@@ -353,11 +399,14 @@ def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
     return independent * float(np.log(power / level**2)) + len(fit.parameters) * float(np.log(independent))
 
 
-def _ranked(fits: list[Calibration], before: Comparison) -> list[Explanation]:
-    """Return explanations in the order of their criterion; how many residuals count as one says the closest fit."""
+def _ranked(fits: list[Calibration], before: Comparison, expected: Assumed | None) -> list[Explanation]:
+    """Return explanations in the order of their criterion, in which errors that are unusually large count, too.
+
+    How many residuals count as one says the closest fit.
+    """
     closest = min(fits, key=lambda fit: float(fit.fit.residuals @ fit.fit.residuals))
     inflation = closest.fit.inflation
-    found = [Explanation(fit, _criterion(fit, before, inflation)) for fit in fits]
+    found = [Explanation(fit, _criterion(fit, before, inflation) + _surprise(fit, expected)) for fit in fits]
     return sorted(found, key=lambda one: one.criterion)
 
 

@@ -52,6 +52,7 @@ class LeastSquares:
     # how many residuals count as one because they have unequal weights: the mean square of the weights over the square
     # of their mean (L. Kish, Survey Sampling, Wiley 1965, sec. 8.2)
     design_effect: float = 1.0
+    tolerance: float = 1e-12  # relative change of values and of the sum of squares at which the search ends
 
     def jacobian(self, values: FloatArray) -> FloatArray:
         """Return the derivatives of the residuals by the parameters in their sizes, by central differences.
@@ -201,9 +202,9 @@ def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float)
         bounds=(problem.low / size, problem.high / size),
         loss=loss,
         f_scale=scale,
-        xtol=1e-12,
-        ftol=1e-12,
-        gtol=1e-14,
+        xtol=problem.tolerance,
+        ftol=problem.tolerance,
+        gtol=0.01 * problem.tolerance,
         max_nfev=200,
     )
 

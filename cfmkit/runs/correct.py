@@ -153,14 +153,14 @@ def _lines(found: Correction, zero_known: bool) -> Iterator[tuple[str, str]]:
     if zero:
         yield "zero", f"without load the sensor shows {format_short(zero, kind, 3)}, which is taken off"
     elif not zero_known:
-        yield "zero", "the recording does not tell the zero of the sensor from the force: taken as recorded (--tare)"
+        yield "zero", "the recording does not tell it from the force: taken as recorded, within 2 % (state --tare)"
     loss = calibration.after.loss()
     if (factor := loss.get("data_loss_factor")) is not None and factor.value is not None:
         area = format_short(loss["data_loss"].value or 0.0, "energy", 3)
         yield "loss", f"a measured cycle loses {area}, loss factor {factor.value:.3g}"
     wanted, reached = (format_short(value, kind, 4) for value in (found.target, found.before.value))
     if not found.changes:
-        yield "corrected", f"{WITHIN_SCATTER}: the mean {kind} is {reached}, wanted is {wanted}"
+        yield "corrected", f"{WITHIN_SCATTER}: the mean {kind} is {reached}"
         return
     yield "corrected", f"for {wanted} instead of {reached}; the next part is assumed to be made with the same errors"
     if found.will_be_made != found.corrected:
