@@ -60,6 +60,8 @@ class GridColumn(NamedTuple):
 
     head: str = ""
     wraps: bool = True
+    # which columns short pages leave out where all do not fit, the largest number first; those with 0 stay
+    rank: int = 0
 
 
 class CellGrid(NamedTuple):

@@ -329,12 +329,14 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
         if fit.at_bound[k]:
             found.append(Finding("at_bound", f"{item.label} is at its bound: the data require a value beyond"))
         elif half[k] > UNKNOWN * item.size:
-            found.append(Finding("weakly_identified", f"{item.label} {CANNOT}: fit fewer values, or give it with --set"))
+            found.append(
+                Finding("weakly_identified", f"{item.label} {CANNOT}: fit fewer values, or give it with --set")
+            )
         elif half[k] > POOR * item.size:
             found.append(
                 Finding(
                     "weakly_identified",
-                    f"{item.label} is known only to within ± {100 * half[k] / item.size:.0f} % of its size",
+                    f"{item.label} cannot be determined from this recording (± {100 * half[k] / item.size:.0f} %)",
                 )
             )
         for other in range(k):
@@ -363,8 +365,8 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
     return [
         Finding(
             "lack_of_fit",
-            f"the residual swings by {swing} (rms) along the travel, beside a noise of {noise}: what was "
-            f"fitted does not describe the measurement, and the intervals hold only where it does; {cure}",
+            f"systematic residual {swing} (rms) along the travel, noise {noise}: what was fitted does not describe "
+            f"the measurement, and the intervals hold only where it does; {cure}",
         )
     ]
 

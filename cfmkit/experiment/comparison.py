@@ -115,7 +115,7 @@ class Comparison(ShortRepr):
         return emptied(found.summarize(_ERRORS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:
-        """Return what a measured cycle loses, its loss factor, and half the mean gap of its branches; without a loop nothing."""
+        """Return what a cycle loses, its loss factor, and half the gap of the branches; nothing without a loop."""
         loop = self.loop
         if loop is None:
             return {}

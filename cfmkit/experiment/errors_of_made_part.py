@@ -249,14 +249,14 @@ def explain(
         before = before.of_the_mean()
         candidates = tuple(item for item in candidates if not item.path.endswith("friction"))
     if fit is not None:
-        found = {(): fitted_to(before, curves, candidates, "linear", TOLERANCE)}
+        fits = [fitted_to(before, curves, candidates, "linear", TOLERANCE)]
     else:
         zeros = () if tared else _zeros(spec, source, before)
         told = Distinction.of(curves, before, (*candidates, *zeros))
-        found = dict(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
-    if not found:
+        fits = list(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
+    if not fits:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
-    explanations = _ranked(list(found.values()), before, assumed(curves.spec))
+    explanations = _ranked(fits, before, assumed(curves.spec))
     best = explanations[0]
     _check_best(best, before, source)
     return tuple(_irreducible([one for one in explanations if one.criterion <= best.criterion + EVIDENCE]))
@@ -357,8 +357,8 @@ def _fits(
     zeros: tuple[FitParameter, ...],
     told: Distinction,
     tell: Callable[[str], None],
-) -> Iterator[tuple[tuple[FitParameter, ...], Calibration]]:
-    """Yield the sets of errors that the recording determines, with their fits; larger sets as long as they are better."""
+) -> Iterator[Calibration]:
+    """Yield the fits of the sets of errors that the recording determines; larger sets as long as they are better."""
     best = np.inf
     for count in range(min(MOST_ERRORS, len(candidates)) + 1):
         level = best
@@ -371,7 +371,7 @@ def _fits(
             except CfmError:  # no such part exists, or none that could be measured so
                 continue
             level = min(level, _criterion(fit, before, 1.0))
-            yield chosen, fit
+            yield fit
         if count and level >= best - EVIDENCE:
             return
         best = level

@@ -11,12 +11,12 @@ from cfmkit.documents.document import GridColumn, PageTable
 from cfmkit.documents.run_outcome import Supplement, report_on, undesigned
 from cfmkit.errors import SpecError
 from cfmkit.experiment import measurement_and_calibration_outputs as add
-from cfmkit.experiment.correction import NotMakeable, correct
+from cfmkit.experiment.correction import correct
+from cfmkit.experiment.redrawn_values import NotMakeable, dimension_of
 from cfmkit.metrics import evaluate
 from cfmkit.metrics.metric_definitions import words
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import border_unit, format_short, to_border
-from cfmkit.studies.variable_paths import leaf
 from cfmkit.tables import Table, TableColumn, to_csv
 
 if TYPE_CHECKING:
@@ -65,10 +65,9 @@ class Row:
     @property
     def numbers(self) -> dict[str, Any]:
         """The same in border units; None where there is no interval."""
-        each = {"before": self.before, "after": self.after}
+        each: dict[str, float | None] = {"before": self.before, "after": self.after}
         for name, ends in (("before", self.before_ends), ("after", self.after_ends)):
-            low, high = ends or (None, None)
-            each |= {f"{name}_low_95": low, f"{name}_high_95": high}
+            each |= {f"{name}_low_95": ends and ends[0], f"{name}_high_95": ends and ends[1]}
         shown = {key: None if value is None else float(to_border(value, self.dimension)) for key, value in each.items()}
         return {"value": self.name, "unit": border_unit(self.dimension), **shown}
 
@@ -119,7 +118,7 @@ def report_of(found: Correction, source: MeasuredCurves, zero_known: bool) -> Re
 def rows_of(found: Correction) -> tuple[Row, ...]:
     """Return what is drawn anew, then forces and stress of the part that was made and of the one that will be."""
     drawn = [
-        Row(path.removeprefix("mechanism."), _dimension(found.drawn, path), before, now)
+        Row(path.removeprefix("mechanism."), dimension_of(found.drawn, path), before, now)
         for path, (before, now) in found.changes.items()
     ]
     kind = found.nominal.curve.kind
@@ -136,11 +135,6 @@ def _metrics(found: Correction, kind: str) -> Iterator[Row]:
         old, new = before.get(name), after.get(name)
         if old is not None and new is not None and old.value is not None and new.value is not None:
             yield Row(words(name), new.dimension, old.value, new.value)
-
-
-def _dimension(spec: Spec, path: str) -> str:
-    quantity = leaf(type(spec), path).quantity
-    return quantity.dimensions[0] if quantity else "ratio"
 
 
 def _lines(found: Correction, zero_known: bool) -> Iterator[tuple[str, str]]:
@@ -164,7 +158,7 @@ def _lines(found: Correction, zero_known: bool) -> Iterator[tuple[str, str]]:
         return
     yield "corrected", f"for {wanted} instead of {reached}; the next part is assumed to be made with the same errors"
     if found.will_be_made != found.corrected:
-        yield "made", "this page is of the part as it will be made; design.yaml is what is drawn, predicted.yaml the part"
+        yield "made", "this page is of the part as it will be made: predicted.yaml; design.yaml is what is drawn"
 
 
 def _specs(found: Correction) -> Iterator[tuple[str, Any]]:

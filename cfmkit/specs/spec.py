@@ -162,6 +162,9 @@ class Correlated(Model):
 class Sensitivity(Model):
     """What `cfmkit sensitivity` varies, and how."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "on_failure": "samples without a result are counted and reported; indices that need them are not stated"
+    }
     method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] = Field(
         "oat",
         description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances, or the "
@@ -176,11 +179,6 @@ class Sensitivity(Model):
     )
     seed: int | None = Field(None, ge=0, description="seed of all random numbers; `--seed` takes precedence")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
-    on_failure: Literal["fail", "resample", "bound"] = Field(
-        "fail",
-        description="for samples without a result: report no index (fail), draw their block again (resample) or report "
-        "intervals (bound)",
-    )
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
     costs: dict[str, Annotated[float, Field(gt=0)]] = Field(
         {},
