@@ -134,8 +134,9 @@ def correct(
     redesign = Redesign(spec, explanations, aim, limits_of(spec), share_missed(nominal))
     x = redesign.solve()
     if _largest_departure(explanations[:1], redesign.drawing(x), aim) > LEAST_CORRECTION:
-        # a requirement stands in the way: the force comes first, and the page says what is missed
-        x = replace(redesign, missed_before=np.inf).solve()
+        # a requirement stands in the way: the force comes first, but the part stays in its envelope
+        envelope = replace(redesign, missed_before=share_missed(nominal, of_envelope=True), of_envelope=True)
+        x = envelope.solve()
     corrected = redesign.drawing(x)
     after = _force(explanations, corrected, aim, zero)
     will_be_made = best.part_of(corrected)

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -347,7 +348,7 @@ def _noise(before: Comparison) -> float:
             effort = item.effort[item.cycle == cycle]
             each.append(effort[np.argsort(item.motion[item.cycle == cycle], kind="stable")])
     bends = np.concatenate([np.diff(effort, 2) for effort in each])
-    return float(robust_scale(bends)) / 6.0**0.5
+    return float(robust_scale(bends)) / sqrt(6.0)
 
 
 def _fits(

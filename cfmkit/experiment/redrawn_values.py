@@ -17,7 +17,7 @@ from cfmkit.errors import CfmError, SolutionError
 from cfmkit.experiment.aimed_curve import N_PLACES, analyzed
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
-from cfmkit.families.base import function_named
+from cfmkit.families.base import ENVELOPE, function_named
 from cfmkit.metrics import check, values_of_family
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -160,8 +160,8 @@ class Redesign:
     explanations: tuple[Explanation, ...]
     aim: Aim
     limits: Mapping[str, Limit]
-    # by what share of its bound a requirement is missed by the design itself; infinite: requirements do not matter
-    missed_before: float = 0.0
+    missed_before: float = 0.0  # by what share of its bound a requirement is missed by the design itself
+    of_envelope: bool = False  # whether of all requirements those on the envelope matter alone
 
     @cached_property
     def start(self) -> FloatArray:
@@ -272,8 +272,8 @@ class Redesign:
                 result = analyzed(one.part_of(self.drawing(x)))
                 departure = self.aim.departure(result.curves)
                 departures += [share * departure, np.array([mean_weight * float(np.nanmean(departure))])]
-                if number == 0 and np.isfinite(self.missed_before):
-                    missed = max(missed, share_missed(result) - self.missed_before)
+                if number == 0:
+                    missed = max(0.0, share_missed(result, self.of_envelope) - self.missed_before)
             except (CfmError, ValueError):
                 departures.append(np.full(len(self.aim.places) * len(self.aim.efforts) + 1, NO_CURVE * share))
         found = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)
@@ -311,12 +311,15 @@ def dimension_of(spec: Spec, path: str) -> str:
     return quantity.dimensions[0] if quantity else "ratio"
 
 
-def share_missed(result: Result) -> float:
-    """Return by what share of its bound a requirement is missed, or met by less than `MARGIN`, the largest."""
+def share_missed(result: Result, of_envelope: bool = False) -> float:
+    """Return by what share of its bound a requirement is missed, or met by less than `MARGIN`, the largest.
+
+    `of_envelope`: of the requirements on the envelope alone.
+    """
     values = values_of_family(family(result.spec.family).values)
     shares = [0.0]
     for outcome in check(result.spec.part_requirements, result, values):
-        if outcome.value is None:
+        if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE):
             continue
         for bound, way in ((outcome.max, 1.0), (outcome.min, -1.0)):
             if bound is not None:

@@ -57,7 +57,7 @@ class Hidden:
         motion = np.tile(np.concatenate([places, places[::-1]]), 2)
         effort = np.tile(np.concatenate([up, down[::-1]]), 2)
         if self.seen_at_rest:
-            motion, effort = np.append(np.full(40, motion[0]), motion), np.append(np.zeros(40), effort)
+            motion, effort = np.append(np.full(40, motion[0]), motion[1:]), np.append(np.zeros(40), effort[1:])
         noise = rng.normal(0.0, self.noise * np.abs(up).max(), len(effort))
         return Recording("synthetic", motion, effort + self.tare + noise, kind=curve.kind)
 
@@ -122,3 +122,75 @@ def test_nine_of_ten_corrected_parts_have_the_force_within_one_percent_or_the_in
         )
     assert len(close) >= 10
     assert sum(close) >= 0.9 * len(close)
+
+
+def test_a_part_that_is_as_its_model_has_nothing_to_correct():
+    hidden = Hidden("make_finger", tare=0.3)
+    found = cfmkit.correct(hidden.drawn, hidden.recording())
+    assert not found.changes
+    assert found.corrected == hidden.drawn
+    assert found.before.low <= found.aim.mean([curve_of(hidden.drawn)]) <= found.before.high
+
+
+def test_beams_whose_modulus_is_not_told_from_their_thickness_get_other_widths_alone():
+    hidden = LOOPS["beams, soft"]
+    found = cfmkit.correct(hidden.drawn, hidden.recording())
+    assert {item.path.rpartition(".")[2] for one in found.explanations for item in one.errors} == {
+        "youngs_modulus",
+        "thickness",
+    }
+    assert list(found.changes) == ["mechanism.width"]
+    assert found.corrected.at(MODULUS) == hidden.drawn.at(MODULUS)  # said, not guessed
+    assert [item.name for item in found.warnings] == ["not_told_apart"]
+
+
+def test_leaves_that_are_made_too_thick_are_drawn_thinner():
+    hidden = LOOPS["titanium, thick leaves"]
+    found = cfmkit.correct(hidden.drawn, hidden.recording())
+    for path in LEAVES:
+        before, after = found.changes[path]
+        assert after - before == pytest.approx(-hidden.thicker, rel=0.03)
+
+
+def test_springs_and_friction_of_a_cam_stay_and_its_profile_changes():
+    hidden = LOOPS["published cam, soft springs, friction"]
+    found = cfmkit.correct(hidden.drawn, hidden.recording(), tare="start")
+    assert list(found.changes) == ["mechanism.profile.force_constant"]
+    before, after = found.changes["mechanism.profile.force_constant"]
+    assert after / before == pytest.approx(1.0 / 0.95, rel=0.005)
+    for path in ("mechanism.springs.stiffness", "mechanism.rolling_friction"):
+        assert found.corrected.at(path) == hidden.drawn.at(path)
+
+
+def test_a_part_stays_in_the_envelope_that_is_required():
+    """Widths alone would make it 15.2 mm deep."""
+    hidden = Hidden("make_finger", {MODULUS: 0.85}, changes=("requirements.0={metric: envelope_z, max: 13.5 mm}",))
+    found = cfmkit.correct(hidden.drawn, hidden.recording())
+    (depth,) = (one for one in cfmkit.check(found.predicted) if one.metric == "envelope_z")
+    assert depth.ok
+    assert any(path.endswith("thickness") for path in found.changes)
+    assert found.after.value == pytest.approx(found.target, rel=0.01)
+
+
+def test_a_recording_of_another_travel_is_refused():
+    hidden = Hidden("make_finger")
+    recording = hidden.recording()
+    longer = Recording("long", 3.0 * recording.motion, recording.effort)
+    with pytest.raises(DataError, match=r"goes over .* a recording of another part\?"):
+        cfmkit.correct(hidden.drawn, longer)
+
+
+def test_a_recording_of_another_force_is_refused():
+    hidden = Hidden("make_finger")
+    recording = hidden.recording()
+    with pytest.raises(DataError, match="a recording of another part"):
+        cfmkit.correct(hidden.drawn, Recording("strong", recording.motion, 30.0 * recording.effort))
+
+
+def test_a_thickness_that_the_process_cannot_make_is_refused_with_the_nearest_force():
+    """The width is that of the sheet: a stiffer material needs beams thinner than 0.98 mm, the least that is made."""
+    changes = ("mechanism.part.sheet=10 mm", "mechanism.part.process.least_feature=0.98 mm")
+    hidden = Hidden("beam_rescaled", {MODULUS: 1.4}, changes=changes)
+    with pytest.raises(NotMakeable, match=r"no part that can be made has .*: the nearest has") as caught:
+        cfmkit.correct(hidden.drawn, hidden.recording())
+    assert "0.98 mm" in str(caught.value)

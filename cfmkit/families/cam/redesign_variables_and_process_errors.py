@@ -21,12 +21,9 @@ def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
         What came out.
     """
     wanted, mechanism = given.design, designed.mechanism
-    if wanted is None:
-        return {}
-    found = {}
-    found["mechanism.profile.force_constant"] = around(mechanism.profile.force_constant)
+    found = {"mechanism.profile.force_constant": around(mechanism.profile.force_constant)}
     rate = mechanism.springs.stiffness
-    if wanted.choose == "stiffness" and isinstance(rate, float):
+    if wanted is not None and wanted.choose == "stiffness" and isinstance(rate, float):
         found["mechanism.springs.stiffness"] = around(rate)
     return found
 
