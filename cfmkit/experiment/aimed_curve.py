@@ -29,7 +29,7 @@ LARGEST_RESCALING = 0.03
 
 
 @dataclass(frozen=True)
-class Aim:
+class AimedCurve:
     """The curve that a corrected part is to have."""
 
     places: FloatArray  # (n,) [m or rad]
@@ -91,7 +91,7 @@ def analyzed(spec: Spec) -> Result:
     return found
 
 
-def aim_of(nominal: Result) -> Aim:
+def aim_of(nominal: Result) -> AimedCurve:
     """Return the curve that a perfect part of a drawing has, at the force that is asked for.
 
     A target may hold between the branches or on one of them: it holds where it is met.
@@ -108,4 +108,4 @@ def aim_of(nominal: Result) -> Aim:
         scale = target / means[nearest] if abs(target / means[nearest] - 1.0) <= LARGEST_RESCALING else 1.0
     efforts = [scale * middle(one, branches, places) for one in nominal.curves]
     known = np.all(np.isfinite(efforts), axis=0)
-    return Aim(places[known], tuple(effort[known] for effort in efforts), branches)
+    return AimedCurve(places[known], tuple(effort[known] for effort in efforts), branches)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.aimed_curve import Aim
+    from cfmkit.experiment.aimed_curve import AimedCurve
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.errors_of_made_part import Explanation
     from cfmkit.results import Result
@@ -67,7 +67,7 @@ class Correction(ShortRepr):
     made: Spec
     will_be_made: Spec
     explanations: tuple[Explanation, ...]  # what differs in the part, the best first
-    aim: Aim  # the curve that is to be reached
+    aim: AimedCurve  # the curve that is to be reached
     nominal: Result  # of a perfect part of the old drawing
     built: Result  # of the part that was made
     predicted: Result  # of the part that will be made
@@ -155,12 +155,12 @@ def correct(
     )  # fmt: skip
 
 
-def _largest_departure(explanations: Sequence[Explanation], drawn: Spec, aim: Aim) -> float:
+def _largest_departure(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve) -> float:
     """Return by how much the mean force of parts departs from the aim at most, over its level."""
     return max(abs(float(np.nanmean(aim.departure(analyzed(one.part_of(drawn)).curves)))) for one in explanations)
 
 
-def _force(explanations: Sequence[Explanation], drawn: Spec, aim: Aim, zero: float) -> PredictedForce:
+def _force(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
     """Return the mean force of the part of a drawing, with an interval that contains that of every explanation.
 
     `zero`: standard deviation of a zero of the sensor that is not known [N or N m].
@@ -169,7 +169,7 @@ def _force(explanations: Sequence[Explanation], drawn: Spec, aim: Aim, zero: flo
     return PredictedForce(each[0].value, min(one.low for one in each), max(one.high for one in each))
 
 
-def _interval(explanation: Explanation, drawn: Spec, aim: Aim, zero: float) -> PredictedForce:
+def _interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
     """Return the mean force of a part with one set of errors, and its interval by linear estimate."""
 
     def mean(values: FloatArray) -> float:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.aimed_curve import Aim
+    from cfmkit.experiment.aimed_curve import AimedCurve
     from cfmkit.experiment.errors_of_made_part import Explanation
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
@@ -158,7 +158,7 @@ class Redesign:
 
     drawn: Spec
     explanations: tuple[Explanation, ...]
-    aim: Aim
+    aim: AimedCurve
     limits: Mapping[str, Limit]
     missed_before: float = 0.0  # by what share of its bound a requirement is missed by the design itself
     of_envelope: bool = False  # whether of all requirements those on the envelope matter alone
