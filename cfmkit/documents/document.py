@@ -237,7 +237,7 @@ class WarningEntry(NamedTuple):
 
 @dataclass(frozen=True)
 class Document:
-    """What one command found."""
+    """Outcome of one command."""
 
     # more of the JSON document than the envelope has; values for its keys replace them
     data: Mapping[str, Any] = attribute(default_factory=dict)

@@ -55,7 +55,7 @@ class MeasureReport(ShortRepr):
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What the user must know of recording and window."""
+        """Findings about recording and window."""
         return (*self.source.warnings, *self.numbers.warnings)
 
     @property
@@ -65,7 +65,7 @@ class MeasureReport(ShortRepr):
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """What metrics.json says: the contract's keys for the raw curve, the filtered one, and what was decided."""
+        """Content of metrics.json: the contract's keys for the raw curve, the filtered one, and what was decided."""
         source, low_pass = self.source, self.source.low_pass
         return {
             "status": self.status.key,

@@ -31,7 +31,7 @@ what published mechanisms of printed plastic are bent to. The stress of what com
 
 @dataclass(frozen=True)
 class Request:
-    """What somebody wants of a mechanism."""
+    """Requirements of a mechanism that is to be suggested."""
 
     kind: Literal["force", "torque"]  # what is to be constant: over a travel, or over an angle
     target: float  # how large [N or N m]; of a band, its middle

@@ -45,7 +45,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Deadlines:
-    """What a run leaves out when it is late."""
+    """Deadlines of parts that a late run leaves out."""
 
     figures: Clock  # of the search and of proposals whose turn comes after it
     files: Clock  # of proposals, all but ``design.yaml``

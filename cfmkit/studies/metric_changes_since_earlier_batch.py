@@ -1,4 +1,4 @@
-"""What has changed in the metrics of many specifications since an earlier batch."""
+"""Changes of the metrics of many specifications since an earlier batch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How results depend on parameters: six methods, and what becomes of samples that fail.
+"""Dependence of results on parameters: six methods, and what becomes of samples that fail.
 
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:

@@ -1,4 +1,4 @@
-"""What a sensitivity study found: indices as lines of a tidy table, the yield, and how many samples failed."""
+"""Outcome of a sensitivity study: indices as lines of a tidy table, the yield, and how many samples failed."""
 
 from __future__ import annotations
 

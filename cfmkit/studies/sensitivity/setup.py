@@ -1,4 +1,4 @@
-"""What a sensitivity study is to do: read off a specification, checked before anything is computed."""
+"""Task of a sensitivity study: read off a specification, checked before anything is computed."""
 
 from __future__ import annotations
 

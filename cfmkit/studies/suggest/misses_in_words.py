@@ -1,4 +1,4 @@
-"""What a mechanism misses of a request, in words: its envelope, its travel, and a force that wide beams raise."""
+"""Requirements that a mechanism misses, in words: its envelope, its travel, and a force that wide beams raise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.base import Envelope
+    from cfmkit.families.base import BoundingBox
     from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
 
@@ -71,7 +71,7 @@ def raised_out(request: Request, force: float, share: float) -> list[str]:
     return [f"wide_beam: the {request.kind} is between {texts[0]} and {texts[1]}, allowed <= {texts[2]}"]
 
 
-def outside(request: Request, space: Envelope | None) -> Iterator[str]:
+def outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
     """Yield by which sides a mechanism leaves the envelope; one that turns may lie either way in the plane."""
     if space is None:
         yield "the envelope that it needs is not known"

@@ -43,7 +43,7 @@ from cfmkit.studies.suggest.yield_of_proposal import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from cfmkit.families.base import Envelope
+    from cfmkit.families.base import BoundingBox
     from cfmkit.families.suggestion_request import Candidate, Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
@@ -353,7 +353,7 @@ def judged(
     seconds = time.perf_counter() - begun
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
-    space: Envelope | None = record.envelope(result)
+    space: BoundingBox | None = record.envelope(result)
     result, values = sized(result, space), values_of_family(record.values)
     required = plain.replace({"requirements": demanded(request, result, space, values)})
     text = dump(with_made_parts(required, request, seed))
@@ -430,7 +430,7 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
     return spec
 
 
-def numbers_of(result: Result, space: Envelope | None, request: Request) -> dict[str, float | None]:
+def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> dict[str, float | None]:
     """Return what proposals are compared by, in SI."""
     kind = request.kind
     found = evaluate(result)
@@ -473,7 +473,7 @@ def _life(found: Mapping[str, Any]) -> float | None:
     return min(known, default=None)
 
 
-def _notes(space: Envelope | None, result: Result) -> Iterator[str]:
+def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     """Yield what a reader has to know: what was assumed, what rubs, what the analysis warns of."""
     if space is not None and space.assumed:
         yield space.assumed

@@ -119,7 +119,10 @@ class Suggestions:
 
 
 def suggest(
-    request: Request, run: Run, prefer: Sequence[str] = ("size", "ripple", "parts", "stress"), reserve: float = 0.0
+    request: Request,
+    run: Run,
+    prefer: Sequence[str] = ("size", "ripple", "parts", "stress"),
+    reserve: float = 0.0,
 ) -> Suggestions:
     """Return mechanisms that do what is required, of every family that has any.
 
