@@ -1,4 +1,4 @@
-"""The curve that a corrected part is to have: that of a perfect part of its design, at the force that is asked for."""
+"""The curve that a corrected part is to have: that of a perfect part of its design, at the force that is requested."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class AimedCurve:
 
     def departure(self, curves: Sequence[Curve]) -> FloatArray:
         """Return by how much curves are above the aim, over its level, (m n,); NaN where they have no value."""
-        found: FloatArray = np.concatenate(
+        departure: FloatArray = np.concatenate(
             [
                 middle(curve, self.branches, self.places) - effort
                 for curve, effort in zip(curves, self.efforts, strict=True)
             ]
         )
-        return found / self.level
+        return departure / self.level
 
     def mean(self, curves: Sequence[Curve]) -> float:
         """Return the mean of the first curve [N or N m]."""
@@ -71,13 +71,13 @@ def middle(curve: Curve, branches: Sequence[str], places: FloatArray) -> FloatAr
     """
     own = [name for name in branches if name in curve.branches] or list(curve.branches[:1])
     try:
-        found: FloatArray = np.mean([effort_at(curve, name, places) for name in own], axis=0)
+        effort: FloatArray = np.mean([effort_at(curve, name, places) for name in own], axis=0)
     except Undefined:
         raise SolutionError("the force has several values at one place: such a curve is not corrected") from None
-    return found
+    return effort
 
 
-def analyzed(spec: Spec) -> Result:
+def analyze_part(spec: Spec) -> Result:
     """Return the result of a part.
 
     Raises
@@ -85,27 +85,27 @@ def analyzed(spec: Spec) -> Result:
     cfmkit.errors.SolutionError
         If it has no curve.
     """
-    found: Result = family(spec.family).analyze(spec, Run())
-    if not found.curves:
-        raise SolutionError(f"there is no curve to correct: {found.message}")
-    return found
+    result: Result = family(spec.family).analyze(spec, Run())
+    if not result.curves:
+        raise SolutionError(f"there is no curve to correct: {result.message}")
+    return result
 
 
 def aim_of(nominal: Result) -> AimedCurve:
-    """Return the curve that a perfect part of a drawing has, at the force that is asked for.
+    """Return the curve that a perfect part of a drawing has, at the force that is requested.
 
     A target may hold between the branches or on one of them: it holds where it is met.
     """
     curve, target = nominal.curve, frame_of(nominal).target
     window = window_of(nominal) or Window(float(curve.motion.min()), float(curve.motion.max()))
     places = np.linspace(window.lo, window.hi, N_PLACES)
-    each = [curve.branches, *((name,) for name in curve.branches)] if len(curve.branches) > 1 else [curve.branches]
-    branches, scale = tuple(each[0]), 1.0
+    choices = [curve.branches, *((name,) for name in curve.branches)] if len(curve.branches) > 1 else [curve.branches]
+    branches, scale = tuple(choices[0]), 1.0
     if target and nominal.target_curve is None and nominal.spec.target_curve is None and len(nominal.curves) == 1:
-        means = [float(np.nanmean(middle(curve, names, places))) for names in each]
-        nearest = min(range(len(each)), key=lambda k: (round(abs(means[k] / target - 1.0), 3), k))
-        branches = tuple(each[nearest])
+        means = [float(np.nanmean(middle(curve, names, places))) for names in choices]
+        nearest = min(range(len(choices)), key=lambda k: (round(abs(means[k] / target - 1.0), 3), k))
+        branches = tuple(choices[nearest])
         scale = target / means[nearest] if abs(target / means[nearest] - 1.0) <= LARGEST_RESCALING else 1.0
-    efforts = [scale * middle(one, branches, places) for one in nominal.curves]
+    efforts = [scale * middle(item, branches, places) for item in nominal.curves]
     known = np.all(np.isfinite(efforts), axis=0)
     return AimedCurve(places[known], tuple(effort[known] for effort in efforts), branches)

@@ -24,8 +24,8 @@ from cfmkit.numerics.least_squares import (
     LeastSquares,
     Loss,
     NotFinite,
+    evaluate_start,
     lack_of_fit,
-    nothing_fitted,
     solve,
     unidentifiable,
 )
@@ -163,10 +163,10 @@ def calibrate(
     before, curves = _compared(spec, source, parameters, window), ModelCurves(spec)
     if has_no_loss(curves, before, parameters):
         before = before.of_the_mean()
-    return fitted_to(before, curves, parameters, loss)
+    return fit_samples(before, curves, parameters, loss)
 
 
-def fitted_to(
+def fit_samples(
     before: Comparison,
     curves: ModelCurves,
     parameters: Sequence[FitParameter],
@@ -193,7 +193,7 @@ def fitted_to(
     """
     problem = replace(_problem(curves, before, parameters), tolerance=tolerance)
     _check(problem, problem.start, parameters)
-    fit = solve(problem, loss) if parameters else nothing_fitted(problem)
+    fit = solve(problem, loss) if parameters else evaluate_start(problem)
     _check(problem, fit.values, parameters)
     fitted = curves.spec_with(parameters, fit.values)
     result = _analysed(fitted)

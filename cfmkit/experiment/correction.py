@@ -2,7 +2,7 @@
 
 What differs in the part is fitted (`errors_of_made_part`); the next part is assumed to be made with the same errors.
 Then values that are drawn, not what is bought, are moved as little as possible until the part that will be made has the
-curve that the drawn one was to have, at the force that is asked for. Where the recording does not tell several errors
+curve that the drawn one was to have, at the force that is requested. Where the recording does not tell several errors
 apart, the values suit all of them, and the interval of the predicted force contains each.
 """
 
@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.experiment.aimed_curve import aim_of, analyzed
+from cfmkit.experiment.aimed_curve import aim_of, analyze_part
 from cfmkit.experiment.errors_of_made_part import explain, name_of
 from cfmkit.experiment.parameters_to_fit import DATA
-from cfmkit.experiment.redrawn_values import Redesign, limits_of, share_missed
+from cfmkit.experiment.redrawn_values import Redesign, largest_miss, limits_of
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
@@ -58,7 +58,7 @@ class PredictedForce:
 
 
 @dataclass(frozen=True, repr=False)
-class Correction(ShortRepr):
+class DesignCorrection(ShortRepr):
     """A corrected drawing."""
 
     drawn: Spec  # that the part was made of, resolved
@@ -93,7 +93,7 @@ def correct(
     fit: Sequence[str] | None = None,
     tared: bool = False,
     run: Run | None = None,
-) -> Correction:
+) -> DesignCorrection:
     """Return a drawing corrected by the recording of a part that was made of it.
 
     Parameters
@@ -120,27 +120,27 @@ def correct(
     run = run or Run()
     explanations = explain(spec, source, fit, tared, lambda text: run.progress(0.2, f"fitting {text}"))
     best = explanations[0]
-    nominal = analyzed(spec)
+    nominal = analyze_part(spec)
     aim = aim_of(nominal)
     made = best.part_of(spec)
-    built = analyzed(made)
+    built = analyze_part(made)
     told = tared or fit is not None or any(item.path.startswith(DATA) for item in best.calibration.parameters)
     zero = 0.0 if told else UNKNOWN_ZERO * float(np.abs(source.recording.effort).max())
     before = _force(explanations, spec, aim, zero)
     off = _largest_departure(explanations, spec, aim)
-    if any(not one.errors for one in explanations) or off <= LEAST_CORRECTION:
-        return Correction(spec, spec, made, made, explanations, aim, nominal, built, built, before, before)
+    if any(not item.errors for item in explanations) or off <= LEAST_CORRECTION:
+        return DesignCorrection(spec, spec, made, made, explanations, aim, nominal, built, built, before, before)
     run.progress(0.6, "moving what is drawn")
-    redesign = Redesign(spec, explanations, aim, limits_of(spec), share_missed(nominal))
+    redesign = Redesign(spec, explanations, aim, limits_of(spec), largest_miss(nominal))
     x = redesign.solve()
     if _largest_departure(explanations[:1], redesign.drawing(x), aim) > LEAST_CORRECTION:
         # a requirement stands in the way: the force comes first, but the part stays in its envelope
-        envelope = replace(redesign, missed_before=share_missed(nominal, of_envelope=True), of_envelope=True)
+        envelope = replace(redesign, missed_before=largest_miss(nominal, of_envelope=True), of_envelope=True)
         x = envelope.solve()
     corrected = redesign.drawing(x)
     after = _force(explanations, corrected, aim, zero)
     will_be_made = best.part_of(corrected)
-    predicted = analyzed(will_be_made)
+    predicted = analyze_part(will_be_made)
     if _largest_departure(explanations[:1], corrected, aim) > LARGEST_REMAINDER:
         raise redesign.not_makeable(x, after.value)
     changes = {
@@ -149,7 +149,7 @@ def correct(
         if abs(value / float(spec.at(path)) - 1.0) > 1e-5
     }
     stated = _with_modulus(corrected, best) if len(explanations) == 1 else corrected
-    return Correction(
+    return DesignCorrection(
         spec, stated, made, will_be_made, explanations, aim, nominal, built, predicted, before, after, changes,
         tuple(_warnings(spec, explanations)),
     )  # fmt: skip
@@ -157,7 +157,7 @@ def correct(
 
 def _largest_departure(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve) -> float:
     """Return by how much the mean force of parts departs from the aim at most, over its level."""
-    return max(abs(float(np.nanmean(aim.departure(analyzed(one.part_of(drawn)).curves)))) for one in explanations)
+    return max(abs(float(np.nanmean(aim.departure(analyze_part(item.part_of(drawn)).curves)))) for item in explanations)
 
 
 def _force(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
@@ -165,15 +165,15 @@ def _force(explanations: Sequence[Explanation], drawn: Spec, aim: AimedCurve, ze
 
     `zero`: standard deviation of a zero of the sensor that is not known [N or N m].
     """
-    each = [_interval(one, drawn, aim, zero) for one in explanations]
-    return PredictedForce(each[0].value, min(one.low for one in each), max(one.high for one in each))
+    forces = [_interval(item, drawn, aim, zero) for item in explanations]
+    return PredictedForce(forces[0].value, min(item.low for item in forces), max(item.high for item in forces))
 
 
 def _interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, zero: float) -> PredictedForce:
     """Return the mean force of a part with one set of errors, and its interval by linear estimate."""
 
     def mean(values: FloatArray) -> float:
-        return aim.mean(analyzed(explanation.part_of(drawn, values)).curves)
+        return aim.mean(analyze_part(explanation.part_of(drawn, values)).curves)
 
     values, spread = explanation.values, np.sqrt(np.diag(explanation.covariance))
     here = mean(values)
@@ -198,7 +198,7 @@ def _with_modulus(corrected: Spec, best: Explanation) -> Spec:
 
 
 def _warnings(spec: Spec, explanations: Sequence[Explanation]) -> Iterator[Finding]:
-    sets = [" with ".join(name_of(item) for item in one.errors) for one in explanations]
+    sets = [" with ".join(name_of(item) for item in explanation.errors) for explanation in explanations]
     if len(sets) > 1:
         reported = f"the recording cannot tell {' from '.join(sets)}: the correction suits each, the interval has all"
         yield Finding("not_told_apart", reported)

@@ -4,7 +4,7 @@ Candidates are what errs in a part of that family: the moduli of its materials, 
 part, one coefficient of friction, and the rates of springs. All sets of them are fitted, with the zero of the force,
 the smaller sets first. They are compared by Schwarz's criterion, n ln(S / n) + k ln n, for n independent residuals with
 the sum of squares S and k fitted values; errors larger than usual of material and process add their squares over the
-usual ones. Sets within `EVIDENCE` of the best one explain the recording as well: the
+usual ones. Sets within `STRONG_EVIDENCE` of the best one explain the recording as well: the
 recording cannot tell them apart, and whoever corrects the part must allow for each.
 
 Reference
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import CfmError, DataError, SolutionError
-from cfmkit.experiment.calibration import POOR, ModelCurves, fitted_to, has_no_loss, scaled_jacobian
+from cfmkit.experiment.calibration import POOR, ModelCurves, fit_samples, has_no_loss, scaled_jacobian
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.parameters_to_fit import DATA, ZEROS, FitParameter, parameters
 from cfmkit.families import family
@@ -45,13 +45,13 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.parts.assumed_errors import Assumed
 
-EVIDENCE = 10.0
+STRONG_EVIDENCE = 10.0
 """Difference of Schwarz's criterion from which one explanation is preferred to another."""
 
 MOST_ERRORS = 3
 """Errors that are fitted at once: a force curve has hardly more independent features."""
 
-RESOLUTION = 1e-4
+FORCE_RESOLUTION = 1e-4
 """Part of the largest force below which residuals say nothing: curves are linear between their points."""
 
 LARGEST_FACTOR = 3.0
@@ -69,10 +69,10 @@ LARGEST_OVERTRAVEL = 1.25
 LARGEST_UNCERTAINTY_OF_ZERO = 0.003
 """Standard deviation of the zero of the force, over the largest force, beyond which it is not fitted."""
 
-UNUSUAL = 0.1
+USUAL_DEVIATION = 0.1
 """Standard deviation of a modulus or a rate of which nothing else is known, as a share of it."""
 
-TOLERANCE = 1e-7
+FIT_TOLERANCE = 1e-7
 """Relative change of values at which fits end: far below their intervals."""
 
 LEAST_FRICTION = 1e-6
@@ -98,14 +98,14 @@ class Explanation:
     @property
     def values(self) -> FloatArray:
         """Fitted values of the errors, (n,) [SI]."""
-        found: FloatArray = self.calibration.fit.values[self._places]
-        return found
+        values: FloatArray = self.calibration.fit.values[self._places]
+        return values
 
     @property
     def covariance(self) -> FloatArray:
         """Covariance of these values, the zeros of the recording being unknown, too, (n, n) [SI]."""
-        found: FloatArray = self.calibration.fit.covariance[np.ix_(self._places, self._places)]
-        return found
+        covariance: FloatArray = self.calibration.fit.covariance[np.ix_(self._places, self._places)]
+        return covariance
 
     @property
     def quantile(self) -> float:
@@ -250,7 +250,7 @@ def explain(
         before = before.of_the_mean()
         candidates = tuple(item for item in candidates if not item.path.endswith("friction"))
     if fit is not None:
-        fits = [fitted_to(before, curves, candidates, "linear", TOLERANCE)]
+        fits = [fit_samples(before, curves, candidates, "linear", FIT_TOLERANCE)]
     else:
         zeros = () if tared else _zeros(spec, source, before)
         told = Distinction.of(curves, before, (*candidates, *zeros))
@@ -260,7 +260,7 @@ def explain(
     explanations = _ranked(fits, before, assumed(curves.spec))
     best = explanations[0]
     _check_best(best, before, source)
-    return tuple(_irreducible([one for one in explanations if one.criterion <= best.criterion + EVIDENCE]))
+    return tuple(_irreducible([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))
 
 
 def _check_travel(motion: FloatArray, source: MeasuredCurves, spec: Spec) -> None:
@@ -315,7 +315,7 @@ class Distinction:
             If the model has no value at some of the samples.
         """
         level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
-        noise = max(_noise(before), RESOLUTION * level)
+        noise = max(_noise(before), FORCE_RESOLUTION * level)
         return cls(parameters, scaled_jacobian(curves, before, parameters), noise, level)
 
     def deviations(self, chosen: Sequence[FitParameter]) -> FloatArray:
@@ -323,8 +323,8 @@ class Distinction:
         columns = self.jacobian[:, [self.parameters.index(item) for item in chosen]]
         _, singular, right = np.linalg.svd(columns, full_matrices=False)
         least = 1e-12 * float(singular.max(initial=0.0)) or 1e-300
-        found: FloatArray = self.noise * np.sqrt((right.T**2 / np.maximum(singular, least) ** 2).sum(axis=1))
-        return found
+        deviations: FloatArray = self.noise * np.sqrt((right.T**2 / np.maximum(singular, least) ** 2).sum(axis=1))
+        return deviations
 
     def zero_is_told(self, zeros: Sequence[FitParameter]) -> bool:
         """Return True if the zero of the force is told from all errors of a part that have an effect."""
@@ -342,12 +342,12 @@ class Distinction:
 
 def _noise(before: Comparison) -> float:
     """Return the standard deviation of neighbouring samples about the line through them [N or N m]."""
-    each = []
+    efforts = []
     for item in before.samples:
         for cycle in np.unique(item.cycle):
             effort = item.effort[item.cycle == cycle]
-            each.append(effort[np.argsort(item.motion[item.cycle == cycle], kind="stable")])
-    bends = np.concatenate([np.diff(effort, 2) for effort in each])
+            efforts.append(effort[np.argsort(item.motion[item.cycle == cycle], kind="stable")])
+    bends = np.concatenate([np.diff(effort, 2) for effort in efforts])
     return float(robust_scale(bends)) / sqrt(6.0)
 
 
@@ -368,34 +368,34 @@ def _fits(
                 continue
             tell(" and ".join(name_of(item) for item in chosen) or "no error")
             try:
-                fit = fitted_to(before, curves, (*chosen, *zeros), "linear", TOLERANCE)
+                fit = fit_samples(before, curves, (*chosen, *zeros), "linear", FIT_TOLERANCE)
             except CfmError:  # no such part exists, or none that could be measured so
                 continue
             level = min(level, _criterion(fit, before, 1.0))
             yield fit
-        if count and level >= best - EVIDENCE:
+        if count and level >= best - STRONG_EVIDENCE:
             return
         best = level
 
 
 def _surprise(fit: Calibration, expected: Assumed | None) -> float:
     """Return the squares of fitted errors over what is usual of material and process, added up."""
-    found = 0.0
+    total = 0.0
     for item, value in zip(fit.parameters, fit.fit.values, strict=True):
-        usual = item.size if item.path.endswith("friction") else UNUSUAL * item.size
+        usual = item.size if item.path.endswith("friction") else USUAL_DEVIATION * item.size
         if item.path.endswith(".youngs_modulus") and expected is not None and expected.modulus is not None:
             usual = max(abs(end - item.start) for end in expected.modulus) / 2.0
         elif is_thickness(item) and expected is not None:
             usual = expected.process.thickness
-        found += 0.0 if item.path.startswith(DATA) else ((float(value) - item.start) / usual) ** 2
-    return found
+        total += 0.0 if item.path.startswith(DATA) else ((float(value) - item.start) / usual) ** 2
+    return total
 
 
 def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
     """Return Schwarz's criterion, residuals counting as one in groups of `inflation`."""
     residuals = fit.fit.residuals
     count, level = len(residuals), float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
-    power = float(residuals @ residuals) / count + (RESOLUTION * level) ** 2
+    power = float(residuals @ residuals) / count + (FORCE_RESOLUTION * level) ** 2
     independent = count / inflation
     return independent * float(np.log(power / level**2)) + len(fit.parameters) * float(np.log(independent))
 
@@ -407,16 +407,16 @@ def _ranked(fits: list[Calibration], before: Comparison, expected: Assumed | Non
     """
     closest = min(fits, key=lambda fit: float(fit.fit.residuals @ fit.fit.residuals))
     inflation = closest.fit.inflation
-    found = [Explanation(fit, _criterion(fit, before, inflation) + _surprise(fit, expected)) for fit in fits]
-    return sorted(found, key=lambda one: one.criterion)
+    ranked = [Explanation(fit, _criterion(fit, before, inflation) + _surprise(fit, expected)) for fit in fits]
+    return sorted(ranked, key=lambda item: item.criterion)
 
 
-def _irreducible(found: Sequence[Explanation]) -> Iterator[Explanation]:
+def _irreducible(explanations: Sequence[Explanation]) -> Iterator[Explanation]:
     """Yield the explanations of which no part explains as much."""
-    for one in found:
-        mine = {item.path for item in one.errors}
-        if not any({item.path for item in other.errors} < mine for other in found):
-            yield one
+    for explanation in explanations:
+        paths = {item.path for item in explanation.errors}
+        if not any({item.path for item in smaller.errors} < paths for smaller in explanations):
+            yield explanation
 
 
 def _check_best(best: Explanation, before: Comparison, source: MeasuredCurves) -> None:

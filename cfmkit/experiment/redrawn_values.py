@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.errors import CfmError, SolutionError
-from cfmkit.experiment.aimed_curve import N_PLACES, analyzed
+from cfmkit.experiment.aimed_curve import N_PLACES, analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE, function_named
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
 MOST_CHANGE = 3.0
 """Factor by which a drawn value may change where the design does not limit it."""
 
-RELUCTANCE = {"width": 1e-4, "thickness": 1e-3}
+SECTION_RELUCTANCE = {"width": 1e-4, "thickness": 1e-3}
 """Deviation of the force that is accepted for not changing a value at all: widths do not change stress or shape."""
 
 OTHER_RELUCTANCE = 1e-2
 """The same of any other value."""
 
-DIGITS = 5
+N_DIGITS = 5
 """Digits of a corrected value: a leaf of 0.25 mm to 10 nm, a millionth of its force."""
 
-CLOSE = 2e-3
+CLOSE_DEPARTURE = 2e-3
 """Root mean square departure from the aim, over its level, with which no more values are changed."""
 
 MEAN_WEIGHT = 10.0
@@ -55,10 +55,10 @@ MEAN_WEIGHT = 10.0
 MISSED_WEIGHT = 3.0
 """How much missing another requirement by a share counts, over missing the force by as much."""
 
-MARGIN = 1e-3
+REQUIREMENT_MARGIN = 1e-3
 """Part of its bound by which a requirement is to be met: values are rounded afterwards."""
 
-DIFFERENCE, MAX_STEPS = 1e-4, 40
+RELATIVE_STEP, MAX_STEPS = 1e-4, 40
 """Relative change of a value for derivatives, and steps of a search, which usually takes five."""
 
 NO_CURVE = 10.0
@@ -75,7 +75,7 @@ class NotMakeable(SolutionError):
 
 
 @dataclass(frozen=True)
-class Limit:
+class DrawnRange:
     """Within which limits a drawn value may move, and what sets them."""
 
     low: float
@@ -83,7 +83,7 @@ class Limit:
     least: str = "the design's own limit"  # what the lower one is
 
 
-def limits_of(spec: Spec) -> dict[str, Limit]:
+def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     """Return which values of a drawing may change, each with its limits [SI].
 
     These are the values that the design chooses, and widths and thicknesses; not widths that a sheet decides, nor what
@@ -97,7 +97,7 @@ def limits_of(spec: Spec) -> dict[str, Limit]:
     stated = family(spec.family).errors
     kinds: dict[str, str] = {} if stated is None else dict(function_named(stated)(spec))
     design = getattr(spec, "design", None)
-    ranges = {path: _widened(float(spec.at(path)), *ends) for path, ends in free_of(spec, spec).items()}
+    ranges = {path: _widen(float(spec.at(path)), *ends) for path, ends in free_of(spec, spec).items()}
     if not getattr(design, "free", None):
         for path in _sections(spec):
             value = float(spec.at(path))
@@ -108,20 +108,20 @@ def limits_of(spec: Spec) -> dict[str, Limit]:
         ranges = {path: around(float(spec.at(path))) for path in places if float(spec.at(path))}
     sheet, process = sheet_of(getattr(spec.at("mechanism"), "part", None)), assumed(spec)
     fixed = {f"mechanism.{key}" for key in spec.out_of_plane_widths} if sheet is not None else set()
-    found = {}
+    limits = {}
     for path, (low, high) in ranges.items():
         if path in fixed:
             continue
-        limit = Limit(low, high)
+        limit = DrawnRange(low, high)
         if process is not None and _is_section(path) and process.process.least_feature > low:
             thinnest = min(process.process.least_feature, float(spec.at(path)))
-            limit = Limit(thinnest, max(high, thinnest), f"the least that {process.process.name} makes")
+            limit = DrawnRange(thinnest, max(high, thinnest), f"the least that {process.process.name} makes")
         if limit.low < limit.high:
-            found[path] = limit
-    return found
+            limits[path] = limit
+    return limits
 
 
-def _widened(value: float, low: float, high: float) -> tuple[float, float]:
+def _widen(value: float, low: float, high: float) -> tuple[float, float]:
     """Return a range in which a value may be corrected: limits that a design states hold, others are wider."""
     least, most = around(value)
     return (
@@ -145,7 +145,7 @@ def _index(path: str) -> str:
 
 
 def _is_section(path: str) -> bool:
-    return _kind(path) in RELUCTANCE
+    return _kind(path) in SECTION_RELUCTANCE
 
 
 def _kind(path: str) -> str:
@@ -159,7 +159,7 @@ class Redesign:
     drawn: Spec
     explanations: tuple[Explanation, ...]
     aim: AimedCurve
-    limits: Mapping[str, Limit]
+    limits: Mapping[str, DrawnRange]
     missed_before: float = 0.0  # by what share of its bound a requirement is missed by the design itself
     of_envelope: bool = False  # whether of all requirements those on the envelope matter alone
 
@@ -205,38 +205,40 @@ class Redesign:
                 "nothing that is made may change: the design says of no value that it is free; state 'design.free'"
             )
         kinds = [_kind(path) for path in self.limits]
-        stages = [[k for k, kind in enumerate(kinds) if kind in names] for names in (("width",), tuple(RELUCTANCE))]
-        best = self._compensated()
-        if self._cost(best) <= CLOSE:
+        stages = [
+            [k for k, kind in enumerate(kinds) if kind in names] for names in (("width",), tuple(SECTION_RELUCTANCE))
+        ]
+        best = self._compensate()
+        if self._cost(best) <= CLOSE_DEPARTURE:
             return best
         for free in dict.fromkeys((*map(tuple, stages), tuple(range(len(kinds))))):
             if free:
-                best = min(self._solved(list(free), best), best, key=self._cost)
-                if self._cost(best) <= CLOSE:
+                best = min(self._solve_for(list(free), best), best, key=self._cost)
+                if self._cost(best) <= CLOSE_DEPARTURE:
                     break
         return best
 
-    def _compensated(self) -> FloatArray:
+    def _compensate(self) -> FloatArray:
         """Return the values of leaves that are drawn thinner by as much as they are made thicker, (n,) [SI].
 
         As drawn where the recording may be explained without an error of the thickness.
         """
-        if not all(any(is_thickness(item) for item in one.errors) for one in self.explanations):
+        if not all(any(is_thickness(item) for item in explanation.errors) for explanation in self.explanations):
             return self.start
         changes: dict[str, float] = {}
         for item, value in zip(self.explanations[0].errors, self.explanations[0].values, strict=True):
             if is_thickness(item):
                 changes |= item.changes(self.drawn, 2.0 * item.start - float(value))
         x = [changes.get(path, value) for path, value in zip(self.limits, self.start.tolist(), strict=True)]
-        return self._written(np.array(x))
+        return self._round(np.array(x))
 
-    def _written(self, x: FloatArray) -> FloatArray:
+    def _round(self, x: FloatArray) -> FloatArray:
         """Return values with the digits that are written, within their limits, (n,) [SI]."""
         low, high = self._ends
-        digits = np.array([float(f"{value:.{DIGITS}g}") for value in x])
+        digits = np.array([float(f"{value:.{N_DIGITS}g}") for value in x])
         return np.where(np.isclose(x, self.start), self.start, np.clip(digits, low, high))
 
-    def _solved(self, free: list[int], start: FloatArray) -> FloatArray:
+    def _solve_for(self, free: list[int], start: FloatArray) -> FloatArray:
         """Return the values of which some have been moved from a start, (n,) [SI]."""
         from scipy.optimize import least_squares
 
@@ -252,11 +254,11 @@ class Redesign:
             return self._residuals(whole(z))
 
         inside = np.clip(start[free] / size[free], low + 1e-9, high - 1e-9)
-        steps = np.full(len(free), DIFFERENCE)
-        found = least_squares(
+        steps = np.full(len(free), RELATIVE_STEP)
+        solution = least_squares(
             residuals, inside, bounds=(low, high), diff_step=steps, xtol=1e-8, ftol=1e-8, max_nfev=MAX_STEPS
         )
-        return self._written(whole(found.x))
+        return self._round(whole(solution.x))
 
     def _cost(self, x: FloatArray) -> float:
         """Return the root mean square departure from the aim, with what is missed of requirements."""
@@ -267,19 +269,19 @@ class Redesign:
         share = (len(self.aim.places) * len(self.aim.efforts) * len(self.explanations)) ** -0.5
         mean_weight = MEAN_WEIGHT * len(self.explanations) ** -0.5
         departures, missed = [], 0.0
-        for number, one in enumerate(self.explanations):
+        for number, explanation in enumerate(self.explanations):
             try:
-                result = analyzed(one.part_of(self.drawing(x)))
+                result = analyze_part(explanation.part_of(self.drawing(x)))
                 departure = self.aim.departure(result.curves)
                 departures += [share * departure, np.array([mean_weight * float(np.nanmean(departure))])]
                 if number == 0:
-                    missed = max(0.0, share_missed(result, self.of_envelope) - self.missed_before)
+                    missed = max(0.0, largest_miss(result, self.of_envelope) - self.missed_before)
             except (CfmError, ValueError):
                 departures.append(np.full(len(self.aim.places) * len(self.aim.efforts) + 1, NO_CURVE * share))
-        found = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)
-        reluctance = np.array([RELUCTANCE.get(_kind(path), OTHER_RELUCTANCE) for path in self.limits])
+        curve_errors = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)
+        reluctance = np.array([SECTION_RELUCTANCE.get(_kind(path), OTHER_RELUCTANCE) for path in self.limits])
         moved: FloatArray = reluctance * (x - self.start) / self._size
-        return np.concatenate([found, [MISSED_WEIGHT * missed], moved])
+        return np.concatenate([curve_errors, [MISSED_WEIGHT * missed], moved])
 
     def not_makeable(self, x: FloatArray, force: float) -> NotMakeable:
         """Return why no part has the force, and the nearest force that one has."""
@@ -311,8 +313,8 @@ def dimension_of(spec: Spec, path: str) -> str:
     return quantity.dimensions[0] if quantity else "ratio"
 
 
-def share_missed(result: Result, of_envelope: bool = False) -> float:
-    """Return by what share of its bound a requirement is missed, or met by less than `MARGIN`, the largest.
+def largest_miss(result: Result, of_envelope: bool = False) -> float:
+    """Return by what share of its bound a requirement is missed, or met by less than `REQUIREMENT_MARGIN`, the largest.
 
     `of_envelope`: of the requirements on the envelope alone.
     """
@@ -323,5 +325,5 @@ def share_missed(result: Result, of_envelope: bool = False) -> float:
             continue
         for bound, way in ((outcome.max, 1.0), (outcome.min, -1.0)):
             if bound is not None:
-                shares.append(way * (outcome.value - bound) / (abs(bound) or 1.0) + MARGIN)
+                shares.append(way * (outcome.value - bound) / (abs(bound) or 1.0) + REQUIREMENT_MARGIN)
     return max(shares)

@@ -174,7 +174,7 @@ def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> FittedValues:
     return _fit(problem, best, loss)
 
 
-def nothing_fitted(problem: LeastSquares) -> FittedValues:
+def evaluate_start(problem: LeastSquares) -> FittedValues:
     """Return the residuals of a problem without parameters, as the outcome of a fit."""
     empty = np.zeros(0)
     residuals = problem.residuals(empty)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.documents.run_outcome import Report
-    from cfmkit.experiment.correction import Correction
+    from cfmkit.experiment.correction import DesignCorrection
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import Spec
@@ -37,7 +37,7 @@ N_ROWS_ON_PAGE = 8
 
 
 @dataclass(frozen=True)
-class Row:
+class CorrectedValue:
     """One value of the part before, and of the corrected one, in SI; ends of 95 % intervals where they are known."""
 
     name: str
@@ -65,33 +65,35 @@ class Row:
     @property
     def numbers(self) -> dict[str, Any]:
         """The same in border units; None where there is no interval."""
-        each: dict[str, float | None] = {"before": self.before, "after": self.after}
+        numbers: dict[str, float | None] = {"before": self.before, "after": self.after}
         for name, ends in (("before", self.before_ends), ("after", self.after_ends)):
-            each |= {f"{name}_low_95": ends and ends[0], f"{name}_high_95": ends and ends[1]}
-        shown = {key: None if value is None else float(to_border(value, self.dimension)) for key, value in each.items()}
+            numbers |= {f"{name}_low_95": ends and ends[0], f"{name}_high_95": ends and ends[1]}
+        shown = {
+            key: None if value is None else float(to_border(value, self.dimension)) for key, value in numbers.items()
+        }
         return {"value": self.name, "unit": border_unit(self.dimension), **shown}
 
 
-def corrected(source: MeasuredCurves, fit: str | None, tared: bool, spec: Spec, run: Run) -> Report:
+def report_on_corrected(source: MeasuredCurves, fit: str | None, tared: bool, spec: Spec, run: Run) -> Report:
     """Return the report on the corrected design: its metrics are those of the part that will be made of it."""
     drawn = api.resolve(spec)
     try:
-        found = correct(drawn, source, None if fit is None else fit.split(","), tared, run)
+        correction = correct(drawn, source, None if fit is None else fit.split(","), tared, run)
     except NotMakeable as problem:
         failed = Design(None, Status.INFEASIBLE, str(problem), nearest_feasible=problem.nearest)
         return report_on(undesigned(drawn, failed), failed)
-    return report_of(found, source, tared or fit is not None)
+    return report_of(correction, source, tared or fit is not None)
 
 
-def report_of(found: Correction, source: MeasuredCurves, zero_known: bool) -> Report:
+def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: bool) -> Report:
     """Return the report on a correction."""
-    calibration = found.explanation.calibration
+    calibration = correction.explanation.calibration
     after = calibration.after
-    rows = rows_of(found)
-    made = replace(found.predicted, spec=found.corrected)
-    report = report_on(made, Design(found.corrected, Status.COMPLETE))
+    rows = rows_of(correction)
+    made = replace(correction.predicted, spec=correction.corrected)
+    report = report_on(made, Design(correction.corrected, Status.COMPLETE))
     files = {
-        **dict(_specs(found)),
+        **dict(_specs(correction)),
         "correction.csv": lambda: to_csv(_table(rows)),
         "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
         **add.comparison_files(source),
@@ -104,44 +106,46 @@ def report_of(found: Correction, source: MeasuredCurves, zero_known: bool) -> Re
         report,
         metrics=dict(report.metrics) | after.metrics() | after.loss(),
         supplement=Supplement(
-            add.comparison_data(after, source) | add.calibration_data(calibration) | {"correction": _data(found, rows)},
+            add.comparison_data(after, source)
+            | add.calibration_data(calibration)
+            | {"correction": _data(correction, rows)},
             files,
-            tuple(_lines(found, zero_known)),
-            (*add.comparison_warnings(after, source), *calibration.warnings, *found.warnings),
+            tuple(_lines(correction, zero_known)),
+            (*add.comparison_warnings(after, source), *calibration.warnings, *correction.warnings),
             shortfall=add.shortfall(after),
-            figures=add.comparison_figures(after, found.drawn.name, calibration.before),
+            figures=add.comparison_figures(after, correction.drawn.name, calibration.before),
             tables=(table,),
         ),
     )
 
 
-def rows_of(found: Correction) -> tuple[Row, ...]:
+def rows_of(correction: DesignCorrection) -> tuple[CorrectedValue, ...]:
     """Return what is drawn anew, then forces and stress of the part that was made and of the one that will be."""
     drawn = [
-        Row(path.removeprefix("mechanism."), dimension_of(found.drawn, path), before, now)
-        for path, (before, now) in found.changes.items()
+        CorrectedValue(path.removeprefix("mechanism."), dimension_of(correction.drawn, path), before, now)
+        for path, (before, now) in correction.changes.items()
     ]
-    kind = found.nominal.curve.kind
-    forces = found.before, found.after
+    kind = correction.nominal.curve.kind
+    forces = correction.before, correction.after
     ends = [(force.low, force.high) for force in forces]
-    mean = Row(f"mean {kind}", kind, forces[0].value, forces[1].value, *ends)
-    return (*drawn, mean, *_metrics(found, kind))
+    mean = CorrectedValue(f"mean {kind}", kind, forces[0].value, forces[1].value, *ends)
+    return (*drawn, mean, *_metrics(correction, kind))
 
 
-def _metrics(found: Correction, kind: str) -> Iterator[Row]:
+def _metrics(correction: DesignCorrection, kind: str) -> Iterator[CorrectedValue]:
     names = [f"{kind}_{name}" if name in ("ripple", "max") else name for name in SHOWN_METRICS]
-    before, after = evaluate(found.built), evaluate(found.predicted)
+    before, after = evaluate(correction.built), evaluate(correction.predicted)
     for name in names:
         old, new = before.get(name), after.get(name)
         if old is not None and new is not None and old.value is not None and new.value is not None:
-            yield Row(words(name), new.dimension, old.value, new.value)
+            yield CorrectedValue(words(name), new.dimension, old.value, new.value)
 
 
-def _lines(found: Correction, zero_known: bool) -> Iterator[tuple[str, str]]:
-    """Yield what was found in the part, and what is done about it."""
-    calibration, kind = found.explanation.calibration, found.nominal.curve.kind
-    for explanation in found.explanations:
-        word = "found" if explanation is found.explanation else "or"
+def _lines(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str, str]]:
+    """Yield what was correction in the part, and what is done about it."""
+    calibration, kind = correction.explanation.calibration, correction.nominal.curve.kind
+    for explanation in correction.explanations:
+        word = "found" if explanation is correction.explanation else "or"
         yield word, "; ".join(explanation.sentences) or "no error of the part that the recording shows"
     zero = calibration.zeros.effort
     if zero:
@@ -152,29 +156,31 @@ def _lines(found: Correction, zero_known: bool) -> Iterator[tuple[str, str]]:
     if (factor := loss.get("data_loss_factor")) is not None and factor.value is not None:
         area = format_short(loss["data_loss"].value or 0.0, "energy", 3)
         yield "loss", f"a measured cycle loses {area}, loss factor {factor.value:.3g}"
-    wanted, reached = (format_short(value, kind, 4) for value in (found.target, found.before.value))
-    if not found.changes:
+    wanted, reached = (format_short(value, kind, 4) for value in (correction.target, correction.before.value))
+    if not correction.changes:
         yield "corrected", f"{WITHIN_SCATTER}: the mean {kind} is {reached}"
         return
     yield "corrected", f"for {wanted} instead of {reached}; the next part is assumed to be made with the same errors"
-    if found.will_be_made != found.corrected:
+    if correction.will_be_made != correction.corrected:
         yield "made", "this page is of the part as it will be made: predicted.yaml; design.yaml is what is drawn"
 
 
-def _specs(found: Correction) -> Iterator[tuple[str, Any]]:
+def _specs(correction: DesignCorrection) -> Iterator[tuple[str, Any]]:
     """Yield the parts with their errors as specifications, where a specification can say so."""
-    parts = {"calibrated.yaml": found.made} | ({"predicted.yaml": found.will_be_made} if found.changes else {})
+    parts = {"calibrated.yaml": correction.made} | (
+        {"predicted.yaml": correction.will_be_made} if correction.changes else {}
+    )
     for name, part in parts.items():
         text = api.dumps(part)
         try:
             api.loads(text, name)
         except SpecError:  # a spring that is not as its wire says
             continue
-        if part not in (found.drawn, found.corrected):
+        if part not in (correction.drawn, correction.corrected):
             yield name, partial(str.encode, text)
 
 
-def _table(rows: tuple[Row, ...]) -> Table:
+def _table(rows: tuple[CorrectedValue, ...]) -> Table:
     records = [row.numbers for row in rows]
     columns = []
     for name in records[0]:
@@ -183,12 +189,13 @@ def _table(rows: tuple[Row, ...]) -> Table:
     return Table(tuple(columns))
 
 
-def _data(found: Correction, rows: tuple[Row, ...]) -> dict[str, Any]:
+def _data(correction: DesignCorrection, rows: tuple[CorrectedValue, ...]) -> dict[str, Any]:
     """Return what metrics.json says of a correction."""
     return {
-        "within_scatter": not found.changes,
+        "within_scatter": not correction.changes,
         "values": [row.numbers for row in rows],
         "explanations": [
-            {"errors": [item.label for item in one.errors], "criterion": one.criterion} for one in found.explanations
+            {"errors": [error.label for error in item.errors], "criterion": item.criterion}
+            for item in correction.explanations
         ],
     }

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.api import AnySpec
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.correction import Correction
+    from cfmkit.experiment.correction import DesignCorrection
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.low_pass import LowPass
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
@@ -208,7 +208,7 @@ def calibrate(
     if loss not in LOSSES:
         raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
     start = resolve(spec)
-    source = _measured_of(data, units, tare, zero, flip, cycles, group)
+    source = _read_curves(data, units, tare, zero, flip, cycles, group)
     given = bounds or {}
     texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
     numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}
@@ -229,7 +229,7 @@ def correct(
     flip: str | Iterable[str] = (),
     cycles: str | None = None,
     group: str | None = None,
-) -> Correction:
+) -> DesignCorrection:
     """Return a design corrected by the recording of a part that was made of it.
 
     Parameters
@@ -257,14 +257,14 @@ def correct(
     >>> found.changes  # within the scatter: nothing to correct
     {}
     """
-    from cfmkit.experiment.correction import correct as found_correction
+    from cfmkit.experiment.correction import correct as correct_design
 
-    source = _measured_of(data, units, tare, zero, flip, cycles, group)
+    source = _read_curves(data, units, tare, zero, flip, cycles, group)
     paths = fit.split(",") if isinstance(fit, str) else fit
-    return found_correction(resolve(spec), source, paths, tare is not None)
+    return correct_design(resolve(spec), source, paths, tare is not None)
 
 
-def _measured_of(
+def _read_curves(
     data: str | os.PathLike[str] | Recording | MeasuredCurves,
     units: str | None,
     tare: str | float | None,

@@ -47,7 +47,7 @@ def run(options: CorrectOptions, terminal: Terminal) -> Document:
     """Correct a design by the recording of its part: what differs is fitted, what is made is drawn anew."""
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.errors import UsageError
-    from cfmkit.runs.correct import corrected
+    from cfmkit.runs.correct import report_on_corrected
     from cfmkit.runs.run import Verb
 
     if options.fit is not None and not options.fit.strip():
@@ -55,6 +55,6 @@ def run(options: CorrectOptions, terminal: Terminal) -> Document:
     source = read_measured(options.data, options)
     fit = [] if options.fit is None else ["--fit", options.fit]
     words = (options.data, *fit, *chain(*measuring_words(options)))
-    compute = partial(corrected, source, options.fit, options.tare is not None)
+    compute = partial(report_on_corrected, source, options.fit, options.tare is not None)
     verb = Verb("correct", "corrected", compute, data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)
