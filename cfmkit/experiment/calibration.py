@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-POOR = 0.3
+POORLY_DETERMINED = 0.3
 """Parameters whose half interval exceeds this part of their size are reported as poorly determined."""
 
 BY_CHANCE = 1e-3
@@ -54,10 +54,10 @@ SWING = 0.2
 UNKNOWN = 1.0
 """Parameters whose half interval exceeds this part of their size cannot be determined."""
 
-ALIKE = 1e-7
+ALIKE_RTOL = 1e-7
 """Branches of a model that differ by less than this part of the force are one: it has no losses."""
 
-TIED = 0.999
+TIED_CORRELATION = 0.999
 """Parameters more correlated than this are reported as poorly distinguished."""
 
 CANNOT = "cannot be determined from this recording"
@@ -112,7 +112,7 @@ class ModelCurves:
         changes = self._changes(parameters, values)
         return self.spec.replace(changes, self.as_made) if changes else self.spec
 
-    def at(self, parameters: Sequence[FitParameter], values: FloatArray) -> Curve:
+    def solve_at(self, parameters: Sequence[FitParameter], values: FloatArray) -> Curve:
         """Return the curve of that specification.
 
         Raises
@@ -233,11 +233,11 @@ def has_no_loss(curves: ModelCurves, before: Comparison, parameters: Sequence[Fi
     branches = {item.model_branch for item in before.samples}
     if len(branches) == 1:
         return True
-    trials = (curves.at([item], np.array([item.start + _step(item)])) for item in parameters)
+    trials = (curves.solve_at([item], np.array([item.start + _step(item)])) for item in parameters)
     places = np.linspace(before.window.lo, before.window.hi, 65)[1:-1]
     for curve in (before.curve, *trials):
         up, down = (model_at(curve, branch, places) for branch in sorted(branches))
-        if not np.nanmax(np.abs(up - down)) <= ALIKE * np.nanmax(np.abs(up)):
+        if not np.nanmax(np.abs(up - down)) <= ALIKE_RTOL * np.nanmax(np.abs(up)):
             return False
     return True
 
@@ -277,7 +277,7 @@ def _problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitPa
 
     def residuals(values: FloatArray) -> FloatArray:
         try:
-            curve = curves.at(parameters, values)
+            curve = curves.solve_at(parameters, values)
         except CfmError:
             return nothing  # the solver then takes a shorter step
         zeros = _zeros(parameters, values)
@@ -332,7 +332,7 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
             found.append(
                 Finding("weakly_identified", f"{item.label} {CANNOT}: fit fewer values, or give it with --set")
             )
-        elif half[k] > POOR * item.size:
+        elif half[k] > POORLY_DETERMINED * item.size:
             found.append(
                 Finding(
                     "weakly_identified",
@@ -340,7 +340,7 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
                 )
             )
         for other in range(k):
-            if abs(fit.correlation[k, other]) > TIED:
+            if abs(fit.correlation[k, other]) > TIED_CORRELATION:
                 reported = f"{parameters[other].label} and {item.label} are poorly distinguished"
                 found.append(Finding("weakly_identified", f"{reported} (correlation {fit.correlation[k, other]:.5f})"))
     if not fit.converged:

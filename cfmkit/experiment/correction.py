@@ -148,7 +148,7 @@ def correct(
         for path, value in zip(redesign.limits, x, strict=True)
         if abs(value / float(spec.at(path)) - 1.0) > 1e-5
     }
-    stated = _with_modulus(corrected, best) if len(explanations) == 1 else corrected
+    stated = _state_modulus(corrected, best) if len(explanations) == 1 else corrected
     return DesignCorrection(
         spec, stated, made, will_be_made, explanations, aim, nominal, built, predicted, before, after, changes,
         tuple(_warnings(spec, explanations)),
@@ -188,7 +188,7 @@ def _interval(explanation: Explanation, drawn: Spec, aim: AimedCurve, zero: floa
     return PredictedForce(here, here - half, here + half)
 
 
-def _with_modulus(corrected: Spec, best: Explanation) -> Spec:
+def _state_modulus(corrected: Spec, best: Explanation) -> Spec:
     """Return a corrected drawing with the fitted moduli: the other errors are those of the process."""
     changes: dict[str, float] = {}
     for item, value in zip(best.errors, best.values, strict=True):

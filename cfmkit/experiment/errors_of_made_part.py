@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import CfmError, DataError, SolutionError
-from cfmkit.experiment.calibration import POOR, ModelCurves, fit_samples, has_no_loss, scaled_jacobian
+from cfmkit.experiment.calibration import POORLY_DETERMINED, ModelCurves, fit_samples, has_no_loss, scaled_jacobian
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.parameters_to_fit import DATA, ZEROS, FitParameter, parameters
 from cfmkit.families import family
@@ -253,7 +253,7 @@ def explain(
         fits = [fit_samples(before, curves, candidates, "linear", FIT_TOLERANCE)]
     else:
         zeros = () if tared else _zeros(spec, source, before)
-        told = Distinction.of(curves, before, (*candidates, *zeros))
+        told = Distinction.estimate(curves, before, (*candidates, *zeros))
         fits = list(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
     if not fits:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
@@ -298,7 +298,7 @@ def _zeros(spec: Spec, source: MeasuredCurves, before: Comparison) -> tuple[FitP
 
 @dataclass(frozen=True)
 class Distinction:
-    """How well a recording tells parameters from each other, by linear estimate at the start."""
+    """Distinction of parameters by a recording, by linear estimate at the start."""
 
     parameters: tuple[FitParameter, ...]
     jacobian: FloatArray  # (n, p) derivatives of the residuals by the parameters in their sizes [N or N m]
@@ -306,7 +306,7 @@ class Distinction:
     level: float  # largest force or torque [N or N m]
 
     @classmethod
-    def of(cls, curves: ModelCurves, before: Comparison, parameters: tuple[FitParameter, ...]) -> Distinction:
+    def estimate(cls, curves: ModelCurves, before: Comparison, parameters: tuple[FitParameter, ...]) -> Distinction:
         """Return it for the samples of a recording beside the start.
 
         Raises
@@ -337,7 +337,7 @@ class Distinction:
     def are_told(self, errors: Sequence[FitParameter], zeros: Sequence[FitParameter]) -> bool:
         """Return True if the recording determines each of some errors beside the others and the zeros."""
         deviations = self.deviations((*errors, *zeros))[: len(errors)]
-        return bool((2.0 * deviations <= POOR).all())
+        return bool((2.0 * deviations <= POORLY_DETERMINED).all())
 
 
 def _noise(before: Comparison) -> float:

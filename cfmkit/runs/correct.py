@@ -1,4 +1,4 @@
-"""What ``cfmkit correct`` reports and writes: the corrected design with a table of before, after and predicted."""
+"""Report and files of ``cfmkit correct``: the corrected design, a table of before, after and predicted."""
 
 from __future__ import annotations
 
