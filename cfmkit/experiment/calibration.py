@@ -389,4 +389,7 @@ def table(calibration: Calibration) -> list[dict[str, Any]]:
     return records
 
 
-__all__ = ["CANNOT", "FINDINGS", "UNKNOWN", "Calibration", "Samples", "calibrate", "resolved", "table"]
+__all__ = [
+    "CANNOT", "FINDINGS", "POORLY_DETERMINED", "UNKNOWN", "Calibration", "ModelCurves", "Samples", "calibrate",
+    "fit_samples", "has_no_loss", "resolved", "scaled_jacobian", "table",
+]  # fmt: skip
