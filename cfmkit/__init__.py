@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.runs.batch import BatchResult, batch
     from cfmkit.runs.examples import Example, examples
-    from cfmkit.runs.measure_and_calibrate_api import calibrate, measure
+    from cfmkit.runs.measure_and_calibrate_api import calibrate, correct, measure
     from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.study_result import StudyResult
@@ -97,7 +97,7 @@ _HOMES = {
     "cfmkit.experiment.reading": ("Recording",),
     "cfmkit.experiment.measurement_and_calibration_outputs": ("MeasureReport",),
     "cfmkit.families.run_control": ("Run",),
-    "cfmkit.runs.measure_and_calibrate_api": ("calibrate", "measure"),
+    "cfmkit.runs.measure_and_calibrate_api": ("calibrate", "correct", "measure"),
     "cfmkit.runs.notebook_result": ("AnalysisView",),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.specs.spec": ("Spec",),
@@ -137,6 +137,7 @@ __all__ = [
     "batch",
     "calibrate",
     "check",
+    "correct",
     "design",
     "drawing",
     "dumps",

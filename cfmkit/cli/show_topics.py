@@ -359,11 +359,12 @@ def _spec_keys() -> Records:
 
 def _findings() -> Records:
     """Return what a run of a family, of a recording or of a study may warn of."""
-    from cfmkit.experiment import calibration, findings
+    from cfmkit.experiment import calibration, correction, findings
     from cfmkit.studies.findings import FINDINGS
 
     known = [(record.name, record.findings) for record in families.records()]
-    known += [("recordings", findings.FINDINGS), ("calibrate", calibration.FINDINGS), *FINDINGS.items()]
+    known += [("recordings", findings.FINDINGS), ("calibrate", calibration.FINDINGS)]
+    known += [("correct", correction.FINDINGS), *FINDINGS.items()]
     return _gathered(
         (key, {"name": key, "family": name, "meaning": meaning})
         for name, meanings in known

@@ -100,6 +100,7 @@ def document_of(report: Report, command: RunCommand | None = None, files: Writte
         verdict=verdict_of(report),
         headline=headline_of(report),
         metrics=metrics_of(report),
+        tables=report.supplement.tables,
         notes=tuple(_notes(report, command)),
         warnings=tuple(warning_of(item, command) for item in report.warnings if item not in _reasons(report)),
         files=files,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.curves import Curve
+    from cfmkit.documents.document import PageTable
     from cfmkit.metrics import Outcome
     from cfmkit.results import Design, Finding, Quantity
     from cfmkit.specs.spec import Spec
@@ -44,6 +45,7 @@ class Supplement:
     curves: tuple[Curve, ...] = ()  # what curve.csv holds, where that is not what the result has
     shortfall: str = ""  # what was requested in addition to the result and is missing, in one sentence
     figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # more figures: what draws each, by name
+    tables: tuple[PageTable, ...] = ()  # of the page
 
     def plus(self, more: Supplement) -> Supplement:
         """Return both, this one first."""
@@ -55,6 +57,7 @@ class Supplement:
             (*self.curves, *more.curves),
             "; ".join(text for text in (self.shortfall, more.shortfall) if text),
             {**self.figures, **more.figures},
+            (*self.tables, *more.tables),
         )
 
 

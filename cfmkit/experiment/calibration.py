@@ -7,7 +7,7 @@ is fitted; those that they determine badly are fitted and named as such.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from cfmkit.numerics.least_squares import (
     LeastSquares,
     Loss,
     NotFinite,
+    evaluate_start,
     lack_of_fit,
     solve,
     unidentifiable,
@@ -35,12 +36,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.parameters_to_fit import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-POOR = 0.3
+POORLY_DETERMINED = 0.3
 """Parameters whose half interval exceeds this part of their size are reported as poorly determined."""
 
 BY_CHANCE = 1e-3
@@ -52,10 +54,10 @@ SWING = 0.2
 UNKNOWN = 1.0
 """Parameters whose half interval exceeds this part of their size cannot be determined."""
 
-ALIKE = 1e-7
+ALIKE_RTOL = 1e-7
 """Branches of a model that differ by less than this part of the force are one: it has no losses."""
 
-TIED = 0.999
+TIED_CORRELATION = 0.999
 """Parameters more correlated than this are reported as poorly distinguished."""
 
 CANNOT = "cannot be determined from this recording"
@@ -90,6 +92,47 @@ def resolved(spec: Spec) -> Spec:
     return written
 
 
+class ModelCurves:
+    """Curves of a specification with some of its values changed; each is solved once."""
+
+    def __init__(self, spec: Spec, as_made: bool = False) -> None:
+        """Keep what is changed; `as_made`: values are those of one manufactured part, see `Spec.replace`."""
+        self.spec = spec
+        self.as_made = as_made
+        self._solved: dict[tuple[tuple[str, float], ...], Curve] = {}
+
+    def spec_with(self, parameters: Sequence[FitParameter], values: FloatArray) -> Spec:
+        """Return the specification with the values of parameters; those of the recording change nothing.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If they are not valid together.
+        """
+        changes = self._changes(parameters, values)
+        return self.spec.replace(changes, self.as_made) if changes else self.spec
+
+    def solve_at(self, parameters: Sequence[FitParameter], values: FloatArray) -> Curve:
+        """Return the curve of that specification.
+
+        Raises
+        ------
+        cfmkit.errors.CfmError
+            If there is none.
+        """
+        key = tuple(sorted(self._changes(parameters, values).items()))
+        if key not in self._solved:
+            self._solved[key] = _analysed(self.spec_with(parameters, values)).curve
+        return self._solved[key]
+
+    def _changes(self, parameters: Sequence[FitParameter], values: FloatArray) -> dict[str, float]:
+        changes: dict[str, float] = {}
+        for item, value in zip(parameters, values, strict=True):
+            if not item.path.startswith(DATA):
+                changes |= item.changes(self.spec, float(value))
+        return changes
+
+
 def calibrate(
     spec: Spec,
     source: MeasuredCurves,
@@ -117,14 +160,42 @@ def calibrate(
     cfmkit.errors.SolutionError
         If the start has no solution, or the data do not determine the parameters, which are named.
     """
-    before = _compared(spec, source, parameters, window)
-    if _has_no_loss(spec, before, parameters):
+    before, curves = _compared(spec, source, parameters, window), ModelCurves(spec)
+    if has_no_loss(curves, before, parameters):
         before = before.of_the_mean()
-    problem = _problem(spec, before, parameters)
+    return fit_samples(before, curves, parameters, loss)
+
+
+def fit_samples(
+    before: Comparison,
+    curves: ModelCurves,
+    parameters: Sequence[FitParameter],
+    loss: Loss = "soft_l1",
+    tolerance: float = LeastSquares.tolerance,
+) -> Calibration:
+    """Return a specification whose model fits measured samples.
+
+    Parameters
+    ----------
+    before : Comparison
+        The samples beside the start.
+    curves : ModelCurves
+        Of the specification that is fitted.
+    parameters, loss
+        As for `calibrate`.
+    tolerance : float
+        Relative change of values at which the search ends.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If the data do not determine the parameters, which are named.
+    """
+    problem = replace(_problem(curves, before, parameters), tolerance=tolerance)
     _check(problem, problem.start, parameters)
-    fit = solve(problem, loss)
+    fit = solve(problem, loss) if parameters else evaluate_start(problem)
     _check(problem, fit.values, parameters)
-    fitted = _with_values(spec, parameters, fit.values)
+    fitted = curves.spec_with(parameters, fit.values)
     result = _analysed(fitted)
     zeros = _zeros(parameters, fit.values)
     samples, branches = (tuple(item.less(zeros) for item in measured) for measured in (before.samples, before.branches))
@@ -152,7 +223,7 @@ def _compared(
     return compare(result, source, Window(low, high))
 
 
-def _has_no_loss(spec: Spec, before: Comparison, parameters: Sequence[FitParameter]) -> bool:
+def has_no_loss(curves: ModelCurves, before: Comparison, parameters: Sequence[FitParameter]) -> bool:
     """Return whether the model has one force at each place where the measurement has two, whatever is fitted.
 
     Then the branches say together where the model must be, which is between them, and their gap what it leaves out.
@@ -162,12 +233,11 @@ def _has_no_loss(spec: Spec, before: Comparison, parameters: Sequence[FitParamet
     branches = {item.model_branch for item in before.samples}
     if len(branches) == 1:
         return True
-    trials = [spec, *(_with_values(spec, [item], np.array([item.start + _step(item)])) for item in parameters)]
+    trials = (curves.solve_at([item], np.array([item.start + _step(item)])) for item in parameters)
     places = np.linspace(before.window.lo, before.window.hi, 65)[1:-1]
-    for trial in trials:
-        curve = before.curve if trial is spec else _analysed(trial).curve
+    for curve in (before.curve, *trials):
         up, down = (model_at(curve, branch, places) for branch in sorted(branches))
-        if not np.nanmax(np.abs(up - down)) <= ALIKE * np.nanmax(np.abs(up)):
+        if not np.nanmax(np.abs(up - down)) <= ALIKE_RTOL * np.nanmax(np.abs(up)):
             return False
     return True
 
@@ -199,21 +269,15 @@ def _analysed(spec: Spec) -> Result:
     return result
 
 
-def _with_values(spec: Spec, parameters: Sequence[FitParameter], values: FloatArray) -> Spec:
-    changes = {item.path: float(value) for item, value in zip(parameters, values, strict=True)}
-    changes = {path: value for path, value in changes.items() if not path.startswith(DATA)}
-    return spec.replace(changes) if changes else spec
-
-
-def _problem(spec: Spec, before: Comparison, parameters: Sequence[FitParameter]) -> LeastSquares:
-    columns = np.array([(item.start, item.low, item.high, item.size) for item in parameters]).T
+def _problem(curves: ModelCurves, before: Comparison, parameters: Sequence[FitParameter]) -> LeastSquares:
+    columns = np.array([(item.start, item.low, item.high, item.size) for item in parameters]).reshape(-1, 4).T
     level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
     weight = np.concatenate([item.weight for item in before.samples])
     nothing, root = np.full(len(weight), np.nan), np.sqrt(weight)
 
     def residuals(values: FloatArray) -> FloatArray:
         try:
-            curve = _analysed(_with_values(spec, parameters, values)).curve
+            curve = curves.solve_at(parameters, values)
         except CfmError:
             return nothing  # the solver then takes a shorter step
         zeros = _zeros(parameters, values)
@@ -222,6 +286,20 @@ def _problem(spec: Spec, before: Comparison, parameters: Sequence[FitParameter])
 
     effect = float(np.mean(weight**2) / np.mean(weight) ** 2)
     return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level, effect)
+
+
+def scaled_jacobian(curves: ModelCurves, before: Comparison, parameters: Sequence[FitParameter]) -> FloatArray:
+    """Return the derivatives of the errors at the start by the parameters in their sizes, (n, p) [N or N m].
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If the model has no value at some of the samples.
+    """
+    problem = _problem(curves, before, parameters)
+    if not np.isfinite(problem.residuals(problem.start)).all():
+        raise SolutionError("the model has no equilibrium at some of the measured points")
+    return problem.jacobian(problem.start)
 
 
 def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitParameter]) -> None:
@@ -234,7 +312,7 @@ def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitPa
             "start from other values"
         ) from None
     if groups:
-        raise SolutionError("; ".join(_undetermined([parameters[k].path for k in group]) for group in groups))
+        raise SolutionError("; ".join(_undetermined([parameters[k].label for k in group]) for group in groups))
 
 
 def _undetermined(paths: Sequence[str]) -> str:
@@ -249,19 +327,21 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
     found, half = [], fit.half_widths()
     for k, item in enumerate(parameters):
         if fit.at_bound[k]:
-            found.append(Finding("at_bound", f"{item.path} is at its bound: the data require a value beyond"))
+            found.append(Finding("at_bound", f"{item.label} is at its bound: the data require a value beyond"))
         elif half[k] > UNKNOWN * item.size:
-            found.append(Finding("weakly_identified", f"{item.path} {CANNOT}: fit fewer values, or give it with --set"))
-        elif half[k] > POOR * item.size:
+            found.append(
+                Finding("weakly_identified", f"{item.label} {CANNOT}: fit fewer values, or give it with --set")
+            )
+        elif half[k] > POORLY_DETERMINED * item.size:
             found.append(
                 Finding(
                     "weakly_identified",
-                    f"{item.path} cannot be determined from this recording (± {100 * half[k] / item.size:.0f} %)",
+                    f"{item.label} cannot be determined from this recording (± {100 * half[k] / item.size:.0f} %)",
                 )
             )
         for other in range(k):
-            if abs(fit.correlation[k, other]) > TIED:
-                reported = f"{parameters[other].path} and {item.path} are poorly distinguished"
+            if abs(fit.correlation[k, other]) > TIED_CORRELATION:
+                reported = f"{parameters[other].label} and {item.label} are poorly distinguished"
                 found.append(Finding("weakly_identified", f"{reported} (correlation {fit.correlation[k, other]:.5f})"))
     if not fit.converged:
         found.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
@@ -305,8 +385,11 @@ def table(calibration: Calibration) -> list[dict[str, Any]]:
             "standard_deviation": float(spread[k]), "start": item.start,
         }  # fmt: skip
         shown = {name: float(to_border(number, item.dimension)) for name, number in numbers.items()}
-        records.append({"path": item.path, "unit": border_unit(item.dimension)} | shown)
+        records.append({"path": item.label, "unit": border_unit(item.dimension)} | shown)
     return records
 
 
-__all__ = ["CANNOT", "FINDINGS", "UNKNOWN", "Calibration", "Samples", "calibrate", "resolved", "table"]
+__all__ = [
+    "CANNOT", "FINDINGS", "POORLY_DETERMINED", "UNKNOWN", "Calibration", "ModelCurves", "Samples", "calibrate",
+    "fit_samples", "has_no_loss", "resolved", "scaled_jacobian", "table",
+]  # fmt: skip

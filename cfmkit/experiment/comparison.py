@@ -115,15 +115,18 @@ class Comparison(ShortRepr):
         return emptied(found.summarize(_ERRORS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:
-        """Return what a measured cycle loses, and half the mean gap between its branches; nothing without a loop."""
+        """Return what a cycle loses, its loss factor, and half the gap of the branches; nothing without a loop."""
         loop = self.loop
         if loop is None:
             return {}
         area = loop_area(loop.places, loop.up, loop.down)
         kind, width = self.curve.kind, self.window.hi - self.window.lo
         meant = recorded(kind)
+        stored = float(np.trapezoid(0.5 * (loop.up + loop.down), loop.places))
+        factor = area / (2.0 * np.pi * stored) if stored > 0.0 else None
         found = {
             "data_loss": Quantity(area, *meant["data_loss"]),
+            "data_loss_factor": Quantity(factor, *meant["data_loss_factor"], "" if factor else "no energy is stored"),
             "data_half_gap": Quantity(0.5 * area / width, *meant["data_half_gap"]),
         }
         return emptied(found, self.holes, kind)

@@ -342,7 +342,7 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
         if width > UNKNOWN * item.size and not calibration.fit.at_bound[k]:
-            lines.append(("fitted", f"{item.path} {CANNOT}"))
+            lines.append(("fitted", f"{item.label} {CANNOT}"))
             continue
         low, high = max(value - width, item.low), min(value + width, item.high)
         reported = f"± {_exact(width, item.dimension, 2)} (95 %)"
@@ -351,7 +351,7 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
         lines.append(
             (
                 "fitted",
-                f"{item.path} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
+                f"{item.label} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
             )
         )
     lines += _loss_lines(calibration.after)
@@ -368,7 +368,8 @@ def _loss_lines(after: Comparison) -> list[tuple[str, str]]:
     """Return what is said where the model has no losses and the measurement has."""
     if not after.branches:
         return []
-    area, half = (item.value for item in after.loss().values())
+    loss = after.loss()
+    area, half = (loss[name].value for name in ("data_loss", "data_half_gap"))
     if area is None or half is None:
         return [("loss", "the model has no losses: it is fitted to the mean of the branches")]
     gap = f"{format_short(half, after.curve.kind)} to either side"

@@ -37,15 +37,30 @@ INSIDE = 1e-9
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A number that is fitted."""
+    """A number that is fitted: one value of a specification, or several that err together."""
 
-    path: str  # dotted
+    path: str  # dotted; of several the first
     dimension: str  # of `cfmkit.specs.units`
     # start, low, high: SI
     start: float
     low: float
     high: float
     size: float  # typical size, SI
+    joint: tuple[str, ...] = ()  # all paths of values that err together; empty: one value
+    by_factor: bool = False  # whether these err by one factor, else by one amount
+
+    @property
+    def label(self) -> str:
+        """The paths in words."""
+        return ", ".join(self.joint) or self.path
+
+    def changes(self, spec: Spec, value: float) -> dict[str, float]:
+        """Return the values of a specification that change with the parameter, by path [SI]."""
+        if not self.joint:
+            return {self.path: value}
+        if self.by_factor:
+            return {path: float(spec.at(path)) * value / self.start for path in self.joint}
+        return {path: float(spec.at(path)) + value - self.start for path in self.joint}
 
 
 def parameters(

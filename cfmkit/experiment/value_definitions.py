@@ -23,6 +23,10 @@ RECORDED = {
     "data_error_max": ("effort", "(model - measured) {} where it is largest in magnitude, in the window"),
     "data_offset": ("effort", f"mean of (model - measured) {{}}, {_OVER}"),
     "data_loss": ("energy", "area between the measured branches over the window"),
+    "data_loss_factor": (
+        "ratio",
+        "data_loss over 2 pi times the area under the mean of the branches over the window, which is the energy stored",
+    ),
     "data_half_gap": ("effort", "half the mean difference of the measured {} on the way up and back"),
 }
 

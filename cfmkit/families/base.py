@@ -209,8 +209,8 @@ class Family:
     # ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
     # specification may move, and in which ranges [SI], as its `design` block says it for the design itself
     free: str | None = None
-    # ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position" or "rate"}``: which values of a part
-    # err, and in what: by the process that makes it, or as the rate of a spring
+    # ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position", "rate" or "friction"}``: which values
+    # of a part err, and in what: by the process that makes it, as the rate of a spring, or as a coefficient of friction
     errors: str | None = None
     # ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes of its
     # departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement

@@ -52,6 +52,7 @@ class LeastSquares:
     # how many residuals count as one because they have unequal weights: the mean square of the weights over the square
     # of their mean (L. Kish, Survey Sampling, Wiley 1965, sec. 8.2)
     design_effect: float = 1.0
+    tolerance: float = 1e-12  # relative change of values and of the sum of squares at which the search ends
 
     def jacobian(self, values: FloatArray) -> FloatArray:
         """Return the derivatives of the residuals by the parameters in their sizes, by central differences.
@@ -124,7 +125,7 @@ def unidentifiable(problem: LeastSquares, values: FloatArray) -> tuple[tuple[int
     """
     if not np.isfinite(problem.residuals(values)).all():
         raise NotFinite
-    return dependent_columns(problem.jacobian(values), problem.level)
+    return dependent_columns(problem.jacobian(values), problem.level) if len(values) else ()
 
 
 def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ...], ...]:
@@ -173,6 +174,15 @@ def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> FittedValues:
     return _fit(problem, best, loss)
 
 
+def evaluate_start(problem: LeastSquares) -> FittedValues:
+    """Return the residuals of a problem without parameters, as the outcome of a fit."""
+    empty = np.zeros(0)
+    residuals = problem.residuals(empty)
+    rms, inflation = float(np.sqrt(np.mean(residuals**2))), correlation_time(residuals) * problem.design_effect
+    freedom = max(len(residuals) / inflation, 1.0)
+    return FittedValues(empty, np.zeros((0, 0)), residuals, rms, inflation, np.zeros(0, dtype=bool), freedom, True)
+
+
 def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float) -> Any:
     from scipy.optimize import least_squares
 
@@ -192,9 +202,9 @@ def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float)
         bounds=(problem.low / size, problem.high / size),
         loss=loss,
         f_scale=scale,
-        xtol=1e-12,
-        ftol=1e-12,
-        gtol=1e-14,
+        xtol=problem.tolerance,
+        ftol=problem.tolerance,
+        gtol=0.01 * problem.tolerance,
         max_nfev=200,
     )
 

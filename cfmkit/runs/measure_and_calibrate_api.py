@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.api import AnySpec
     from cfmkit.experiment.calibration import Calibration
+    from cfmkit.experiment.correction import DesignCorrection
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.low_pass import LowPass
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
@@ -200,23 +201,14 @@ def calibrate(
     >>> round(found.spec.mechanism.rolling_friction, 5)
     0.00224
     """
-    from cfmkit.experiment.branches import read_cycles
     from cfmkit.experiment.calibration import calibrate as fitted
-    from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, MeasuredCurves, measured, read_measured
     from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
-    from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.zeros_and_signs import corrected
     from cfmkit.numerics.least_squares import LOSSES
 
     if loss not in LOSSES:
         raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
     start = resolve(spec)
-    if isinstance(data, Recording):
-        source = measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT, read_cycles(cycles))
-    elif isinstance(data, MeasuredCurves):
-        source = data
-    else:
-        source = read_measured(_file(data), units, tare, zero, _each(flip), cycles, group)
+    source = _read_curves(data, units, tare, zero, flip, cycles, group)
     given = bounds or {}
     texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
     numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}
@@ -224,3 +216,71 @@ def calibrate(
     paths = fit.split(",") if isinstance(fit, str) else fit
     chosen = parameters(start, paths, limits, source.recording)
     return fitted(start, source, chosen, loss, Window(*window) if window else None)
+
+
+def correct(
+    spec: AnySpec,
+    data: str | os.PathLike[str] | Recording | MeasuredCurves,
+    *,
+    fit: str | Sequence[str] | None = None,
+    units: str | None = None,
+    tare: str | float | None = None,
+    zero: str | float | None = None,
+    flip: str | Iterable[str] = (),
+    cycles: str | None = None,
+    group: str | None = None,
+) -> DesignCorrection:
+    """Return a design corrected by the recording of a part that was made of it.
+
+    Parameters
+    ----------
+    spec : Spec or path-like
+        What the part was made of.
+    data : path-like, Recording or MeasuredCurves
+        A lab file as for `measure`, or what was read of it.
+    fit : str or sequence of str, optional
+        What errs in the part; default: whichever of modulus, thickness, friction and rates the recording tells apart.
+    units, tare, zero, flip, cycles, group
+        As for `measure`. Without `tare` the zero of the force is fitted where the recording tells it.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If the recording is not of such a part.
+    cfmkit.errors.SolutionError
+        If it determines nothing, or no part that can be made has the force.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> found = cfmkit.correct("configs/cam.yaml", "configs/synthetic/cam_loop.csv", tare="0 N")
+    >>> found.changes  # within the scatter: nothing to correct
+    {}
+    """
+    from cfmkit.experiment.correction import correct as correct_design
+
+    source = _read_curves(data, units, tare, zero, flip, cycles, group)
+    paths = fit.split(",") if isinstance(fit, str) else fit
+    return correct_design(resolve(spec), source, paths, tare is not None)
+
+
+def _read_curves(
+    data: str | os.PathLike[str] | Recording | MeasuredCurves,
+    units: str | None,
+    tare: str | float | None,
+    zero: str | float | None,
+    flip: str | Iterable[str],
+    cycles: str | None,
+    group: str | None,
+) -> MeasuredCurves:
+    """Return the branches of a recording, read from its file unless they are given."""
+    from cfmkit.experiment.branches import read_cycles
+    from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, MeasuredCurves, measured, read_measured
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.zeros_and_signs import corrected
+
+    if isinstance(data, MeasuredCurves):
+        return data
+    if isinstance(data, Recording):
+        return measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT, read_cycles(cycles))
+    return read_measured(_file(data), units, tare, zero, _each(flip), cycles, group)

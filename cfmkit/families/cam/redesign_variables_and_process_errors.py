@@ -21,12 +21,9 @@ def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
         What came out.
     """
     wanted, mechanism = given.design, designed.mechanism
-    if wanted is None:
-        return {}
-    found = {}
-    found["mechanism.profile.force_constant"] = around(mechanism.profile.force_constant)
+    found = {"mechanism.profile.force_constant": around(mechanism.profile.force_constant)}
     rate = mechanism.springs.stiffness
-    if wanted.choose == "stiffness" and isinstance(rate, float):
+    if wanted is not None and wanted.choose == "stiffness" and isinstance(rate, float):
         found["mechanism.springs.stiffness"] = around(rate)
     return found
 
@@ -36,7 +33,8 @@ PLACES = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.rolle
 
 
 def errors(spec: CamSpec) -> dict[str, str]:
-    """Return which values err: where the process puts holes and the contour, and the rates of bought springs."""
+    """Return which values err: where the process puts holes and the contour, rates of bought springs, and friction."""
     rate = spec.mechanism.springs.stiffness
     listed = [f".{number}" for number in range(len(rate))] if isinstance(rate, tuple) else [""]
-    return dict.fromkeys(PLACES, "position") | {f"mechanism.springs.stiffness{one}": "rate" for one in listed}
+    rates = {f"mechanism.springs.stiffness{item}": "rate" for item in listed}
+    return dict.fromkeys(PLACES, "position") | rates | {"mechanism.rolling_friction": "friction"}

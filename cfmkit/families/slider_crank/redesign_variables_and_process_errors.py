@@ -54,13 +54,15 @@ def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple
 
 
 def errors(spec: SliderCrankSpec) -> dict[str, str]:
-    """Return which values err: the thickness of a strip, everywhere; of links, where holes lie; rates of springs."""
+    """Return which values err: the thickness of a strip, everywhere; of links, where holes lie; rates; friction."""
     mechanism = spec.mechanism
     if mechanism.beam is not None:
         return {"mechanism.beam.offset": "thickness"} if spec.fidelity == "beam" else {}
     if mechanism.flexures is not None:
         return {}
+    rubbing = [name for name in ("pins", "guide") if getattr(mechanism, name) is not None][:1]
+    friction = {f"mechanism.{name}.friction": "friction" for name in rubbing}
     given = {name: getattr(mechanism, name) for name in ("crank_length", "stretched_position", "offset")}
     found = {f"mechanism.{name}": "position" for name, value in given.items() if isinstance(value, float)}
     rates = zip(JOINTS, mechanism.springs.rates, strict=True)
-    return found | {f"mechanism.springs.{name}": "rate" for name, rate in rates if rate > 0.0}
+    return found | {f"mechanism.springs.{name}": "rate" for name, rate in rates if rate > 0.0} | friction

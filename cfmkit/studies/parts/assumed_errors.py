@@ -52,7 +52,8 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
     None of what is no part.
     """
     errors = family(spec.family).errors
-    kinds: Mapping[str, str] = {} if errors is None else function_named(errors)(spec)
+    every: Mapping[str, str] = {} if errors is None else function_named(errors)(spec)
+    kinds = {path: kind for path, kind in every.items() if kind != "friction"}  # of which nothing is assumed
     if not kinds:
         return None
     accuracy, (shared, owned) = accuracy_of(spec, process), _materials(spec)

@@ -1,0 +1,329 @@
+"""Drawn values moved until the part that is made of them has the curve that is aimed at.
+
+Values of what is made may move: those that the design chooses, widths and thicknesses; not what is bought, and not the
+widths that a sheet decides. They move as little as possible, widths before thicknesses before all others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.errors import CfmError, SolutionError
+from cfmkit.experiment.aimed_curve import N_PLACES, analyze_part
+from cfmkit.experiment.errors_of_made_part import is_thickness
+from cfmkit.families import family
+from cfmkit.families.base import ENVELOPE, function_named
+from cfmkit.metrics import check, values_of_family
+from cfmkit.specs.units import format_short
+from cfmkit.stock.material_and_part_spec import sheet_of
+from cfmkit.studies.parts.assumed_errors import assumed
+from cfmkit.studies.parts.redesign import free_of
+from cfmkit.studies.variable_paths import leaf
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.experiment.aimed_curve import AimedCurve
+    from cfmkit.experiment.errors_of_made_part import Explanation
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+
+MOST_CHANGE = 3.0
+"""Factor by which a drawn value may change where the design does not limit it."""
+
+SECTION_RELUCTANCE = {"width": 1e-4, "thickness": 1e-3}
+"""Deviation of the force that is accepted for not changing a value at all: widths do not change stress or shape."""
+
+OTHER_RELUCTANCE = 1e-2
+"""The same of any other value."""
+
+N_DIGITS = 5
+"""Digits of a corrected value: a leaf of 0.25 mm to 10 nm, a millionth of its force."""
+
+CLOSE_DEPARTURE = 2e-3
+"""Root mean square departure from the aim, over its level, with which no more values are changed."""
+
+MEAN_WEIGHT = 10.0
+"""How much a departure of the mean force counts, over one of the same size from the curve."""
+
+MISSED_WEIGHT = 3.0
+"""How much missing another requirement by a share counts, over missing the force by as much."""
+
+REQUIREMENT_MARGIN = 1e-3
+"""Part of its bound by which a requirement is to be met: values are rounded afterwards."""
+
+RELATIVE_STEP, MAX_STEPS = 1e-4, 40
+"""Relative change of a value for derivatives, and steps of a search, which usually takes five."""
+
+NO_CURVE = 10.0
+"""Deviation that stands for a part that has no curve."""
+
+
+class NotMakeable(SolutionError):
+    """No part within the limits of process, stock and design has the force."""
+
+    def __init__(self, message: str, nearest: Mapping[str, str]) -> None:
+        """Keep the values with which there is one."""
+        super().__init__(message)
+        self.nearest = dict(nearest)
+
+
+@dataclass(frozen=True)
+class DrawnRange:
+    """Within which limits a drawn value may move, and what sets them."""
+
+    low: float
+    high: float
+    least: str = "the design's own limit"  # what the lower one is
+
+
+def limits_of(spec: Spec) -> dict[str, DrawnRange]:
+    """Return which values of a drawing may change, each with its limits [SI].
+
+    These are the values that the design chooses, and widths and thicknesses; not widths that a sheet decides, nor what
+    is bought. Where nothing of that is there, the places of joints.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If a path of `design.free` is not in the specification.
+    """
+    stated = family(spec.family).errors
+    kinds: dict[str, str] = {} if stated is None else dict(function_named(stated)(spec))
+    design = getattr(spec, "design", None)
+    ranges = {path: _widen(float(spec.at(path)), *ends) for path, ends in free_of(spec, spec).items()}
+    if not getattr(design, "free", None):
+        for path in _sections(spec):
+            value = float(spec.at(path))
+            ranges.setdefault(path, (value / MOST_CHANGE, value * MOST_CHANGE))
+    ranges = {path: ends for path, ends in ranges.items() if kinds.get(path) not in ("rate", "friction")}
+    if not ranges:
+        places = [path for path, kind in kinds.items() if kind == "position"]
+        ranges = {path: around(float(spec.at(path))) for path in places if float(spec.at(path))}
+    sheet, process = sheet_of(getattr(spec.at("mechanism"), "part", None)), assumed(spec)
+    fixed = {f"mechanism.{key}" for key in spec.out_of_plane_widths} if sheet is not None else set()
+    limits = {}
+    for path, (low, high) in ranges.items():
+        if path in fixed:
+            continue
+        limit = DrawnRange(low, high)
+        if process is not None and _is_section(path) and process.process.least_feature > low:
+            thinnest = min(process.process.least_feature, float(spec.at(path)))
+            limit = DrawnRange(thinnest, max(high, thinnest), f"the least that {process.process.name} makes")
+        if limit.low < limit.high:
+            limits[path] = limit
+    return limits
+
+
+def _widen(value: float, low: float, high: float) -> tuple[float, float]:
+    """Return a range in which a value may be corrected: limits that a design states hold, others are wider."""
+    least, most = around(value)
+    return (
+        value / MOST_CHANGE if np.isclose(low, least) and value > 0.0 else low,
+        value * MOST_CHANGE if np.isclose(high, most) and value > 0.0 else high,
+    )
+
+
+def _sections(spec: Spec) -> list[str]:
+    """Return the paths of widths and thicknesses of what bends."""
+    made = {f"mechanism.{key}" for key, value in spec.out_of_plane_widths.items() if value is not None}
+    beside = {path.removesuffix("width") + "thickness" for path in made}
+    known = dict(spec.leaves())
+    return [path for path in known if path in made or path.removesuffix(_index(path)) in beside]
+
+
+def _index(path: str) -> str:
+    """Return the number of an item at the end of a path with its dot; "" if it has none."""
+    last = path.rpartition(".")[2]
+    return f".{last}" if last.isdecimal() else ""
+
+
+def _is_section(path: str) -> bool:
+    return _kind(path) in SECTION_RELUCTANCE
+
+
+def _kind(path: str) -> str:
+    return path.removesuffix(_index(path)).rpartition(".")[2]
+
+
+@dataclass(frozen=True)
+class Redesign:
+    """The drawn values with which the parts of every explanation have the curve that is aimed at."""
+
+    drawn: Spec
+    explanations: tuple[Explanation, ...]
+    aim: AimedCurve
+    limits: Mapping[str, DrawnRange]
+    missed_before: float = 0.0  # by what share of its bound a requirement is missed by the design itself
+    of_envelope: bool = False  # whether of all requirements those on the envelope matter alone
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """The values as drawn, (n,) [SI]."""
+        return np.array([float(self.drawn.at(path)) for path in self.limits])
+
+    @property
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper limits of the values, (n,) [SI]."""
+        limits = self.limits.values()
+        return np.array([limit.low for limit in limits]), np.array([limit.high for limit in limits])
+
+    @property
+    def _size(self) -> FloatArray:
+        """Typical sizes of the values, (n,) [SI]: the values; of zeros their ranges."""
+        return np.where(self.start == 0.0, self._ends[1] - self._ends[0], np.abs(self.start))
+
+    def drawing(self, x: FloatArray) -> Spec:
+        """Return the drawing with other values.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If they are not valid together.
+        """
+        return self.drawn.replace(dict(zip(self.limits, x.tolist(), strict=True)))
+
+    def solve(self) -> FloatArray:
+        """Return the values, with the digits that are written, (n,) [SI].
+
+        Widths change alone if that is enough: neither shape nor stress change with them. Then thicknesses change, too,
+        then all.
+
+        Raises
+        ------
+        cfmkit.errors.SolutionError
+            If nothing may change.
+        """
+        if not self.limits:
+            raise SolutionError(
+                "nothing that is made may change: the design says of no value that it is free; state 'design.free'"
+            )
+        kinds = [_kind(path) for path in self.limits]
+        stages = [
+            [k for k, kind in enumerate(kinds) if kind in names] for names in (("width",), tuple(SECTION_RELUCTANCE))
+        ]
+        best = self._compensate()
+        if self._cost(best) <= CLOSE_DEPARTURE:
+            return best
+        for free in dict.fromkeys((*map(tuple, stages), tuple(range(len(kinds))))):
+            if free:
+                best = min(self._solve_for(list(free), best), best, key=self._cost)
+                if self._cost(best) <= CLOSE_DEPARTURE:
+                    break
+        return best
+
+    def _compensate(self) -> FloatArray:
+        """Return the values of leaves that are drawn thinner by as much as they are made thicker, (n,) [SI].
+
+        As drawn where the recording may be explained without an error of the thickness.
+        """
+        if not all(any(is_thickness(item) for item in explanation.errors) for explanation in self.explanations):
+            return self.start
+        changes: dict[str, float] = {}
+        for item, value in zip(self.explanations[0].errors, self.explanations[0].values, strict=True):
+            if is_thickness(item):
+                changes |= item.changes(self.drawn, 2.0 * item.start - float(value))
+        x = [changes.get(path, value) for path, value in zip(self.limits, self.start.tolist(), strict=True)]
+        return self._round(np.array(x))
+
+    def _round(self, x: FloatArray) -> FloatArray:
+        """Return values with the digits that are written, within their limits, (n,) [SI]."""
+        low, high = self._ends
+        digits = np.array([float(f"{value:.{N_DIGITS}g}") for value in x])
+        return np.where(np.isclose(x, self.start), self.start, np.clip(digits, low, high))
+
+    def _solve_for(self, free: list[int], start: FloatArray) -> FloatArray:
+        """Return the values of which some have been moved from a start, (n,) [SI]."""
+        from scipy.optimize import least_squares
+
+        size = self._size
+        low, high = (end[free] / size[free] for end in self._ends)
+
+        def whole(z: FloatArray) -> FloatArray:
+            x = start.copy()
+            x[free] = z * size[free]
+            return x
+
+        def residuals(z: FloatArray) -> FloatArray:
+            return self._residuals(whole(z))
+
+        inside = np.clip(start[free] / size[free], low + 1e-9, high - 1e-9)
+        steps = np.full(len(free), RELATIVE_STEP)
+        solution = least_squares(
+            residuals, inside, bounds=(low, high), diff_step=steps, xtol=1e-8, ftol=1e-8, max_nfev=MAX_STEPS
+        )
+        return self._round(whole(solution.x))
+
+    def _cost(self, x: FloatArray) -> float:
+        """Return the root mean square departure from the aim, with what is missed of requirements."""
+        return float(np.linalg.norm(self._residuals(x)[: -len(self.limits)]))
+
+    def _residuals(self, x: FloatArray) -> FloatArray:
+        count = N_PLACES * len(self.aim.efforts)
+        share = (len(self.aim.places) * len(self.aim.efforts) * len(self.explanations)) ** -0.5
+        mean_weight = MEAN_WEIGHT * len(self.explanations) ** -0.5
+        departures, missed = [], 0.0
+        for number, explanation in enumerate(self.explanations):
+            try:
+                result = analyze_part(explanation.part_of(self.drawing(x)))
+                departure = self.aim.departure(result.curves)
+                departures += [share * departure, np.array([mean_weight * float(np.nanmean(departure))])]
+                if number == 0:
+                    missed = max(0.0, largest_miss(result, self.of_envelope) - self.missed_before)
+            except (CfmError, ValueError):
+                departures.append(np.full(len(self.aim.places) * len(self.aim.efforts) + 1, NO_CURVE * share))
+        curve_errors = np.nan_to_num(np.concatenate(departures), nan=NO_CURVE * count**-0.5)
+        reluctance = np.array([SECTION_RELUCTANCE.get(_kind(path), OTHER_RELUCTANCE) for path in self.limits])
+        moved: FloatArray = reluctance * (x - self.start) / self._size
+        return np.concatenate([curve_errors, [MISSED_WEIGHT * missed], moved])
+
+    def not_makeable(self, x: FloatArray, force: float) -> NotMakeable:
+        """Return why no part has the force, and the nearest force that one has."""
+        kind = "torque" if self.drawn.motion == "angle" else "force"
+        wanted, reached = (format_short(value, kind, 4) for value in (self.aim.mean_effort, force))
+        held = []
+        for path, value, limit in zip(self.limits, x.tolist(), self.limits.values(), strict=True):
+            dimension = dimension_of(self.drawn, path)
+            if np.isclose(value, limit.low, rtol=1e-4):
+                held.append(f"{path} {format_short(limit.low, dimension, 4)} ({limit.least})")
+            elif np.isclose(value, limit.high, rtol=1e-4):
+                held.append(f"{path} {format_short(limit.high, dimension, 4)} (the most that the design allows)")
+        why = f", held by {' and '.join(held)}" if held else ""
+        message = f"no part that can be made has {wanted}: the nearest has {reached}{why}"
+        levels = [path for path in family(self.drawn.family).levels if _has(self.drawn, path)]
+        return NotMakeable(message, {path: reached for path in levels[:1]})
+
+
+def _has(spec: Spec, path: str) -> bool:
+    try:
+        return isinstance(spec.at(path), float)
+    except KeyError:
+        return False
+
+
+def dimension_of(spec: Spec, path: str) -> str:
+    """Return the dimension of the value at a path."""
+    quantity = leaf(type(spec), path).quantity
+    return quantity.dimensions[0] if quantity else "ratio"
+
+
+def largest_miss(result: Result, of_envelope: bool = False) -> float:
+    """Return by what share of its bound a requirement is missed, or met by less than `REQUIREMENT_MARGIN`, the largest.
+
+    `of_envelope`: of the requirements on the envelope alone.
+    """
+    values = values_of_family(family(result.spec.family).values)
+    shares = [0.0]
+    for outcome in check(result.spec.part_requirements, result, values):
+        if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE):
+            continue
+        for bound, way in ((outcome.max, 1.0), (outcome.min, -1.0)):
+            if bound is not None:
+                shares.append(way * (outcome.value - bound) / (abs(bound) or 1.0) + REQUIREMENT_MARGIN)
+    return max(shares)

@@ -1,0 +1,201 @@
+"""Report and files of ``cfmkit correct``: the corrected design, a table of before, after and predicted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from cfmkit import api
+from cfmkit.documents.document import GridColumn, PageTable
+from cfmkit.documents.run_outcome import Supplement, report_on, undesigned
+from cfmkit.errors import SpecError
+from cfmkit.experiment import measurement_and_calibration_outputs as add
+from cfmkit.experiment.correction import correct
+from cfmkit.experiment.redrawn_values import NotMakeable, dimension_of
+from cfmkit.metrics import evaluate
+from cfmkit.metrics.metric_definitions import words
+from cfmkit.results import Design, Status
+from cfmkit.specs.units import border_unit, format_short, to_border
+from cfmkit.tables import Table, TableColumn, to_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.documents.run_outcome import Report
+    from cfmkit.experiment.correction import DesignCorrection
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
+    from cfmkit.families.run_control import Run
+    from cfmkit.specs.spec import Spec
+
+WITHIN_SCATTER = "within the scatter: nothing to correct"
+
+SHOWN_METRICS = ("ripple", "max", "stress_max", "safety_factor", "hysteresis_area")
+"""What is compared beside the mean; the first two are of the force or torque."""
+
+N_ROWS_ON_PAGE = 8
+
+
+@dataclass(frozen=True)
+class CorrectedValue:
+    """One value of the part before, and of the corrected one, in SI; ends of 95 % intervals where they are known."""
+
+    name: str
+    dimension: str
+    before: float
+    after: float
+    before_ends: tuple[float, float] | None = None
+    after_ends: tuple[float, float] | None = None
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Name, before, after and the interval of the prediction, as a page shows them."""
+        before = self._text(self.before)
+        if self.before_ends is not None:
+            before += f" ({self._span(self.before_ends)})"
+        predicted = "" if self.after_ends is None else self._span(self.after_ends)
+        return self.name, before, self._text(self.after), predicted
+
+    def _text(self, value: float) -> str:
+        return format_short(value, self.dimension, 5)
+
+    def _span(self, ends: tuple[float, float]) -> str:
+        return f"{float(to_border(ends[0], self.dimension)):.4g} to {self._text(ends[1])}"
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The same in border units; None where there is no interval."""
+        numbers: dict[str, float | None] = {"before": self.before, "after": self.after}
+        for name, ends in (("before", self.before_ends), ("after", self.after_ends)):
+            numbers |= {f"{name}_low_95": ends and ends[0], f"{name}_high_95": ends and ends[1]}
+        shown = {
+            key: None if value is None else float(to_border(value, self.dimension)) for key, value in numbers.items()
+        }
+        return {"value": self.name, "unit": border_unit(self.dimension), **shown}
+
+
+def report_on_corrected(source: MeasuredCurves, fit: str | None, tared: bool, spec: Spec, run: Run) -> Report:
+    """Return the report on the corrected design: its metrics are those of the part that will be made of it."""
+    drawn = api.resolve(spec)
+    try:
+        correction = correct(drawn, source, None if fit is None else fit.split(","), tared, run)
+    except NotMakeable as problem:
+        failed = Design(None, Status.INFEASIBLE, str(problem), nearest_feasible=problem.nearest)
+        return report_on(undesigned(drawn, failed), failed)
+    return report_of(correction, source, tared or fit is not None)
+
+
+def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: bool) -> Report:
+    """Return the report on a correction."""
+    calibration = correction.explanation.calibration
+    after = calibration.after
+    rows = rows_of(correction)
+    made = replace(correction.predicted, spec=correction.corrected)
+    report = report_on(made, Design(correction.corrected, Status.COMPLETE))
+    files = {
+        **dict(_specs(correction)),
+        "correction.csv": lambda: to_csv(_table(rows)),
+        "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
+        **add.comparison_files(source),
+    }
+    if calibration.parameters:
+        files["parameters.csv"] = lambda: to_csv(add.parameters_table(calibration))
+    heads = ("", "before (95 %)", "after", "predicted (95 %)")
+    table = PageTable("", tuple(map(GridColumn, heads)), tuple(row.cells for row in rows), N_ROWS_ON_PAGE)
+    return replace(
+        report,
+        metrics=dict(report.metrics) | after.metrics() | after.loss(),
+        supplement=Supplement(
+            add.comparison_data(after, source)
+            | add.calibration_data(calibration)
+            | {"correction": _data(correction, rows)},
+            files,
+            tuple(_lines(correction, zero_known)),
+            (*add.comparison_warnings(after, source), *calibration.warnings, *correction.warnings),
+            shortfall=add.shortfall(after),
+            figures=add.comparison_figures(after, correction.drawn.name, calibration.before),
+            tables=(table,),
+        ),
+    )
+
+
+def rows_of(correction: DesignCorrection) -> tuple[CorrectedValue, ...]:
+    """Return what is drawn anew, then forces and stress of the part that was made and of the one that will be."""
+    drawn = [
+        CorrectedValue(path.removeprefix("mechanism."), dimension_of(correction.drawn, path), before, now)
+        for path, (before, now) in correction.changes.items()
+    ]
+    kind = correction.nominal.curve.kind
+    forces = correction.before, correction.after
+    ends = [(force.low, force.high) for force in forces]
+    mean = CorrectedValue(f"mean {kind}", kind, forces[0].value, forces[1].value, *ends)
+    return (*drawn, mean, *_metrics(correction, kind))
+
+
+def _metrics(correction: DesignCorrection, kind: str) -> Iterator[CorrectedValue]:
+    names = [f"{kind}_{name}" if name in ("ripple", "max") else name for name in SHOWN_METRICS]
+    before, after = evaluate(correction.built), evaluate(correction.predicted)
+    for name in names:
+        old, new = before.get(name), after.get(name)
+        if old is not None and new is not None and old.value is not None and new.value is not None:
+            yield CorrectedValue(words(name), new.dimension, old.value, new.value)
+
+
+def _lines(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str, str]]:
+    """Yield what was correction in the part, and what is done about it."""
+    calibration, kind = correction.explanation.calibration, correction.nominal.curve.kind
+    for explanation in correction.explanations:
+        word = "found" if explanation is correction.explanation else "or"
+        yield word, "; ".join(explanation.sentences) or "no error of the part that the recording shows"
+    zero = calibration.zeros.effort
+    if zero:
+        yield "zero", f"without load the sensor shows {format_short(zero, kind, 3)}, which is taken off"
+    elif not zero_known:
+        yield "zero", "the recording does not tell it from the force: taken as recorded, within 2 % (state --tare)"
+    loss = calibration.after.loss()
+    if (factor := loss.get("data_loss_factor")) is not None and factor.value is not None:
+        area = format_short(loss["data_loss"].value or 0.0, "energy", 3)
+        yield "loss", f"a measured cycle loses {area}, loss factor {factor.value:.3g}"
+    wanted, reached = (format_short(value, kind, 4) for value in (correction.target, correction.before.value))
+    if not correction.changes:
+        yield "corrected", f"{WITHIN_SCATTER}: the mean {kind} is {reached}"
+        return
+    yield "corrected", f"for {wanted} instead of {reached}; the next part is assumed to be made with the same errors"
+    if correction.will_be_made != correction.corrected:
+        yield "made", "this page is of the part as it will be made: predicted.yaml; design.yaml is what is drawn"
+
+
+def _specs(correction: DesignCorrection) -> Iterator[tuple[str, Any]]:
+    """Yield the parts with their errors as specifications, where a specification can say so."""
+    parts = {"calibrated.yaml": correction.made} | (
+        {"predicted.yaml": correction.will_be_made} if correction.changes else {}
+    )
+    for name, part in parts.items():
+        text = api.dumps(part)
+        try:
+            api.loads(text, name)
+        except SpecError:  # a spring that is not as its wire says
+            continue
+        if part not in (correction.drawn, correction.corrected):
+            yield name, partial(str.encode, text)
+
+
+def _table(rows: tuple[CorrectedValue, ...]) -> Table:
+    records = [row.numbers for row in rows]
+    columns = []
+    for name in records[0]:
+        values = tuple("" if record[name] is None else record[name] for record in records)
+        columns.append(TableColumn(name, values))
+    return Table(tuple(columns))
+
+
+def _data(correction: DesignCorrection, rows: tuple[CorrectedValue, ...]) -> dict[str, Any]:
+    """Return what metrics.json says of a correction."""
+    return {
+        "within_scatter": not correction.changes,
+        "values": [row.numbers for row in rows],
+        "explanations": [
+            {"errors": [error.label for error in item.errors], "criterion": item.criterion}
+            for item in correction.explanations
+        ],
+    }
