@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
     BAD,
+    GOOD,
     SHORT,
     Document,
+    GridColumn,
     Note,
+    PageTable,
+    Span,
     ValueRow,
     WarningEntry,
     Written,
@@ -25,7 +29,7 @@ from cfmkit.specs.units import border_unit, format_short, to_border
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from cfmkit.documents.run_outcome import Report
     from cfmkit.metrics import Outcome
@@ -244,6 +248,43 @@ def metrics_of(report: Report) -> tuple[ValueRow, ...]:
         )
         for name in names
     )
+
+
+def metrics_table(metrics: Mapping[str, Quantity]) -> PageTable:
+    """Return one row for each metric, with a column for each branch; those without a value say why."""
+    named = [(name, *split_name(name)) for name in metrics]
+    branches = tuple(dict.fromkeys(branch for _, base, branch in named if branch is not None and base in metrics))
+    rows = []
+    for name, base, branch in named:
+        if branch in branches and base in metrics:
+            continue
+        each = [metrics.get(f"{name}[{one}]") for one in branches]
+        values = [_long_value(metrics[name]), *("" if one is None else _long_value(one) for one in each)]
+        rows.append((name, *values, metrics[name].definition))
+    heads = ("metric", "worst" if branches else "value", *branches, "what it is")
+    return PageTable("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
+
+
+def _long_value(quantity: Quantity) -> str:
+    if quantity.value is None:
+        return f"none: {quantity.reason}" if quantity.reason else "none"
+    return short_value(quantity, 6)
+
+
+def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
+    """Return one row for each requirement: its metric, the value, the bounds, and whether they are kept."""
+    rows = tuple(
+        (words(one.metric), *_value_and_bounds(one), Span("ok", GOOD) if one.ok else Span("MISSED", BAD))
+        for one in outcomes
+    )
+    return PageTable("Requirements", tuple(map(GridColumn, ("", "value", "required", ""))), rows)
+
+
+def _value_and_bounds(outcome: Outcome) -> tuple[str, str]:
+    """Return the value of an outcome and its bounds, as its sentence has them."""
+    reported = outcome.sentence.removeprefix(words(outcome.metric)).strip().rpartition(": ")[0]
+    value, _, bounds = reported.rpartition(", ")
+    return value, bounds.removeprefix("allowed ").removeprefix("required ")
 
 
 def _facts(report: Report) -> Iterator[ValueRow]:

@@ -150,6 +150,15 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     return figure
 
 
+@styled
+def new_axes() -> Axes:
+    """Return axes that fill a new figure of `matplotlib.pyplot` (160 x 100 mm), which notebooks show."""
+    from matplotlib import pyplot
+
+    figure = pyplot.figure(figsize=(160.0 * MM, 100.0 * MM))
+    return axes_mm(figure, (17.0, 12.0, 138.0, 84.0))
+
+
 def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
     """Return width and height of a figure [mm of print]."""
     dots = figure.dpi * MM

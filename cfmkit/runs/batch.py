@@ -21,7 +21,6 @@ from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
-from cfmkit.tables.html import first_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -301,7 +300,10 @@ class BatchResult:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the first specifications with their verdicts."""
-        return f"<div>{first_rows(self.table)}</div>"
+        from cfmkit.documents.batch_document import document_of
+        from cfmkit.documents.notebook import shown
+
+        return shown(document_of(self.entries, self.exit_code, compared=self.compared))
 
     @property
     def summary(self) -> Mapping[str, Any]:
