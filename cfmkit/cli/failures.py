@@ -118,6 +118,7 @@ _PARSER_WORDS = (
     (r"Value error, ", ""),
     (r"Input should be a valid integer, unable to parse string as an integer", "a whole number is needed"),
     (r"'[^']*' is not a valid integer", "a whole number is needed"),  # typer 0.26
+    (r"No such option: --room\b.*", "No such option: --room, it is --envelope now"),
 )
 """Patterns of what the library says that checks the types of options, and what to say instead."""
 

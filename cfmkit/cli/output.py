@@ -26,7 +26,7 @@ NARROWEST, WIDEST = 40, 100
 
 @dataclass(frozen=True)
 class Terminal:
-    """What is known about the user's wishes for output."""
+    """Options of output of a command line."""
 
     arguments: tuple[str, ...] = ()  # the command line, without the program's name
     # json, quiet: whether results are a JSON document, or not shown
@@ -36,7 +36,7 @@ class Terminal:
 
     @classmethod
     def guess(cls, arguments: Sequence[str]) -> Terminal:
-        """Return what a command line that may be malformed seems to wish."""
+        """Return what a command line that may be malformed seems to request."""
         given = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
         flags = "".join(item[1:] for item in given if item.startswith("-") and item[1:].strip("vq") == "")
         verbose = flags.count("v") + given.count("--verbose")

@@ -115,7 +115,7 @@ class StudyProgress:
         return recent if now - since >= RECENT else max(recent, mean)
 
     def interrupt(self, number: int, _frame: FrameType | None) -> None:
-        """Take Ctrl-C: the first time as a wish to stop soon, the second time at once."""
+        """Take Ctrl-C: the first time as a request to stop soon, the second time at once."""
         if self.stopped:
             signal.signal(number, signal.SIG_DFL)
             raise Stopped(number)

@@ -129,7 +129,7 @@ def _incomplete(found: Sequence[Mapping[str, Any]], files: Written) -> Iterator[
 def _shares(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the shares that follow the other columns of the table."""
     lossy = any(one["hysteresis"] is not None for one in (*record["proposals"], *record["unjudged"]))
-    return (*(("hysteresis",) if lossy else ()), *(("yield",) if "yield" in record["wish"] else ()))
+    return (*(("hysteresis",) if lossy else ()), *(("yield",) if "yield" in record["suggest"] else ()))
 
 
 def _silent(one: Mapping[str, Any]) -> tuple[str, str]:
@@ -139,7 +139,7 @@ def _silent(one: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _row(number: int, one: Mapping[str, Any], record: Mapping[str, Any]) -> tuple[str | Span, ...]:
-    unit = "N*mm" if "torque" in record["wish"] else "N"
+    unit = "N*mm" if "torque" in record["suggest"] else "N"
     sides = [one["across"], one["along"], one["depth"]]
     return (
         Span(f"{number} {one['family']}", link=quote(f"{one['folder']}/report.html")),

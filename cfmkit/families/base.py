@@ -132,7 +132,7 @@ SHARED = {
 
 
 @dataclass(frozen=True)
-class Room:
+class Envelope:
     """The box that a mechanism stays in over all of its travel, with everything that is drawn of it."""
 
     # across, along: in the plane, across and along the direction of travel [m]
@@ -146,7 +146,7 @@ class Room:
     drawn: tuple[float, float]  # width and height of the box along x and y of the drawings [m]
 
     @classmethod
-    def around(cls, part: PosedPart) -> Room:
+    def around(cls, part: PosedPart) -> Envelope:
         """Return the box around a mechanism over its motion, along its travel and along x and y."""
         from cfmkit.export.posed_part import box
 
@@ -231,7 +231,7 @@ class Family:
     elastic_parts: str | None = None
     # ``"module:function"`` with ``function(spec) -> (DrivenNetwork, ...)``: the same parts as beams, for decks
     elastic_networks: str | None = None
-    # ``"module:function"``, ``propose(wish, run) -> FamilyOffer``: what it could do with a wish, by scaling laws
+    # ``"module:function"``, ``propose(request, run) -> FamilyOffer``: what it could do with a request, by scaling laws
     propose: str | None = None
     # ``"module:function"`` with ``part_over_motion(result) -> PosedPart``: where the material of a solved mechanism is
     # in its poses; its box follows. None where that is not known
@@ -285,10 +285,10 @@ class Family:
             return result
         return sized(result, self.envelope(result))
 
-    def envelope(self, result: Result) -> Room | None:
+    def envelope(self, result: Result) -> Envelope | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
         part = function_named(self.part)(result) if self.part else None
-        return None if part is None else Room.around(part)
+        return None if part is None else Envelope.around(part)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
@@ -336,7 +336,7 @@ def _own_quantity(metric: OwnMetric, result: Result) -> Quantity:
     return Quantity(number, *about) if math.isfinite(number) else Quantity(None, *about, reason="it is not finite")
 
 
-def sized(result: Result, space: Room | None) -> Result:
+def sized(result: Result, space: Envelope | None) -> Result:
     """Return a result with the sizes of its box among its values; without a value where the box is not known."""
     sides = (None, None, None) if space is None else space.sides
     reason = (space.assumed if space else "") or "the box is not known"

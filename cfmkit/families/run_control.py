@@ -109,7 +109,7 @@ class Run:
     Attributes
     ----------
     seed : int
-        Of everything random.
+        Random seed.
     progress : callable
         Is told a fraction in [0, 1], which never falls, and a short text.
     time_budget : float, optional

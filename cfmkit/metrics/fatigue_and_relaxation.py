@@ -24,7 +24,7 @@ from cfmkit.metrics.branches_cut_to_window import Undefined
 
 FIRST = 1e-9
 """In place of a first point at 0, which log t does not have [s]: so early that most of the fall to the next point is
-over long before that one, where the force is hardly more than at it, which errs on the safe side."""
+over long before that one, where the force is hardly more than at it, which is conservative."""
 
 
 @dataclass(frozen=True)

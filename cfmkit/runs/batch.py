@@ -366,7 +366,7 @@ def batch(
     fidelity : str, optional
         For all of them.
     seed : int
-        Of everything random.
+        Random seed.
     plots : bool
         Whether to draw.
     jobs : int, optional

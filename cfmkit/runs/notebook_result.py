@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from cfmkit.metrics import Outcome
-    from cfmkit.studies.suggest.spec import WishBlock
+    from cfmkit.studies.suggest.spec import SuggestBlock
 
 
 class Metrics(Named[Quantity]):
@@ -112,12 +112,12 @@ class AnalysisView(Result):
 class SuggestionsView(Suggestions):
     """Proposals with what was requested; a notebook shows their table and the mechanisms to one scale."""
 
-    request: WishBlock | None = field(default=None, compare=False)  # always there; after fields with defaults
+    block: SuggestBlock | None = field(default=None, compare=False)  # always there; it follows fields with defaults
 
     @classmethod
-    def of(cls, suggestions: Suggestions, request: WishBlock) -> SuggestionsView:
-        """Return suggestions with the request that they answer."""
-        return cls(**{item.name: getattr(suggestions, item.name) for item in fields(suggestions)}, request=request)
+    def of(cls, suggestions: Suggestions, block: SuggestBlock) -> SuggestionsView:
+        """Return suggestions with the block `suggest` that they answer."""
+        return cls(**{item.name: getattr(suggestions, item.name) for item in fields(suggestions)}, block=block)
 
     def __repr__(self) -> str:
         """Return the proposals in a line: family and variant of the first ten."""
@@ -133,6 +133,6 @@ class SuggestionsView(Suggestions):
         from cfmkit.runs.suggestion_files import as_json, exit_code
         from cfmkit.studies.suggest.pareto_and_scale_drawings import to_one_scale
 
-        assert self.request is not None  # `of`
-        figures = {"proposals": lambda: to_one_scale(self.listed, self.wish)} if self.listed else {}
-        return shown(document_of(as_json(self, self.request), exit_code(self)), figures)
+        assert self.block is not None  # `of`
+        figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
+        return shown(document_of(as_json(self, self.block), exit_code(self)), figures)

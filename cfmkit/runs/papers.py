@@ -366,9 +366,9 @@ def _named(name: str, scope: _Scope) -> Any:
 def _varied(spec: Spec, path: str) -> tuple[float, ...]:
     """Return the values that a sweep gives to something."""
     from cfmkit.studies.plan import stepped
-    from cfmkit.studies.varied_axes import axes, wishes
+    from cfmkit.studies.varied_axes import axes, collect_variations
 
-    for axis in axes(spec, wishes(spec.sweep.vary)) if spec.sweep else ():
+    for axis in axes(spec, collect_variations(spec.sweep.vary)) if spec.sweep else ():
         if axis.leaf.path == path:
             return tuple(map(float, stepped(axis).values))
     raise ValueError(f"no sweep varies {path}")

@@ -118,7 +118,7 @@ class Request:
     out: str  # the output folder
     changes: tuple[str, ...] = ()  # what ``--set`` says
     fidelity: str | None = None  # what ``--fidelity`` says
-    seed: int = 0  # of everything random
+    seed: int = 0  # random seed
     plots: bool = True  # whether to draw
     of_many: bool = False  # whether it is one of many, and changes may be for others
     page: bool = False  # whether to write ``report.html``

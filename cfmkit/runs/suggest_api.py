@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def suggest(
-    wish: str | os.PathLike[str] | None = None,
+    request: str | os.PathLike[str] | None = None,
     *,
     seed: int = 0,
     jobs: int = 1,
@@ -25,7 +25,7 @@ def suggest(
     travel: str | None = None,
     angle: str | None = None,
     ripple: str | float | None = None,
-    room: Sequence[str] | None = None,
+    envelope: Sequence[str] | None = None,
     material: str | Sequence[str] | None = None,
     process: str | None = None,
     adjustable: Sequence[str] | None = None,
@@ -34,14 +34,14 @@ def suggest(
     min_yield: str | float | None = None,
     prefer: Sequence[str] | None = None,
 ) -> SuggestionsView:
-    """Return mechanisms of every family that do what is wished, the best first, and those not judged in full.
+    """Return mechanisms of every family that do what is required, the best first, and those not judged in full.
 
     Parameters
     ----------
-    wish : path-like, optional
-        A YAML file with a block `wish`.
+    request : path-like, optional
+        A YAML file with a block `suggest`.
     seed : int
-        Of everything random.
+        Random seed.
     jobs : int
         Processes; 1: only this one, in which a long job cannot be stopped when the time budget ends.
     time_budget : str or float, optional
@@ -52,7 +52,7 @@ def suggest(
         Over which the force, or the torque, is constant.
     ripple : str or float, optional
         Largest (max - min)/max over the travel.
-    room : sequence of str, optional
+    envelope : sequence of str, optional
         Box that it stays in, ``["80 mm", "60 mm", "6 mm"]``: across the travel, along it, and the depth.
     material : str or sequence of str, optional
         Allowed materials.
@@ -72,17 +72,17 @@ def suggest(
     Raises
     ------
     cfmkit.errors.SpecError
-        If the wish contradicts itself, or is malformed.
+        If the request contradicts itself, or is malformed.
 
     Examples
     --------
     >>> import cfmkit
-    >>> found = cfmkit.suggest(force="10 kN", travel="10 mm", room=["20 mm", "20 mm", "1 mm"], material="pla")
+    >>> found = cfmkit.suggest(force="10 kN", travel="10 mm", envelope=["20 mm", "20 mm", "1 mm"], material="pla")
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
     from cfmkit.runs.notebook_result import SuggestionsView
-    from cfmkit.runs.read_wish import wish_of
+    from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as searched
@@ -91,9 +91,10 @@ def suggest(
         return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
     keys = stated(
-        force=force, torque=torque, travel=travel, angle=angle, ripple=ripple, room=room, material=material,
+        force=force, torque=torque, travel=travel, angle=angle, ripple=ripple, envelope=envelope, material=material,
         process=process, adjustable=adjustable, hysteresis=hysteresis, cycles=cycles, prefer=prefer,
     ) | ({} if min_yield is None else {"yield": min_yield})  # fmt: skip
-    block = wish_of(None if wish is None else os.fspath(wish), {key: written(value) for key, value in keys.items()})
+    name = None if request is None else os.fspath(request)
+    block = read_request(name, {key: written(value) for key, value in keys.items()})
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
-    return SuggestionsView.of(searched(block.wish(), run, block.prefer), block)
+    return SuggestionsView.of(searched(block.request(), run, block.prefer), block)

@@ -63,7 +63,7 @@ def sweep(
     curves : bool, optional
         Keep the curve of every point.
     seed : int
-        Of everything random.
+        Random seed.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def sensitivity(
     design : bool, optional
         Design the mechanism anew at each sample.
     seed : int, optional
-        Of everything random.
+        Random seed.
 
     Raises
     ------

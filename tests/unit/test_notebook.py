@@ -211,7 +211,7 @@ def test_what_was_not_solved_cannot_be_drawn():
 
 
 def test_suggestions_are_shown_as_the_page_of_the_command():
-    found = cfmkit.suggest(force="10 kN", travel="10 mm", room=["20 mm", "20 mm", "1 mm"], material="pla")
+    found = cfmkit.suggest(force="10 kN", travel="10 mm", envelope=["20 mm", "20 mm", "1 mm"], material="pla")
     shown = found._repr_html_()
     assert all(f"<td>{name}</td>" in shown for name in ("cam", "beam", "vcfm", "slider-crank"))
     assert 10 < len(repr(found)) < 2000
@@ -221,7 +221,7 @@ def test_suggestions_are_shown_as_the_page_of_the_command():
 @pytest.mark.slow
 def test_proposals_are_shown_with_their_numbers_and_drawn_to_one_scale():
     """Slow: one proposal is designed and judged."""
-    keys = {"force": "10 N", "travel": "3 mm", "room": ["80 mm", "70 mm", "13 mm"], "material": "pla"}
+    keys = {"force": "10 N", "travel": "3 mm", "envelope": ["80 mm", "70 mm", "13 mm"], "material": "pla"}
     found = cfmkit.suggest(**keys, time_budget="60 s")
     assert found.proposals
     shown = found._repr_html_()

@@ -192,12 +192,12 @@ def test_signatures_name_every_argument(name):
 
 def test_signatures_have_the_keys_of_the_blocks_that_they_stand_for():
     from cfmkit.specs.spec import Sensitivity, Sweep
-    from cfmkit.studies.suggest.spec import WishBlock
+    from cfmkit.studies.suggest.spec import SuggestBlock
 
     for function, block, others in (
         (cfmkit.sweep, Sweep, {"spec", "jobs", "seed"}),
         (cfmkit.sensitivity, Sensitivity, {"spec", "jobs"}),
-        (cfmkit.suggest, WishBlock, {"wish", "seed", "jobs", "time_budget"}),
+        (cfmkit.suggest, SuggestBlock, {"request", "seed", "jobs", "time_budget"}),
     ):
         keys = {"min_yield" if name == "made_well" else name for name in block.model_fields}
         assert set(inspect.signature(function).parameters) - others == keys
