@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from cfmkit.errors import ExitCode
 
 HEADS = ("", "variant", "mean", "ripple", "size", "safety", "parts", "model")
-"""Of the table; "hysteresis" follows where a proposal has some, and "yield" where one is required."""
+"""Of the table, as far as a proposal has a value; "hysteresis" and "yield" follow where there are some."""
+
+NO_VALUE = "-"
 
 VARIANT = 1
 """The column whose cells may be cut; a number is never."""
@@ -66,18 +68,17 @@ def _next(found: Sequence[Mapping[str, Any]], files: Written) -> str:
 
 def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
     more = _shares(record)
-    heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
     proposals, unjudged = record["proposals"], record["unjudged"]
-    for heading, listed, first in (
-        ("proposals", proposals, 1),
-        ("not judged in full", unjudged, len(proposals) + 1),
-    ):
-        rows = tuple(
-            (*_row(number, one, record), *(_share(one[name]) for name in more))
-            for number, one in enumerate(listed, first)
-        )
-        if rows:
-            yield PageTable(heading, heads, rows)
+    rows = [
+        (*_row(number, one, record), *(_share(one[name]) for name in more))
+        for number, one in enumerate((*proposals, *unjudged), 1)
+    ]
+    heads = (*HEADS, *more)
+    kept = [column for column in range(len(heads)) if any(row[column] not in ("", NO_VALUE) for row in rows)]
+    columns = tuple(GridColumn(heads[column], column == VARIANT) for column in kept)
+    for heading, listed in (("proposals", rows[: len(proposals)]), ("not judged in full", rows[len(proposals) :])):
+        if listed:
+            yield PageTable(heading, columns, tuple(tuple(row[column] for column in kept) for row in listed))
     pair = (GridColumn("", False), GridColumn())
     near = tuple((one["family"], f"{one['variant']}: {one['misses'][0]}") for one in record["near_misses"])
     if near:
@@ -145,13 +146,13 @@ def _row(number: int, one: Mapping[str, Any], record: Mapping[str, Any]) -> tupl
         Span(f"{number} {one['family']}", link=quote(f"{one['folder']}/report.html")),
         one["variant"],
         f"{one['mean']:.4g} {unit}",
-        "-" if one["ripple"] is None else f"{100 * one['ripple']:.2g} %",
+        NO_VALUE if one["ripple"] is None else f"{100 * one['ripple']:.2g} %",
         " x ".join(f"{side:.3g}" for side in sides if side is not None) + " mm",
-        "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
+        NO_VALUE if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
         str(one["parts"]),
         one["model"],
     )
 
 
 def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.3g} %"
+    return NO_VALUE if value is None else f"{100 * value:.3g} %"

@@ -14,7 +14,7 @@ from cfmkit.arrays import Several, named
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.metrics.compare import TOLERANCE
-from cfmkit.plots.figure_options import PLAIN, FigureForm
+from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
@@ -55,7 +55,7 @@ class BatchWork:
         """Everything in it that decides what a run finds and writes."""
         given = self.common
         page = ["report"] if given.page else []  # without a page: as it always was, so that earlier batches are reused
-        form = [] if given.form.plain else [repr(given.form), repr(given.form.settings)]
+        form = [] if given.form.is_default else [repr(given.form), repr(given.form.settings)]
         return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page, *form]
 
     def __call__(self, job: BatchJob) -> Entry:
@@ -427,7 +427,7 @@ def batch(
         addressed(change)
     named = _named(specs)
     files = sources(named, place)
-    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
+    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)

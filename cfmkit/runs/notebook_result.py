@@ -131,7 +131,7 @@ class SuggestionsView(Suggestions):
         from cfmkit.documents.notebook import shown
         from cfmkit.documents.suggestion_document import document_of
         from cfmkit.runs.suggestion_files import as_json, exit_code
-        from cfmkit.studies.suggest.pareto_and_scale_drawings import to_one_scale
+        from cfmkit.studies.suggest.figures import to_one_scale
 
         assert self.block is not None  # `of`
         figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
