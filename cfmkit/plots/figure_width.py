@@ -114,10 +114,10 @@ def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool)
                 ax.tick_params(labelleft=True, labelbottom=True)
             if number in layout.broken:
                 _break_label(ax)
+        for text in figure.texts:
+            _keep_note_on_paper(text, figure)
     for ax in figure.axes:
         _keep_name_on_paper(ax)
-    for text in figure.texts:
-        _keep_note_on_paper(text, figure)
     return figure
 
 
@@ -221,10 +221,11 @@ def _free_margins(figure: Figure, new_width: float) -> Box:
     scale = 25.4 / figure.dpi
     low, high = extents[:, :2].min(axis=0) * scale, extents[:, 2:].max(axis=0) * scale
     width, height = figure.bbox.width * scale, figure.bbox.height * scale
-    texts = [text.get_window_extent() for text in figure.texts]
+    texts = [one.get_window_extent() for one in (*figure.texts, *figure.legends)]
     beside = any(text.x0 * scale > high[0] - 1.0 for text in texts)
     right = (width - high[0]) * new_width / width if beside else PAD_MM
-    above = max((height - text.y0 * scale + 0.5 for text in texts if text.y0 * scale > high[1] - 1.0), default=0.0)
+    # where it begins decides: what takes more lines than before may reach into the axes
+    above = max((height - text.y0 * scale + 0.5 for text in texts if text.y1 * scale > high[1] - 2.0), default=0.0)
     below = max((text.y1 * scale for text in texts if text.y1 * scale < low[1] + 1.0), default=0.0)
     return PAD_MM, max(below, PAD_MM), right, max(above, PAD_MM)
 
