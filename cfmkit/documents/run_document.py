@@ -194,7 +194,7 @@ def span(low: float, high: float, dimension: str) -> str:
 # --- title ------------------------------------------------------------------------------------------------------------
 
 
-def _window(report: Report) -> Window | None:
+def shown_window(report: Report) -> Window | None:
     """Return the window of the title: that of the analysis, else the one that all requirements share."""
     if (own := window_of(report.result)) is not None:
         return left_of(own, report.result)
@@ -207,7 +207,7 @@ def _summary(report: Report) -> str:
     result = report.result
     if not result.status.usable or not result.curves:
         return ""
-    curve, window = result.curve, _window(report)
+    curve, window = result.curve, shown_window(report)
     name = f"{curve.kind}_mean"
     measured = report.metrics
     if window is not None and window_of(result) is None:
@@ -420,7 +420,7 @@ def _required(report: Report, requirement: Requirement, outcome: Outcome) -> Val
 
 def _is_title(report: Report, window: Window) -> bool:
     """Return True if a window is the one that the title states."""
-    shown = _window(report)
+    shown = shown_window(report)
     if shown is None:
         return False
     slack = 1e-9 * max(abs(shown.lo), abs(shown.hi))

@@ -34,7 +34,7 @@ def explorer(tmp_path):
 @pytest.mark.parametrize("name", ["cam", "slider_crank_li2019", "vcfm_ding2022", "cam_six_springs"])
 def test_every_number_has_a_slider_whose_ends_the_file_takes(name):
     explorer = Explorer.of(str(CONFIGS / f"{name}.yaml"))
-    sliders = explorer.sliders()
+    sliders = explorer.sliders
     assert len({slider.path for slider in sliders}) == len(sliders) > 10
     document = explorer.document
     for slider in sliders:
