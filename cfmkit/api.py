@@ -86,8 +86,9 @@ def loads(text: str | bytes, source: str = "text") -> Spec:
     """
     from cfmkit.runs.specfile import bind
     from cfmkit.specs.yamlio import read_document
+    from cfmkit.specs.yamlio.base_file import with_base
 
-    return bind(read_document(text, source))
+    return bind(with_base(read_document(text, source)))
 
 
 def dumps(spec: Spec, complete: bool = False) -> str:

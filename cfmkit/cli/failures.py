@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
 
+MAX_EXCERPTS = 10
+"""Problems with the line of the file below them: more are a list to read, not a place to look at."""
+
 ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 """What the option parser raises; typer does not name it itself."""
 
@@ -93,7 +96,9 @@ def code_of(error: BaseException) -> ExitCode:
 def _lines(error: BaseException) -> Iterator[str]:
     """Yield what standard error shows; faults of a file start with their place, as editors want it."""
     if isinstance(error, SpecError):
-        yield from errors.lines_of(error)
+        for number, line in enumerate(errors.lines_of(error)):
+            yield line
+            yield from error.problems[number].excerpt if number < MAX_EXCERPTS else ()
         return
     for entry in _entries(error):
         yield f"error    {entry['message']}"
@@ -101,7 +106,8 @@ def _lines(error: BaseException) -> Iterator[str]:
 
 def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
     if isinstance(error, SpecError):
-        yield from (asdict(problem) for problem in error.problems)
+        for problem in error.problems:
+            yield {name: value for name, value in asdict(problem).items() if name != "text"}
     else:
         yield {"message": shortened(_reported(error))}
 

@@ -83,7 +83,7 @@ class BatchWork:
         spec = spec_of(wanted)
         verb = _verb(self.verb or _natural(spec), self.fresh)
         name = " ".join(spec.name.split())
-        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec))
+        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
         try:
             outcome = carried_out(verb, wanted, self.arguments)
         except CfmError as error:
@@ -99,12 +99,15 @@ def _natural(spec: Spec) -> str:
     return "design" if designs else "analyze"
 
 
-def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
-    """Return the data files that a specification names, and the hashes of their content."""
+def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
+    """Return the files that a specification takes values and data from, and the hashes of their content."""
     from cfmkit.specs.data_file_paths import named_in
+    from cfmkit.specs.yamlio.base_file import base_files
     from cfmkit.store import file_hash
 
-    return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
+    folder = os.path.dirname(file) or "."
+    bases = tuple((os.path.relpath(base, folder), file_hash(base.resolve())) for base in base_files(file))
+    return (*bases, *((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump())))
 
 
 def _verb(name: str, fresh: bool) -> Verb:
@@ -281,6 +284,8 @@ class BatchResult:
         What was written there.
     compared : BatchComparison or None
         With an earlier batch.
+    accepted : str
+        The folder of the reference that has these results now; empty if none was to be replaced.
     """
 
     entries: tuple[Entry, ...]
@@ -288,6 +293,7 @@ class BatchResult:
     folder: str
     files: tuple[str, ...]
     compared: BatchComparison | None = None
+    accepted: str = ""
 
     def __post_init__(self) -> None:
         """Keep the texts of what is inside short."""
@@ -343,6 +349,7 @@ def batch(
     summary: str | None = None,
     compare: str | os.PathLike[str] | None = None,
     compare_tolerance: float | None = None,
+    accept: bool = False,
     page: bool = False,
     form: FigureForm | None = None,
     arguments: Sequence[str] = (),
@@ -385,6 +392,9 @@ def batch(
         The folder of an earlier batch; what has changed beyond the tolerance is a missed requirement. It may be `out`.
     compare_tolerance : float, optional
         Relative change of a metric that counts as none; default: 1e-6.
+    accept : bool
+        Make the results the reference: they replace those in the folder `compare`, which need not exist yet. Changes
+        are still listed, but are no missed requirement.
     page : bool
         Whether to write a ``report.html`` for each, and one for all that links them.
     form : FigureForm, optional
@@ -437,7 +447,9 @@ def batch(
     if not 0 <= tolerance < 1:
         meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
         raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")
-    before = None if compare is None else earlier(os.fspath(compare))
+    reference = "" if compare is None else os.fspath(compare)
+    begins = accept and batch_output_files.check_reference(reference, place)
+    before = None if compare is None or begins else earlier(reference)
     watched = monitor or Unwatched()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
@@ -445,20 +457,22 @@ def batch(
         compared = None
         if before is not None:
             changed = changes_of(before, entries, place, tolerance)
-            compared = BatchComparison(os.fspath(compare or ""), tolerance, changed, gone(before, entries))
+            compared = BatchComparison(reference, tolerance, changed, gone(before, entries))
         code = exit_code(entries, watched.stopped)
-        if compared is not None and compared.beyond and not watched.stopped:
+        if compared is not None and compared.beyond and not watched.stopped and not accept:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
         written = batch_output_files.write(
             folder, entries, batch_output_files.about(work.arguments, work.common.seed, named, code), page, compared
         )
+    if accepted := accept and not watched.stopped:
+        batch_output_files.write_reference(reference, place, entries, work.arguments)
     if report is not None:
         report(junit_of(entries))
     if reported is not None:
         from cfmkit.documents.markdown import summary as in_markdown
 
         reported(in_markdown(entries, compared))
-    return BatchResult(entries, code, place, written, compared)
+    return BatchResult(entries, code, place, written, compared, reference if accepted else "")
 
 
 def _named(specs: Any) -> list[str]:

@@ -295,7 +295,7 @@
       const text = `${key.path.replaceAll("_", " ")} ${key.path} ${key.row.title}`.toLowerCase();
       key.row.hidden = !words.every((word) => text.includes(word));
     }
-    by("others").open = words.length > 0 || by("leading").hidden;
+    by("others").open = words.length > 0 || !by("leading").querySelector(".key");
     tidy();
   });
 
