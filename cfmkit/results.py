@@ -1,4 +1,4 @@
-"""What an analysis or a design gives back: values, never half-finished objects.
+"""Outcome of an analysis or a design: values, never half-finished objects.
 
 A `Status` says how far the solver came; its value is the sentence the user
 reads. Whether the mechanism is any good is not a status: that is what the

@@ -61,7 +61,7 @@ def go_on(fresh: bool) -> str:
 
 
 def told(error: BaseException, terminal: Terminal) -> Document:
-    """Tell the user what went wrong, with its traceback if that is wanted; return the answer with its exit code."""
+    """Report an error to the user, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
     answer = answer_to(error)
@@ -70,7 +70,7 @@ def told(error: BaseException, terminal: Terminal) -> Document:
 
 
 def fail(error: BaseException, terminal: Terminal) -> ExitCode:
-    """Tell the user what ended the command; return the exit code."""
+    """Report what ended the command; return the exit code."""
     answer = told(error, terminal)
     if terminal.json:
         # What could not be written may be this very output.

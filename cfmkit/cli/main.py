@@ -150,7 +150,7 @@ def _tell_more() -> None:
 
 
 def _failed(error: BaseException, terminal: Terminal) -> ExitCode:
-    """Tell of an error; a signal may arrive while that is done."""
+    """Report an error; a signal may arrive while that is done."""
     try:
         return fail(error, terminal)
     except Stopped as stop:

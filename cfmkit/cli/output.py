@@ -1,4 +1,4 @@
-"""What the user wants to see, and the streams it goes to: results to standard output, all else to standard error."""
+"""Options of output, and its streams: results to standard output, all else to standard error."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class ProgressLines:
         self._most = 0.0
 
     def report(self, fraction: float, text: str) -> None:
-        """Tell how far a run is, by the share that is done, if the last line is old enough."""
+        """Report the share of a run that is done, if the last line is old enough."""
         now, self._most = time.monotonic(), max(self._most, fraction)
         if now - self._reported >= LINE_EVERY and 0.0 < self._most < 1.0:
             self._reported = now

@@ -1,4 +1,4 @@
-"""How far a study is, on standard error: a bar for whoever watches, else a line now and then.
+"""Progress of a study on standard error: a bar for whoever watches, else a line now and then.
 
 The first Ctrl-C asks the study to finish what runs and to write what there is; the
 second ends it at once.

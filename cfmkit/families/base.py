@@ -1,4 +1,4 @@
-"""What a family of mechanisms must offer: a frozen record of functions, not a base class."""
+"""Interface of a family of mechanisms: a frozen record of functions, not a base class."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ SHARED = {
 
 
 @dataclass(frozen=True)
-class Envelope:
+class BoundingBox:
     """The box that a mechanism stays in over all of its travel, with everything that is drawn of it."""
 
     # across, along: in the plane, across and along the direction of travel [m]
@@ -146,7 +146,7 @@ class Envelope:
     drawn: tuple[float, float]  # width and height of the box along x and y of the drawings [m]
 
     @classmethod
-    def around(cls, part: PosedPart) -> Envelope:
+    def around(cls, part: PosedPart) -> BoundingBox:
         """Return the box around a mechanism over its motion, along its travel and along x and y."""
         from cfmkit.export.posed_part import box
 
@@ -285,10 +285,10 @@ class Family:
             return result
         return sized(result, self.envelope(result))
 
-    def envelope(self, result: Result) -> Envelope | None:
+    def envelope(self, result: Result) -> BoundingBox | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
         part = function_named(self.part)(result) if self.part else None
-        return None if part is None else Envelope.around(part)
+        return None if part is None else BoundingBox.around(part)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
@@ -336,7 +336,7 @@ def _own_quantity(metric: OwnMetric, result: Result) -> Quantity:
     return Quantity(number, *about) if math.isfinite(number) else Quantity(None, *about, reason="it is not finite")
 
 
-def sized(result: Result, space: Envelope | None) -> Result:
+def sized(result: Result, space: BoundingBox | None) -> Result:
     """Return a result with the sizes of its box among its values; without a value where the box is not known."""
     sides = (None, None, None) if space is None else space.sides
     reason = (space.assumed if space else "") or "the box is not known"

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 MaterialBlock = Mapping[str, Any]
 
+Springs = Literal["catalogue", "custom"]
+"""Springs as they are sold, or made to a wire, a coil and a number of turns."""
+
 RESERVED = 0.8
 """Share of the strength that is used where made parts have to be good: sources scatter moduli by 10 % and more."""
 
@@ -28,7 +31,7 @@ what published mechanisms of printed plastic are bent to. The stress of what com
 
 @dataclass(frozen=True)
 class Request:
-    """What somebody wants of a mechanism."""
+    """Requirements of a mechanism that is to be suggested."""
 
     kind: Literal["force", "torque"]  # what is to be constant: over a travel, or over an angle
     target: float  # how large [N or N m]; of a band, its middle
@@ -46,10 +49,12 @@ class Request:
     # presses that it has to survive; judged where the material has fatigue data, whose allowable stress counts
     cycles: int | None = None
     thinnest: float = 2e-5  # thinnest leaf that the process makes [m]
+    springs: Springs | None = None  # that it may be put together with; None: either
+    safety: float = 1.0  # least strength over stress, of everything whose stress is known
     good_parts: float | None = None  # least share of manufactured parts that meet all of it
     # by which tolerances they are made; None: those of the process that is usual for the material
     process: str | None = None
-    # share of the allowable stress that designs by beams may use: solids have more stress, in fillets
+    # share of what the safety factor leaves that designs by beams may use: solids have more stress, in fillets
     reserve: float = 1.0
 
     @property
@@ -59,8 +64,8 @@ class Request:
 
     @property
     def strength_used(self) -> float:
-        """The share of the allowable stress that designs may use: made parts are thicker and stiffer than drawn."""
-        return self.reserve * (1.0 if self.good_parts is None else RESERVED)
+        """The share of the strength that designs may use: made parts are thicker and stiffer than drawn."""
+        return self.reserve * (1.0 if self.good_parts is None else RESERVED) / self.safety
 
     @property
     def with_strengths(self) -> tuple[Request, ...]:
@@ -102,6 +107,7 @@ class Candidate:
     # that model as it is
     correct: str = ""
     reserve: float = 1.0  # `Request.reserve` that it was proposed for, and is designed with
+    springs: Springs | None = None  # that it is put together with; None if it needs none
 
 
 def called(variant: str, request: Request, block: MaterialBlock) -> str:

@@ -1,4 +1,4 @@
-"""What a material does in use: cycles to failure, and the modulus that is left after a hold.
+"""Material in use: cycles to failure, and the modulus that is left after a hold.
 
 Fatigue: the window is one cycle, from the least stress in it to the largest and back, both taken at one place and with
 one sign. Goodman's line turns amplitude s_a and mean s_m into the fully reversed amplitude s_a / (1 - s_m / s_u)

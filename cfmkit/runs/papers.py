@@ -43,7 +43,7 @@ VERDICTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class PrintedRow:
-    """What a paper prints at one place."""
+    """Values that a paper prints at one place."""
 
     paper: str  # first author and year, as `cfmkit show references` has it
     family: str  # of the mechanism
@@ -257,7 +257,7 @@ def _reported(value: float, text: str) -> str:
 
 @dataclass(frozen=True)
 class _Scope:
-    """Where the names of a question have their values."""
+    """Values of the names in a question."""
 
     spec: str
     changes: tuple[str, ...] = ()

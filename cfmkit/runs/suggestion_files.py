@@ -45,7 +45,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Deadlines:
-    """What a run leaves out when it is late."""
+    """Deadlines of parts that a late run leaves out."""
 
     figures: Clock  # of the search and of proposals whose turn comes after it
     files: Clock  # of proposals, all but ``design.yaml``
@@ -101,6 +101,7 @@ def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
         "status": STATUSES[code],
         "message": message(found),
         "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+        "order": list(block.prefer),
         "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
         "unjudged": [
             _record(found, one, number) for number, one in enumerate(found.unjudged, len(found.proposals) + 1)
@@ -161,7 +162,9 @@ def _warnings(found: Suggestions) -> Iterator[dict[str, str]]:
 def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
     about = {"family": one.family, "variant": one.variant, **with_force(found, one)}
     place = {} if number is None else {"folder": folder_name(number, one)}
-    judged = {"model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings)}
+    judged = {
+        "verdict": one.verdict, "model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings),
+    }  # fmt: skip
     return about | place | judged | {"misses": list(one.missed), "notes": list(one.notes)}
 
 
@@ -272,17 +275,13 @@ def table(found: Suggestions) -> bytes:
         head = f"{found.request.kind}_mean" if name == "mean" else name
         values = tuple(each.get(name) for each in numbers)
         columns.append(TableColumn(head, values, unit if name == "mean" else border if dimension != "count" else None))
-    columns.append(TableColumn("verdict", tuple(_verdict(one) for _, one in rows)))
+    columns.append(TableColumn("verdict", tuple(one.verdict for _, one in rows)))
     columns.append(TableColumn("model", tuple(one.model for _, one in rows)))
     columns.append(TableColumn("warnings", tuple("; ".join(one.warnings) for _, one in rows)))
     columns.append(TableColumn("unjudged", tuple("; ".join(one.open) for _, one in rows)))
     columns.append(TableColumn("misses", tuple("; ".join(one.missed) for _, one in rows)))
     columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, one) for n, one in rows)))
     return to_csv(Table(tuple(columns)))
-
-
-def _verdict(one: Proposal) -> str:
-    return "meets" if one.good else "open" if one.passes else "fails"
 
 
 def page(

@@ -1,4 +1,4 @@
-"""What is varied: ``mechanism.roller_radius=8 mm:16 mm:5`` read against a specification.
+"""Variations: ``mechanism.roller_radius=8 mm:16 mm:5`` read against a specification.
 
 A range includes both ends and is spaced evenly in the unit of the border, so that
 8 mm to 16 mm in five steps is 8, 10, 12, 14, 16 mm and not 10.000000000000002 mm.

@@ -82,7 +82,7 @@ def test_the_next_line_is_a_command_that_writes_files_to_cut(published, tmp_path
 def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
     one = {"family": "cam", "variant": "2 springs", "mean": 20.0, "ripple": 0.01, "across": 1.0, "along": 2.0}
     one |= {"depth": None, "safety_factor": None, "parts": 3, "hysteresis": None, "model": "quasi-static"}
-    one |= {"unjudged": [], "warnings": []}
+    one |= {"unjudged": [], "warnings": [], "verdict": "meets", "life": None, "yield": None}
     both = [one | {"folder": "1-cam-2-springs"}, one | {"folder": "10-cam"}]
     data = {
         "message": "2 mechanisms meet the requirements",
@@ -90,6 +90,7 @@ def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
         "suggest": {},
         "near_misses": [],
         "unjudged": [],
+        "order": ["size"],
     }
     written = Written("out", ("1-cam-2-springs/design.yaml", "10-cam/design.yaml", "10-cam/metrics.json"))
     document = document_of(data | {"families": [], "warnings": []}, ExitCode.OK, written)

@@ -38,7 +38,14 @@ from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, order
 
 REQUESTS = Path(__file__).parents[1] / "requests"
 
-POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "envelope": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
+POM = {
+    "safety": "1",
+    "force": "10 N",
+    "travel": "3 mm",
+    "ripple": "3 %",
+    "envelope": "[80 mm, 60 mm, 12 mm]",
+    "material": "pom",
+}
 
 
 def request(**keys):

@@ -27,10 +27,18 @@ from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judged, made
+from cfmkit.studies.suggest.requirements_of_request import demanded
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "envelope": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
+POM = {
+    "safety": "1",
+    "force": "10 N",
+    "travel": "3 mm",
+    "ripple": "3 %",
+    "envelope": "[80 mm, 60 mm, 12 mm]",
+    "material": "pom",
+}
 
 
 def block(**keys):
@@ -391,3 +399,48 @@ def test_links_that_yield_are_found():
     assert values["link_stress_max"].value > 60e6
     assert values["link_safety_factor"].value < 1.0
     assert values["link_turn_share_max"].value > 0.3
+
+
+def test_a_safety_factor_is_required_of_stresses_and_leaves_less_strength_to_the_laws():
+    usual = read_request(None, {key: value for key, value in POM.items() if key != "safety"}).request()
+    assert usual.safety == 1.5
+    assert usual.strength_used == pytest.approx(request().strength_used / 1.5)
+    result = cfmkit.analyze("configs/vcfm_pla.yaml")
+    rows = {one["metric"]: one for one in demanded(usual, result, None, ())}
+    assert rows["safety_factor"]["min"] == "1.5"
+
+
+@pytest.mark.parametrize(
+    ("proposal", "verdict"),
+    [
+        (Proposal("cam", "a", text="x"), "meets"),
+        (Proposal("cam", "a", text="x", unjudged=("life not judged: no S-N data for petg",)), "open: life"),
+        (Proposal("cam", "a", text="x", pending="solid"), "open: solid"),
+        (
+            Proposal(
+                "cam", "a", text="x", missed=("1", "2", "3"), fails=("stress", "force", "stress"), pending="solid"
+            ),
+            "fails: stress, force",
+        ),
+    ],
+)
+def test_a_verdict_names_what_fails_or_is_open(proposal, verdict):
+    assert proposal.verdict == verdict
+    assert Proposal.of_record(proposal.as_record()).verdict == verdict
+
+
+def test_a_mechanism_whose_springs_are_stretched_too_far_is_no_proposal():
+    """It misses no number that was required: only a warning says it."""
+    spec = cfmkit.load("configs/cam.yaml").replace({"mechanism.springs.max_elongation": 0.05})
+    found = judged("cam", "2 springs", spec, request(force="50 N", travel="100 mm", envelope="[1 m, 1 m]"))
+    assert found.fails == ("springs",)
+    assert found.missed[0].startswith("spring_overstretched: ")
+    assert found.near
+
+
+def test_only_springs_of_the_kind_that_is_required_are_offered():
+    kinds = {None: {"catalogue", "custom"}, "catalogue": {"catalogue"}, "custom": {"custom"}}
+    for springs, allowed in kinds.items():
+        asked = request(envelope="[80 mm, 60 mm, 20 mm]", **({"springs": springs} if springs else {}))
+        offer = offer_of(family("cam"), asked, Run())
+        assert {one.springs for one in offer.candidates} == allowed

@@ -21,7 +21,14 @@ from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, Proposa
 from cfmkit.studies.suggest.search import _key, _Making, _Times
 from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, moved_for_yield
 
-POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "envelope": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
+POM = {
+    "safety": "1",
+    "force": "10 N",
+    "travel": "3 mm",
+    "ripple": "3 %",
+    "envelope": "[80 mm, 60 mm, 12 mm]",
+    "material": "pom",
+}
 MEASURED = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
 
 
@@ -171,10 +178,18 @@ def test_a_strip_moved_for_a_yield_has_it():
 
 
 def test_the_page_says_how_the_search_ended_and_v_how_long_it_took():
-    text = "3 mechanisms meet the request; the time budget ended the search before everything was tried"
-    data = {"message": text, "proposals": [], "unjudged": [], "near_misses": [], "families": [], "warnings": []}
+    text = "3 mechanisms meet the requirements; the time budget ended the search before everything was tried"
+    data = {
+        "message": text,
+        "proposals": [],
+        "unjudged": [],
+        "near_misses": [],
+        "order": [],
+        "families": [],
+        "warnings": [],
+    }
     document = document_of(data | {"suggest": {}}, ExitCode.OK, Written("out", (), 94.7))
     short, full = (printed(page(document, 80, everything), 80) for everything in (False, True))
-    assert short.startswith("suggest   3 mechanisms meet the request\n")
+    assert short.startswith("suggest   3 mechanisms meet the requirements\n")
     assert "the time budget ended the search before everything was tried" in " ".join(short.split())
     assert "94.70 s" in full

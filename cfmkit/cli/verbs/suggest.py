@@ -78,6 +78,12 @@ class SuggestOptions(Common):
     hysteresis: Annotated[
         str | None, _key("hysteresis", "SHARE", "Largest energy loss of a cycle, as a share of its work.")
     ] = None
+    springs: Annotated[
+        str | None, _key("springs", "KIND", "Helical springs it may have: catalogue or custom; default: either.")
+    ] = None
+    safety: Annotated[
+        str | None, _key("safety", "FACTOR", "Least safety factor of stresses, against yield; default: 1.5.")
+    ] = None
     cycles: Annotated[
         str | None, _key("cycles", "N", "Required life in cycles; judged for materials with fatigue data.")
     ] = None
@@ -103,7 +109,7 @@ class SuggestOptions(Common):
 
 KEYS = (
     "force", "torque", "travel", "angle", "ripple", "envelope", "material", "process", "adjustable", "hysteresis",
-    "cycles", "made_well", "prefer",
+    "springs", "safety", "cycles", "made_well", "prefer",
 )  # fmt: skip
 """Options that are keys of a request."""
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.posed_part import box
-from cfmkit.families.base import Envelope
+from cfmkit.families.base import BoundingBox
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.part import as_made, part_over_motion
@@ -81,7 +81,7 @@ class Kept:
     motion: FloatArray
     force: FloatArray
     stress: FloatArray
-    envelope: Envelope
+    envelope: BoundingBox
 
 
 @lru_cache(maxsize=1)
@@ -102,7 +102,7 @@ def _followed(name: str) -> Kept:
     part = part_over_motion(result)
     assert part is not None
     curve = result.curve
-    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, Envelope.around(part))
+    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, BoundingBox.around(part))
 
 
 def _in_two_layers(kept: Kept) -> Kept:

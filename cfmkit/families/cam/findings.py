@@ -1,4 +1,4 @@
-"""What a cam mechanism can suffer from, by name, and the checks that find it and put it into numbers.
+"""Warnings of the cam family: their rules and sentences.
 
 The names are stable; the sentences say what the name means. The message that a run reports carries the numbers that
 decide and the cure.

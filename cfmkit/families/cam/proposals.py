@@ -153,7 +153,7 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         if material.yield_strength is None:
             continue
         modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
-        bearable = YIELD_PRESSURE * material.yield_strength
+        bearable = YIELD_PRESSURE * material.yield_strength / request.safety
         thick = max(PLATE_MIN, 1.1 * LOAD * request.target * modulus / (np.pi * size["roller"] * bearable**2))
         depths = {}
         for count in COUNTS:
@@ -190,7 +190,13 @@ def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
 def _from_catalogue(made: Candidate) -> Candidate:
     """Return the same proportions with springs of the generic series; from these the force constant follows."""
     spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
-    return replace(made, variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant), spec=spec, finish="")
+    return replace(
+        made,
+        variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
+        spec=spec,
+        finish="",
+        springs="catalogue",
+    )
 
 
 def _written(
@@ -230,7 +236,7 @@ def _written(
     area = size["width"] * size["height"] / (request.envelope[0] * request.envelope[1])
     variant = called(f"{count} spring{'s' if count > 1 else ''}", request, material)
     promise = area + size["ripple"] / request.ripple
-    return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise)
+    return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise, springs="custom")
 
 
 def _out_of_reach(request: Request, found: dict[str, Any]) -> FamilyOffer:

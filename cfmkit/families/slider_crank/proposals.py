@@ -271,7 +271,11 @@ def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
 
 
 def _strip(
-    request: Request, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
+    request: Request,
+    material: dict[str, Any],
+    lengths: Proportions,
+    crank: float,
+    travel: tuple[float, float],
 ) -> Candidate:
     """Return a strip of one thickness, to be sized by stress and force."""
     thick, wide = (request.thinnest, THICKEST * crank), (request.thinnest, request.depth or crank)
@@ -300,7 +304,11 @@ def _strip(
 
 
 def _tapered(
-    request: Request, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
+    request: Request,
+    material: dict[str, Any],
+    lengths: Proportions,
+    crank: float,
+    travel: tuple[float, float],
 ) -> Candidate:
     """Return a strip of varying thickness, to be searched for the flattest force."""
     plain = _strip(request, material, lengths, crank, travel)
@@ -313,7 +321,11 @@ def _tapered(
 
 
 def _flexures(
-    request: Request, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
+    request: Request,
+    material: dict[str, Any],
+    lengths: Proportions,
+    crank: float,
+    travel: tuple[float, float],
 ) -> Candidate:
     """Return a chain of links and flexures: first the springs for the force, then flexures of that stiffness."""
     scale = crank / 0.054

@@ -158,7 +158,9 @@ def _turned(request: Request, share: float, linkage: tuple[float, float, float, 
         "analysis": {"angle": (low, within[1]), "points": 961},
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("springs at pins", spec, finish=FINISH, promise=-min(most / request.target, STRONG))
+    return Candidate(
+        "springs at pins", spec, finish=FINISH, promise=-min(most / request.target, STRONG), springs="custom"
+    )
 
 
 def _within(request: Request, unloaded: float) -> tuple[float, float]:
@@ -418,7 +420,7 @@ def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: 
             break
     else:
         return most
-    return Candidate("springs at pins", spec, finish=FINISH, promise=largest_first(crank, request))
+    return Candidate("springs at pins", spec, finish=FINISH, promise=largest_first(crank, request), springs="custom")
 
 
 def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:

@@ -248,7 +248,7 @@ def _coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes: Desig
     # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
     listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": request.depth})
     variant = called("2 Vs, catalogue springs", request, block)
-    return Candidate(variant, listed, True, FINISH, float(promise), correct=CORRECT)
+    return Candidate(variant, listed, True, FINISH, float(promise), correct=CORRECT, springs="catalogue")
 
 
 def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: float) -> Iterator[CatalogueSpring]:

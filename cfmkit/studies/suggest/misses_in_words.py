@@ -1,4 +1,4 @@
-"""What a mechanism misses of a request, in words: its envelope, its travel, and a force that wide beams raise."""
+"""Requirements that a mechanism misses, in words: its envelope, its travel, and a force that wide beams raise."""
 
 from __future__ import annotations
 
@@ -10,12 +10,49 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.base import Envelope
+    from cfmkit.families.base import BoundingBox
     from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
 
 SLACK = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
+
+
+TOPICS = {
+    "ripple": "ripple", "safety": "stress", "life": "life", "hysteresis": "hysteresis", "adjusted": "adjustment",
+    "link_turn": "stiffness",
+}  # fmt: skip
+"""Parts of names of metrics, and what a requirement on them is about; all others are about the force."""
+
+DISQUALIFYING = {
+    "stress": ("overstressed", "surface_stress_exceeded", "bearing_overloaded"),
+    "springs": (
+        "spring_overstretched", "spring_buckles", "spring_binds_on_pin", "spring_slack", "spring_closed",
+        "joint_overrotated",
+    ),
+    "force": ("lift_off", "tip_jams", "tip_lifts_off", "force_negative"),
+    "stability": ("unstable", "unstable_branch", "asymmetric_buckling", "out_of_plane_buckling"),
+    "clearance": ("parts_touch", "rollers_collide", "flanks_collide", "beams_touch", "meets_itself"),
+    "drawing": ("part_not_drawn", "joined_away_from_nodes"),
+}  # fmt: skip
+"""Warnings of an analysis with which a mechanism is no proposal, whatever its numbers say, by what they are about."""
+
+
+def topic_of(metric: str) -> str:
+    """Return what a requirement on a metric is about, in a word.
+
+    Examples
+    --------
+    >>> topic_of("force_ripple"), topic_of("link_safety_factor"), topic_of("force_mean")
+    ('ripple', 'stress', 'force')
+    """
+    return next((topic for part, topic in TOPICS.items() if part in metric), "force")
+
+
+def disqualifying(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield topic and sentence of every warning with which a mechanism is no proposal."""
+    for topic, names in DISQUALIFYING.items():
+        yield from ((topic, f"{one.name}: {one.message}") for one in result.warnings if one.name in names)
 
 
 def largest_force(request: Request, result: Result) -> float:
@@ -34,7 +71,7 @@ def raised_out(request: Request, force: float, share: float) -> list[str]:
     return [f"wide_beam: the {request.kind} is between {texts[0]} and {texts[1]}, allowed <= {texts[2]}"]
 
 
-def outside(request: Request, space: Envelope | None) -> Iterator[str]:
+def outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
     """Yield by which sides a mechanism leaves the envelope; one that turns may lie either way in the plane."""
     if space is None:
         yield "the envelope that it needs is not known"

@@ -23,7 +23,14 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.studies.suggest.misses_in_words import largest_force, outside, raised_out, too_short
+from cfmkit.studies.suggest.misses_in_words import (
+    disqualifying,
+    largest_force,
+    outside,
+    raised_out,
+    too_short,
+    topic_of,
+)
 from cfmkit.studies.suggest.requirements_of_request import LIVES, demanded, unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
@@ -36,7 +43,7 @@ from cfmkit.studies.suggest.yield_of_proposal import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from cfmkit.families.base import Envelope
+    from cfmkit.families.base import BoundingBox
     from cfmkit.families.suggestion_request import Candidate, Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
@@ -83,6 +90,7 @@ class Proposal:
     # the complete specification with the request as its requirements; empty where nothing came of the candidate
     text: str = ""
     missed: tuple[str, ...] = ()  # one sentence for every hard request that it misses when it is analysed from its file
+    fails: tuple[str, ...] = ()  # what these sentences are about, in a word each: ``force``, ``stress``, ``size``
     message: str = ""  # why nothing came of it
     # in SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
     # ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is required),
@@ -119,6 +127,15 @@ class Proposal:
         return (*not_run, *self.unjudged)
 
     @property
+    def verdict(self) -> str:
+        """``meets``, ``fails: stress, force`` or ``open: life``."""
+        if self.missed:
+            return f"fails: {', '.join(dict.fromkeys(self.fails))}"
+        topics = [text.partition(" not ")[0] for text in self.unjudged]
+        topics += [self.pending] if self.pending else []
+        return f"open: {', '.join(dict.fromkeys(topics))}" if topics else "meets"
+
+    @property
     def near(self) -> bool:
         """Whether it misses exactly one request."""
         return bool(self.text) and len(self.missed) == 1
@@ -132,7 +149,8 @@ class Proposal:
         """Return it as plain lists and mappings."""
         return {
             "family": self.family, "variant": self.variant, "text": self.text, "missed": list(self.missed),
-            "message": self.message, "numbers": dict(self.numbers), "notes": list(self.notes), "movable": self.movable,
+            "fails": list(self.fails), "message": self.message, "numbers": dict(self.numbers),
+            "notes": list(self.notes), "movable": self.movable,
             "unjudged": list(self.unjudged), "model": self.model, "pending": self.pending,
             "warnings": list(self.warnings), "seconds": self.seconds, "own": self.own,
         }  # fmt: skip
@@ -140,7 +158,7 @@ class Proposal:
     @classmethod
     def of_record(cls, record: Mapping[str, Any]) -> Proposal:
         """Return what a record says."""
-        lists = {name: tuple(record[name]) for name in ("missed", "notes", "unjudged", "warnings")}
+        lists = {name: tuple(record[name]) for name in ("missed", "fails", "notes", "unjudged", "warnings")}
         return cls(**{**record, **lists})
 
 
@@ -335,39 +353,46 @@ def judged(
     seconds = time.perf_counter() - begun
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
-    space: Envelope | None = record.envelope(result)
+    space: BoundingBox | None = record.envelope(result)
     result, values = sized(result, space), values_of_family(record.values)
     required = plain.replace({"requirements": demanded(request, result, space, values)})
     text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
-    missed = [one.sentence for one in outcomes if not one.ok and one.metric not in ENVELOPE]
-    missed += outside(request, space)
-    missed += too_short(request, result)
+    misses = [
+        *((topic_of(one.metric), one.sentence) for one in outcomes if not one.ok and one.metric not in ENVELOPE),
+        *(("size", text) for text in outside(request, space)),
+        *(("travel", text) for text in too_short(request, result)),
+        *disqualifying(result),
+    ]
     pending = finest_of(name, written)
     pending = "" if pending == model_of(name, written) else pending
     numbers, movable = numbers_of(result, space, request), False
-    warnings = [one.name for one in result.warnings]
-    if "wide_beam" in warnings and not missed:
+    warnings = {one.name: f"{one.name}: {one.short}" if one.short else one.name for one in result.warnings}
+    if "wide_beam" in warnings and not misses:
         coarser = written if near is None else written.replace({FIDELITY: near.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
-        warnings = [f"wide_beam {100.0 * raised:+.2g} %" if one == "wide_beam" else one for one in warnings]
+        warnings["wide_beam"] = f"wide_beam {100.0 * raised:+.2g} %"
         # what its finest model is still to correct may come down to the lower end of the band
-        missed += raised_out(request, request.low if pending else largest_force(request, result), raised)
+        beyond = raised_out(request, request.low if pending else largest_force(request, result), raised)
+        misses += [("force", text) for text in beyond]
     if near is not None:
         numbers["yield"] = near.numbers.get("yield")
-        warnings += [f"yield by the {near.model} model"] if request.good_parts is not None else []
-    elif request.good_parts is not None and len(missed) <= 1:
-        parts: GoodParts = good_parts(replace(result, spec=written), request, clock, draw=not missed)
+        if request.good_parts is not None:
+            warnings["yield"] = f"yield by the {near.model} model"
+    elif request.good_parts is not None and len(misses) <= 1:
+        parts: GoodParts = good_parts(replace(result, spec=written), request, clock, draw=not misses)
         if parts.late:
             return Proposal(name, variant, message=OUT_OF_TIME)
-        movable = parts.movable and not missed
-        missed += [parts.missed] if parts.missed else []
+        movable = parts.movable and not misses
+        misses += [("yield", parts.missed)] if parts.missed else []
         numbers["yield"] = parts.share
     return Proposal(
-        name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)), movable,
-        tuple(unjudged(request, result)), model_of(name, written), pending, tuple(dict.fromkeys(warnings)),
-        seconds, near.model if near else "",
+        name, variant, text,
+        missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
+        notes=tuple(_notes(space, result)), movable=movable, unjudged=tuple(unjudged(request, result)),
+        model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
+        own=near.model if near else "",
     )  # fmt: skip
 
 
@@ -405,7 +430,7 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
     return spec
 
 
-def numbers_of(result: Result, space: Envelope | None, request: Request) -> dict[str, float | None]:
+def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> dict[str, float | None]:
     """Return what proposals are compared by, in SI."""
     kind = request.kind
     found = evaluate(result)
@@ -448,7 +473,7 @@ def _life(found: Mapping[str, Any]) -> float | None:
     return min(known, default=None)
 
 
-def _notes(space: Envelope | None, result: Result) -> Iterator[str]:
+def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     """Yield what a reader has to know: what was assumed, what rubs, what the analysis warns of."""
     if space is not None and space.assumed:
         yield space.assumed

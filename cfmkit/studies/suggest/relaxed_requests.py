@@ -64,6 +64,8 @@ def _relaxations(request: Request) -> dict[str, Relaxation]:
     found: dict[str, Relaxation] = {"envelope": _larger, request.kind: _weaker}
     found["travel" if request.kind == "force" else "angle"] = _shorter
     found["ripple"] = _rippled
+    if request.safety > 1.0:
+        found["safety"] = _less_safe
     if request.hysteresis is not None:
         found["hysteresis"] = _lossy
     if request.adjustable is not None:
@@ -121,7 +123,7 @@ def _met(request: Request, name: str, relaxed_by: tuple[Relaxation, float], seed
 
 
 def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> Relaxed:
-    """Return an relaxed envelope of which those sides are as they were that need not be larger."""
+    """Return a relaxed envelope of which those sides are as they were that need not be larger."""
     for side in reversed(range(len(request.envelope))):
         sides = tuple(
             old if k == side else new
@@ -173,6 +175,11 @@ def _shorter(request: Request, factor: float) -> Relaxed:
 def _rippled(request: Request, factor: float) -> Relaxed | None:
     text = percent(factor * request.ripple)
     return (replace(request, ripple=share), text) if (share := read_quantity(text, "ratio")) < LARGEST else None
+
+
+def _less_safe(request: Request, factor: float) -> Relaxed | None:
+    text = f"{request.safety / factor:.3g}"
+    return (replace(request, safety=float(text)), text) if float(text) >= 1.0 else None
 
 
 def _lossy(request: Request, factor: float) -> Relaxed | None:

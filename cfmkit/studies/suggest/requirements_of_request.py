@@ -1,4 +1,4 @@
-"""What is required, as the requirements that a proposal's file keeps, and what of it no model here can judge.
+"""Requirements that a proposal's file keeps, and those that no model here can judge.
 
 Every number of a request becomes a requirement on a metric, so that `cfmkit analyze` of the file says the same as the
 search. What a request asks for and nothing is known of, as the life of a material without fatigue data, is no
@@ -17,7 +17,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from cfmkit.families.base import Envelope
+    from cfmkit.families.base import BoundingBox
     from cfmkit.families.suggestion_request import Request
     from cfmkit.metrics import Definition
     from cfmkit.results import Quantity, Result
@@ -38,11 +38,11 @@ def windows_of(spec: Spec, request: Request) -> tuple[dict[str, Any], ...]:
 
     Solids are solved at the ends of the windows of all requirements: with this one they are those of the finished file.
     """
-    return ({"metric": "safety_factor", "min": "1", "over": pressed(request, spec)},)
+    return ({"metric": "safety_factor", "min": f"{request.safety:.12g}", "over": pressed(request, spec)},)
 
 
 def demanded(
-    request: Request, result: Result, space: Envelope | None, values: Iterable[Definition]
+    request: Request, result: Result, space: BoundingBox | None, values: Iterable[Definition]
 ) -> tuple[dict[str, Any], ...]:
     """Return the requirements that say what is required of a mechanism, over the window of its analysis.
 
@@ -51,7 +51,7 @@ def demanded(
     request : Request
     result : Result
         An analysis of the mechanism: only what it has metrics for is required.
-    space : Envelope or None
+    space : BoundingBox or None
         The box that it stays in.
     values : iterable of Definition
         Of the scalar results of its family.
@@ -118,14 +118,15 @@ def _of_effort(request: Request) -> Iterator[dict[str, Any]]:
 
 
 def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+    least = f"{request.safety:.12g}"
     if _known(found, "safety_factor") is not None:
-        yield {"metric": "safety_factor", "min": "1", "over": pressed(request, result.spec)}
+        yield {"metric": "safety_factor", "min": least, "over": pressed(request, result.spec)}
     if _known(found, "link_safety_factor") is not None:
-        yield {"metric": "link_safety_factor", "min": "1"}
+        yield {"metric": "link_safety_factor", "min": least}
         yield {"metric": "link_turn_share_max", "max": STRAIGHT_LINKS}
 
 
-def _of_box(request: Request, space: Envelope | None) -> Iterator[dict[str, Any]]:
+def _of_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, Any]]:
     if space is None:
         return
     width, height, depth = space.sides

@@ -119,7 +119,10 @@ class Suggestions:
 
 
 def suggest(
-    request: Request, run: Run, prefer: Sequence[str] = ("size", "ripple", "parts", "stress"), reserve: float = 0.0
+    request: Request,
+    run: Run,
+    prefer: Sequence[str] = ("size", "ripple", "parts", "stress"),
+    reserve: float = 0.0,
 ) -> Suggestions:
     """Return mechanisms that do what is required, of every family that has any.
 
@@ -155,7 +158,7 @@ def suggest(
     return Suggestions(
         request,
         tuple(ordered([one for one in passing if one.good], prefer)),
-        tuple(_near(done)),
+        tuple(_near(done, request)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
@@ -328,6 +331,10 @@ def _asked(request: Request, run: Run, name: str) -> FamilyOffer:
     return offer_of(record, request, run)
 
 
+OTHER = {"catalogue": "custom", "custom": "catalogue"}
+"""The springs that are not allowed where only the first ones are."""
+
+
 def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     """Return what a family could do with a request; elastic parts with a reserve of strength come first.
 
@@ -341,8 +348,11 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     for one, reserve in product(request.with_strengths, reserves):
         offer: FamilyOffer = propose(replace(one, reserve=reserve), run)
         for candidate in offer.candidates:
+            if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
+                continue
             found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
-    return FamilyOffer(tuple(found.values()), offer.reason)
+    reason = f"it needs {OTHER[request.springs]} springs" if offer.candidates and request.springs else ""
+    return FamilyOffer(tuple(found.values()), offer.reason if found else offer.reason or reason)
 
 
 def _next(
@@ -430,13 +440,25 @@ def measure(proposal: Proposal, name: str) -> float:
     return numbers.get(name, np.inf)
 
 
-def _near(done: Sequence[Proposal]) -> list[Proposal]:
-    """Return those that miss one request, two of each family at most."""
+MAX_OVERSIZE = 1.5
+"""Sides over those of the envelope up to which a mechanism is an alternative."""
+
+
+def _near(done: Sequence[Proposal], request: Request) -> list[Proposal]:
+    """Return those that miss one requirement, and no side of the envelope by far; two of each family at most."""
     found: list[Proposal] = []
     for name in dict.fromkeys(one.family for one in done):
-        near = [one for one in done if one.family == name and one.near]
+        near = [one for one in done if one.family == name and one.near and _nearly_fits(one, request)]
         found += sorted(near, key=lambda one: measure(one, "ripple"))[:2]
     return found
+
+
+def _nearly_fits(proposal: Proposal, request: Request) -> bool:
+    sides = [float(proposal.numbers.get(name) or 0.0) for name in ("across", "along", "depth")]
+    given = [*request.envelope, np.inf][:3]
+    if request.kind == "torque":  # what turns may lie either way in the plane
+        sides[:2], given[:2] = sorted(sides[:2]), sorted(given[:2])
+    return all(side <= MAX_OVERSIZE * most for side, most in zip(sides, given, strict=True))
 
 
 def _failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:

@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfmkit.families.base import article
-from cfmkit.families.suggestion_request import Request
+from cfmkit.families.suggestion_request import Request, Springs
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
-from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec  # noqa: TC001 - read by pydantic
+from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor  # noqa: TC001 - pydantic
 from cfmkit.stock.processes import PROCESSES, ProcessName, why_not_made
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
@@ -22,6 +22,9 @@ MEAN = 0.025
 
 RIPPLE = 0.05
 """Ripple where none is required."""
+
+SAFETY = 1.5
+"""Safety factor where none is required: usual for parts whose material and loads are known on average."""
 
 USUAL: dict[str, tuple[str, ...]] = {
     "fdm": ("pla", "petg", "abs"),
@@ -65,6 +68,8 @@ class SuggestBlock(Model):
         None, description="lowest and highest force of the adjustment"
     )
     hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
+    springs: Springs | None = Field(None, description="helical springs that it may have; default: either")
+    safety: SafetyFactor = Field(SAFETY, description="least safety factor of stresses, against yield")
     cycles: Annotated[int, Field(ge=1)] | None = Field(
         None, description="required life in cycles; checked for materials with `fatigue` data"
     )
@@ -177,6 +182,8 @@ class SuggestBlock(Model):
             adjustable=self.adjustable,
             hysteresis=self.hysteresis,
             cycles=self.cycles,
+            springs=self.springs,
+            safety=self.safety,
             good_parts=self.made_well,
             process=self.process,
             **({} if thinnest is None else {"thinnest": thinnest}),

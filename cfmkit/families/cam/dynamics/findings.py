@@ -1,4 +1,4 @@
-"""What is wrong with a motion of a cam mechanism: each failure mode, found and put into numbers."""
+"""Warnings about a motion of a cam mechanism."""
 
 from __future__ import annotations
 
