@@ -128,7 +128,7 @@ def spec_of(spec: AnySpec) -> Spec:
     return spec if isinstance(spec, Spec) else load(_path_of(spec))
 
 
-def stated(**keys: Any) -> dict[str, Any]:
+def given_arguments(**keys: Any) -> dict[str, Any]:
     """Return the keyword arguments that were given: those that are not None."""
     return {key: value for key, value in keys.items() if value is not None}
 
@@ -234,9 +234,9 @@ def evaluate(
     from cfmkit.runs.values_with_units import read_window
 
     chosen = names_of(names)  # registers functions, which are values of the result then
-    found = with_own_metrics(_result_of(result))
-    over = read_window(window, found.curve.kind) if window is not None else None
-    return Metrics(measured(found, chosen, over))
+    measurable = with_own_metrics(_result_of(result))
+    over = read_window(window, measurable.curve.kind) if window is not None else None
+    return Metrics(measured(measurable, chosen, over))
 
 
 def check(spec: AnySpec, changes: Iterable[str] = ()) -> tuple[Problem, ...]:

@@ -36,7 +36,7 @@ def shown(document: Document, figures: Mapping[str, Callable[[], Figure]] = NO_F
     """Return the HTML of a document with its tables and the first of some figures; `more` follows."""
     from cfmkit.plots.vector_formats import first_picture
 
-    tables = "".join(table_of(one, one.most or MAX_ROWS) for one in document.tables if one.most != 0)
+    tables = "".join(table_of(table, table.most or MAX_ROWS) for table in document.tables if table.most != 0)
     return f"<div>{text_of(document)}{tables}{first_picture(figures)}{more}</div>"
 
 

@@ -258,8 +258,11 @@ def metrics_table(metrics: Mapping[str, Quantity]) -> PageTable:
     for name, base, branch in named:
         if branch in branches and base in metrics:
             continue
-        each = [metrics.get(f"{name}[{one}]") for one in branches]
-        values = [_long_value(metrics[name]), *("" if one is None else _long_value(one) for one in each)]
+        by_branch = [metrics.get(f"{name}[{item}]") for item in branches]
+        values = [
+            _long_value(metrics[name]),
+            *("" if quantity is None else _long_value(quantity) for quantity in by_branch),
+        ]
         rows.append((name, *values, metrics[name].definition))
     heads = ("metric", "worst" if branches else "value", *branches, "what it is")
     return PageTable("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
@@ -274,8 +277,8 @@ def _long_value(quantity: Quantity) -> str:
 def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
     """Return one row for each requirement: its metric, the value, the bounds, and whether they are kept."""
     rows = tuple(
-        (words(one.metric), *_value_and_bounds(one), Span("ok", GOOD) if one.ok else Span("MISSED", BAD))
-        for one in outcomes
+        (words(outcome.metric), *_value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
+        for outcome in outcomes
     )
     return PageTable("Requirements", tuple(map(GridColumn, ("", "value", "required", ""))), rows)
 

@@ -29,8 +29,8 @@ FAMILIES = {
 }
 """Those of this package."""
 
-_REGISTERED: dict[str, Family] = {}
-_STAMPS: dict[str, str] = {}
+_REGISTERED_FAMILIES: dict[str, Family] = {}
+_REGISTRATION_STAMPS: dict[str, str] = {}
 _WITH_OWN_METRICS: dict[str, tuple[str, Family, Family]] = {}
 
 
@@ -58,8 +58,8 @@ def register(record: Family) -> Family:
         fault = "an installed package has a family of this name"
     if fault:
         raise UsageError(f"the family {visible(str(record.name))!r} cannot be registered: {fault}")
-    _REGISTERED[record.name] = record
-    _STAMPS[record.name] = secrets.token_hex(16)
+    _REGISTERED_FAMILIES[record.name] = record
+    _REGISTRATION_STAMPS[record.name] = secrets.token_hex(16)
     return record
 
 
@@ -71,14 +71,14 @@ def _fault_of_name(record: Family) -> str:
     return f"'family' of its specifications is {' or '.join(map(repr, allowed))}"
 
 
-def registered() -> Mapping[str, Family]:
+def list_registered() -> Mapping[str, Family]:
     """Return the families that were added to this process, by name."""
-    return _REGISTERED
+    return _REGISTERED_FAMILIES
 
 
 def names() -> tuple[str, ...]:
     """Return the names of all families, those of other packages last; nothing is imported for it."""
-    return (*FAMILIES, *_REGISTERED, *entry_point_plugins.usable_names((*FAMILIES, *_REGISTERED)))
+    return (*FAMILIES, *_REGISTERED_FAMILIES, *entry_point_plugins.usable_names((*FAMILIES, *_REGISTERED_FAMILIES)))
 
 
 def clashing() -> tuple[str, ...]:
@@ -103,26 +103,26 @@ def family(name: str) -> Family:
 
 def _with_own_metrics(record: Family) -> Family:
     """Return a family whose values have the metrics of the user; the same record until one of them changes."""
-    stamp, plain, known = _WITH_OWN_METRICS.get(record.name, ("", None, record))
+    stamp, plain, extended = _WITH_OWN_METRICS.get(record.name, ("", None, record))
     if stamp != own_metrics.stamp() or plain is not record:
         from cfmkit.metrics import known_metrics
 
-        taken = {*record.values, *(one.name for one in known_metrics(None))}
-        own = own_metrics.own_metrics()
-        if clash := [name for name in own if name in taken]:
+        taken = {*record.values, *(item.name for item in known_metrics(None))}
+        metrics = own_metrics.own_metrics()
+        if clash := [name for name in metrics if name in taken]:
             raise UsageError(f"the metric {clash[0]!r} needs another name: {record.phrase} has one of this name")
-        about = {name: (metric.dimension, metric.definition) for name, metric in own.items()}
-        known = replace(record, values={**record.values, **about})
-        _WITH_OWN_METRICS[record.name] = own_metrics.stamp(), record, known
-    return known
+        about = {name: (metric.dimension, metric.definition) for name, metric in metrics.items()}
+        extended = replace(record, values={**record.values, **about})
+        _WITH_OWN_METRICS[record.name] = own_metrics.stamp(), record, extended
+    return extended
 
 
 def _record(name: str) -> Family:
     if name in FAMILIES:
         record: Family = import_module(FAMILIES[name]).FAMILY
         return record
-    if name in _REGISTERED:
-        return _REGISTERED[name]
+    if name in _REGISTERED_FAMILIES:
+        return _REGISTERED_FAMILIES[name]
     for offer in entry_point_plugins.offers():
         if offer.name == name:
             return entry_point_plugins.record_of(offer, FAMILIES)
@@ -139,7 +139,7 @@ def examined() -> tuple[tuple[entry_point_plugins.InstalledFamily | None, Family
     tuple of (InstalledFamily or None, Family or str)
         Those of this package and of this process come first, without an offer. All others are imported.
     """
-    own = tuple((None, family(name)) for name in (*FAMILIES, *_REGISTERED))
+    own = tuple((None, family(name)) for name in (*FAMILIES, *_REGISTERED_FAMILIES))
     return own + tuple((offer, _tried(offer)) for offer in entry_point_plugins.offers())
 
 
@@ -169,12 +169,12 @@ def origin(name: str) -> dict[str, str]:
         ``package``, ``version`` and ``content``, the SHA-256 of its files: what is kept for a later run is of these.
         ``registered`` where functions of this process compute: those of no other process are the same.
     """
-    stamps = [*filter(None, (_STAMPS.get(name), own_metrics.stamp()))]
+    stamps = [*filter(None, (_REGISTRATION_STAMPS.get(name), own_metrics.stamp()))]
     return _package_of(name) | ({"registered": " ".join(stamps)} if stamps else {})
 
 
 def _package_of(name: str) -> dict[str, str]:
-    if name in FAMILIES or name in _REGISTERED:
+    if name in FAMILIES or name in _REGISTERED_FAMILIES:
         return {}
     offers = entry_point_plugins.offers()
     return next((entry_point_plugins.code_of(offer) for offer in offers if offer.name == name), {})
@@ -183,7 +183,7 @@ def _package_of(name: str) -> dict[str, str]:
 def origins() -> dict[str, dict[str, str]]:
     """Return what computes each family of another package or of this process, and metrics of the user."""
     computed = {one.name: origin(one.name) for one in entry_point_plugins.offers() if one.name not in FAMILIES}
-    computed |= {name: origin(name) for name in _REGISTERED}
+    computed |= {name: origin(name) for name in _REGISTERED_FAMILIES}
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
@@ -193,11 +193,11 @@ __all__ = [
     "clashing",
     "examined",
     "family",
+    "list_registered",
     "names",
     "origin",
     "origins",
     "records",
     "register",
-    "registered",
     "skipped",
 ]

@@ -304,14 +304,14 @@ class Family:
 
 def with_own_metrics(result: Result) -> Result:
     """Return a result with the metrics of the user among its values, each computed when it is read."""
-    own = own_metrics()
-    if not own:
+    metrics = own_metrics()
+    if not metrics:
         return result
 
     def compute(name: str) -> Quantity:
-        return _own_quantity(own[name], result) if name in own else result.values[name]
+        return _own_quantity(metrics[name], result) if name in metrics else result.values[name]
 
-    return replace(result, values=LazyMapping((*result.values, *own), compute))
+    return replace(result, values=LazyMapping((*result.values, *metrics), compute))
 
 
 def _own_quantity(metric: OwnMetric, result: Result) -> Quantity:

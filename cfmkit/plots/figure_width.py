@@ -81,33 +81,33 @@ class FigureLayout:
         return self.boxes[len(self.asked) - 1] if self.boxes else box
 
 
-_LAYOUT: ContextVar[FigureLayout | None] = ContextVar("layout", default=None)
+_ACTIVE_LAYOUT: ContextVar[FigureLayout | None] = ContextVar("layout", default=None)
 
 
 def active_layout() -> FigureLayout | None:
     """Return the layout of the figure that is being drawn; None if it is drawn as it asks."""
-    return _LAYOUT.get()
+    return _ACTIVE_LAYOUT.get()
 
 
 @contextmanager
-def _in(layout: FigureLayout) -> Iterator[None]:
-    mark = _LAYOUT.set(layout)
+def _apply(layout: FigureLayout) -> Iterator[None]:
+    mark = _ACTIVE_LAYOUT.set(layout)
     try:
         yield
     finally:
-        _LAYOUT.reset(mark)
+        _ACTIVE_LAYOUT.reset(mark)
 
 
 def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool) -> Figure:
     """Return a figure in a width [mm], by default its own; without titles their height is cut off."""
     first = layout = FigureLayout()
-    with _in(first):
+    with _apply(first):
         figure = make()
     if not first.axes:
         return figure
     for _ in range(2):  # keys and notes that take more lines in the new width get their room in the second round
-        layout = _fitted(figure, layout.axes, first, first.size[0] if width is None else width, titles)
-        with _in(layout):
+        layout = _fit(figure, layout.axes, first, first.size[0] if width is None else width, titles)
+        with _apply(layout):
             figure = make()
         for number, ax in enumerate(figure.axes):
             if layout.own_numbers:
@@ -121,34 +121,34 @@ def draw_in_width(make: Callable[[], Figure], width: float | None, titles: bool)
     return figure
 
 
-def _fitted(figure: Figure, axes: Sequence[Axes], first: FigureLayout, width: float, titles: bool) -> FigureLayout:
+def _fit(figure: Figure, axes: Sequence[Axes], first: FigureLayout, width: float, titles: bool) -> FigureLayout:
     """Return the layout for another width; the figure, which was drawn in any layout, is taken apart for it."""
     boxes = np.array(first.asked)
     left, bottom, right, top = _free_margins(figure, width)
     top -= 0.0 if titles else min(HEADING_MM, max(top - PAD_MM, 0.0))
     stacked = _must_stack(boxes, first.size[0], width)
-    rows, columns = _stacked_cells(boxes) if stacked else _cells(boxes)
+    rows, columns = _stack_cells(boxes) if stacked else _cells(boxes)
     to_scale = any(ax.get_aspect() != "auto" for ax in axes)
     _prepare(figure, stacked)
     height = first.size[1] if not stacked else float(rows.sizes.sum())
 
-    def found(height: float) -> FloatArray:
+    def lay_out(height: float) -> FloatArray:
         margins = left / width, bottom / height, 1.0 - (left + right) / width, 1.0 - (bottom + top) / height
-        return _constrained(figure, axes, (width, height), (rows, columns), margins)
+        return _constrain(figure, axes, (width, height), (rows, columns), margins)
 
     for _ in range(3):  # the height follows from the width that is left for the axes, which needs the height
-        placed = found(height)
+        placed = lay_out(height)
         for ax in figure.axes:
             if _is_too_long(ax):
                 _break_label(ax)
-        around = height - _occupied(placed, rows)
+        around = height - _height_of_rows(placed, rows)
         factor = float(np.median(placed[:, 2] / boxes[:, 2]))
         if stacked:
             factor = min(1.0, (MAX_STACK_HEIGHT_MM - around) / rows.sizes.sum(), factor if to_scale else 1.0)
         elif not to_scale:
             factor = min(max(factor, MIN_HEIGHT_FACTOR), MAX_HEIGHT_FACTOR)
-        height = around + max(factor, 0.2) * _occupied(boxes, rows)
-    placed = found(height)
+        height = around + max(factor, 0.2) * _height_of_rows(boxes, rows)
+    placed = lay_out(height)
     broken = tuple(number for number, ax in enumerate(figure.axes) if "\n[" in ax.get_ylabel())
     return FigureLayout((width, height), boxes=list(map(tuple, placed.tolist())), own_numbers=stacked, broken=broken)
 
@@ -168,12 +168,12 @@ class _Cells:
 
 def _cells(boxes: FloatArray) -> tuple[_Cells, _Cells]:
     """Return rows from the top and columns from the left, in the order in which boxes begin."""
-    columns = _along(boxes[:, 0], boxes[:, 0] + boxes[:, 2])
-    rows = _along(-(boxes[:, 1] + boxes[:, 3]), -boxes[:, 1])
+    columns = _find_cells(boxes[:, 0], boxes[:, 0] + boxes[:, 2])
+    rows = _find_cells(-(boxes[:, 1] + boxes[:, 3]), -boxes[:, 1])
     return rows, columns
 
 
-def _along(starts: FloatArray, ends: FloatArray) -> _Cells:
+def _find_cells(starts: FloatArray, ends: FloatArray) -> _Cells:
     """Return the cells along one direction: a new one begins where a box begins that is beyond another one."""
     edges = [float(starts.min())]
     for start in np.sort(starts):
@@ -189,7 +189,7 @@ def _along(starts: FloatArray, ends: FloatArray) -> _Cells:
     return _Cells(first, last, np.array(sizes))
 
 
-def _stacked_cells(boxes: FloatArray) -> tuple[_Cells, _Cells]:
+def _stack_cells(boxes: FloatArray) -> tuple[_Cells, _Cells]:
     """Return one column, in which boxes stand in the order in which they are read."""
     order = sorted(range(len(boxes)), key=lambda k: (-round(boxes[k][1] + boxes[k][3]), boxes[k][0]))
     row = np.argsort(order)
@@ -205,7 +205,7 @@ def _must_stack(boxes: FloatArray, size: float, width: float) -> bool:
     return share < MIN_SHARE_OF_WIDTH and columns.count > 1 and len(boxes) <= MAX_STACKED and boxes[:, 2].min() > KEY_MM
 
 
-def _occupied(boxes: FloatArray, rows: _Cells) -> float:
+def _height_of_rows(boxes: FloatArray, rows: _Cells) -> float:
     """Return the height of the rows of axes, without what is between them [mm]."""
     single = rows.first == rows.last
     return sum(float(boxes[single & (rows.first == row), 3].max(initial=0.0)) for row in range(rows.count)) or float(
@@ -216,12 +216,12 @@ def _occupied(boxes: FloatArray, rows: _Cells) -> float:
 def _free_margins(figure: Figure, new_width: float) -> Box:
     """Return what is free of axes at the left, bottom, right and top [mm]: margins for texts beside them."""
     figure.canvas.draw()
-    found = [ax.get_tightbbox() for ax in figure.axes]
-    extents = np.array([[box.x0, box.y0, box.x1, box.y1] for box in found if box is not None])
+    boxes = [ax.get_tightbbox() for ax in figure.axes]
+    extents = np.array([[box.x0, box.y0, box.x1, box.y1] for box in boxes if box is not None])
     scale = 25.4 / figure.dpi
     low, high = extents[:, :2].min(axis=0) * scale, extents[:, 2:].max(axis=0) * scale
     width, height = figure.bbox.width * scale, figure.bbox.height * scale
-    texts = [one.get_window_extent() for one in (*figure.texts, *figure.legends)]
+    texts = [item.get_window_extent() for item in (*figure.texts, *figure.legends)]
     beside = any(text.x0 * scale > high[0] - 1.0 for text in texts)
     right = (width - high[0]) * new_width / width if beside else PAD_MM
     # where it begins decides: what takes more lines than before may reach into the axes
@@ -241,7 +241,7 @@ def _prepare(figure: Figure, own_numbers: bool) -> None:
             text.set_in_layout(not frame.overlaps(text.get_window_extent()))
 
 
-def _constrained(
+def _constrain(
     figure: Figure, axes: Sequence[Axes], size: tuple[float, float], cells: tuple[_Cells, _Cells], margins: Box
 ) -> FloatArray:
     """Return the boxes that constrained layout finds in a figure of a size [mm], (n, 4)."""
@@ -260,8 +260,8 @@ def _constrained(
     engine = ConstrainedLayoutEngine(w_pad=pad, h_pad=pad, wspace=0.0, hspace=0.0, rect=margins)
     figure.set_layout_engine(engine)
     engine.execute(figure)
-    found = [ax.get_position(original=True).bounds for ax in axes]
-    boxes: FloatArray = np.array(found) * np.array([size[0], size[1], size[0], size[1]])
+    bounds = [ax.get_position(original=True).bounds for ax in axes]
+    boxes: FloatArray = np.array(bounds) * np.array([size[0], size[1], size[0], size[1]])
     return boxes
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.tables import Table
 
-MOTIONS: dict[Kind, str] = {"force": "displacement [mm]", "torque": "angle [deg]"}
-EFFORTS: dict[Kind, str] = {"force": "force [N]", "torque": "torque [N*mm]"}
+MOTION_COLUMNS: dict[Kind, str] = {"force": "displacement [mm]", "torque": "angle [deg]"}
+EFFORT_COLUMNS: dict[Kind, str] = {"force": "force [N]", "torque": "torque [N*mm]"}
 """Columns of curve.csv by the kind of the curve."""
 
 
@@ -54,7 +54,7 @@ def read_earlier(folder: str) -> EarlierCurve:
         raise UsageError(f"--overlay {visible(folder)}: there is no curve.csv; name the folder of a design or analysis")
     try:
         table = read_csv(file)
-        kind: Kind = "force" if EFFORTS["force"] in table.headers else "torque"
+        kind: Kind = "force" if EFFORT_COLUMNS["force"] in table.headers else "torque"
         return EarlierCurve(Path(folder).name or folder, kind, _branches(table, kind))
     except (CfmError, KeyError, ValueError) as error:
         raise UsageError(f"--overlay {visible(folder)}: curve.csv is not a curve of cfmkit: {error}") from None
@@ -62,7 +62,9 @@ def read_earlier(folder: str) -> EarlierCurve:
 
 def _branches(table: Table, kind: Kind) -> tuple[FloatArray, ...]:
     """Return the branches of the first curve: of several, the varied values lead."""
-    motion, effort, branch = (np.asarray(table[name]) for name in (MOTIONS[kind], EFFORTS[kind], "branch"))
+    motion, effort, branch = (
+        np.asarray(table[name]) for name in (MOTION_COLUMNS[kind], EFFORT_COLUMNS[kind], "branch")
+    )
     first = np.ones(len(table), dtype=bool)
     for header in table.headers[: table.headers.index("branch")]:
         first &= np.asarray(table[header]) == np.asarray(table[header])[0]

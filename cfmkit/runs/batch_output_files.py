@@ -83,7 +83,7 @@ def write_reference(reference: str, folder: str, entries: Sequence[Entry], argum
     """
     from cfmkit.store import RunFolder
 
-    named = ("metrics.json", *(f"{one.folder}/metrics.json" for one in entries if one.written))
+    named = ("metrics.json", *(f"{entry.folder}/metrics.json" for entry in entries if entry.written))
     with RunFolder(reference) as target:
         target.check(*named)
         for name in named:

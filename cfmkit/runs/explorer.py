@@ -44,7 +44,7 @@ MOST_POINTS = 600
 SPAN = 0.5
 """Share of a value by which its slider goes down and up: far enough to see a trend, near enough to stay a mechanism."""
 
-STEP = 0.01
+RELATIVE_STEP = 0.01
 """Share of a value by which it is changed to find its influence: above the noise of solvers, and a small change."""
 
 PAIRS = {name: ("x", "y") for name in ("at", "mirror")} | {
@@ -137,35 +137,35 @@ class Explorer:
             found = {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
             if isinstance(error, SpecError):
                 found["places"] = [
-                    {"path": one.path or one.source.removeprefix("--set "), "message": one.message}
-                    for one in error.problems
+                    {"path": problem.path or problem.source.removeprefix("--set "), "message": problem.message}
+                    for problem in error.problems
                 ]
         return found | {"seconds": time.perf_counter() - start}
 
     def influence(self, path: str) -> dict[str, Any]:
-        """Return the share of its bounds by which `STEP` more of a value moves the requirements, or the mean effort.
+        """Return the share of its bounds by which `RELATIVE_STEP` more of a value moves the requirements, or the mean effort.
 
         Zero where the value cannot be changed alone, and of values that are no part of the mechanism.
         """
-        slider = next((one for one in self.sliders if one.path == path), None)
+        slider = next((item for item in self.sliders if item.path == path), None)
         if slider is None:
             return {"influence": 0.0}
         size = abs(slider.value) or slider.high - slider.low
-        step = 1.0 if slider.whole else STEP * size
+        step = 1.0 if slider.whole else RELATIVE_STEP * size
         written = f"{path}={slider.value + step:.12g} {slider.unit}".rstrip()
         try:
-            moved = _judged(api.analyze(self.spec([written])))
+            moved = _judge(api.analyze(self.spec([written])))
             nominal = self._nominal
         except CfmError:
             return {"influence": 0.0}
         shares = [
             abs(moved[name][0] - value) / size for name, (value, size) in nominal.items() if name in moved and size
         ]
-        return {"influence": max(shares, default=0.0) * STEP * size / step}
+        return {"influence": max(shares, default=0.0) * RELATIVE_STEP * size / step}
 
     @cached_property
     def _nominal(self) -> dict[str, tuple[float, float]]:
-        return _judged(api.analyze(self.spec()))
+        return _judge(api.analyze(self.spec()))
 
     def command(self, changes: Sequence[str]) -> str:
         """Return the command that analyses the specification with changes."""
@@ -325,18 +325,18 @@ def _shown(result: Result) -> dict[str, Any]:
     return found
 
 
-def _judged(result: AnalysisView) -> dict[str, tuple[float, float]]:
+def _judge(result: AnalysisView) -> dict[str, tuple[float, float]]:
     """Return the value of each required metric with the size of its bound, and the mean effort with its own, in SI."""
-    found = {
-        one.metric: (one.value, max(abs(end) for end in (one.min, one.max) if end is not None))
-        for one in result.requirements
-        if one.value is not None
+    judged = {
+        outcome.metric: (outcome.value, max(abs(end) for end in (outcome.min, outcome.max) if end is not None))
+        for outcome in result.requirements
+        if outcome.value is not None
     }
     if result.curves:
         name = f"{result.curve.kind}_mean"
         mean = api.evaluate(result, [name])[name].value
-        found |= {} if mean is None else {"mean": (mean, abs(mean))}
-    return found
+        judged |= {} if mean is None else {"mean": (mean, abs(mean))}
+    return judged
 
 
 def _branches(curve: Curve) -> Iterator[tuple[str, list[list[float | None]]]]:

@@ -1,6 +1,6 @@
-"""What Python functions return: results that measure, draw and show themselves when they are asked to.
+"""Results of Python functions, which measure, draw and show themselves when they are asked to.
 
-What `cfmkit.analyze` gives back is an `AnalysisView`, a `Result`; what `cfmkit.suggest` gives back a `SuggestionsView`.
+`cfmkit.analyze` returns an `AnalysisView`, which is a `Result`; `cfmkit.suggest` returns a `SuggestionsView`.
 A notebook shows them by the documents that the command line prints.
 """
 
@@ -123,7 +123,7 @@ class SuggestionsView(Suggestions):
         """Return the proposals in a line: family and variant of the first ten."""
         from cfmkit.runs.suggestion_files import message
 
-        listed = [f"{one.family} {one.variant}"[:100] for one in self.listed[:10]]
+        listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
         return f"<Suggestions: {'; '.join([message(self), *listed])}>"
 
     def _repr_html_(self) -> str:

@@ -1,4 +1,4 @@
-"""What a program adds to cfmkit for its process: metrics that are functions of a result, and families."""
+"""Registration of a program's own metrics and families: functions of a result, and records."""
 
 from __future__ import annotations
 

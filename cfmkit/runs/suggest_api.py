@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.api import stated
+from cfmkit.api import given_arguments
 from cfmkit.families.run_control import Run, read_time
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def suggest(
     def written(value: Any) -> str:
         return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
-    keys = stated(
+    keys = given_arguments(
         force=force, torque=torque, travel=travel, angle=angle, ripple=ripple, envelope=envelope, material=material,
         process=process, adjustable=adjustable, hysteresis=hysteresis, cycles=cycles, prefer=prefer,
     ) | ({} if min_yield is None else {"yield": min_yield})  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.api import spec_of, stated
+from cfmkit.api import given_arguments, spec_of
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.runs.study_result import StudyResult
 from cfmkit.specs.own_metrics import names_of
@@ -87,17 +87,19 @@ def sweep(
     spec = spec_of(spec)
     if isinstance(vary, Mapping):
         vary = {path: in_words(values, spec, path) for path, values in vary.items()}
-    block = stated(vary=vary, combine=combine, samples=samples, metrics=names_of(metrics), design=design, curves=curves)
+    block = given_arguments(
+        vary=vary, combine=combine, samples=samples, metrics=names_of(metrics), design=design, curves=curves
+    )
     if block:
         spec = spec.replace({"sweep": block})
     work = prepare(spec, SweepRequest(seed=_seed(seed)))
     records = run(work, _executor(jobs))
     summary = summary_of(records)
-    found = _read(outputs(records, summary, spec.sweep is not None and spec.sweep.curves))
-    dimensions = {one.name: one.dimension for one in work.study.metrics}
-    document = document_of(spec, found.summary, dimensions, summary.exit_code())
-    varied = tuple(found.table.headers[: len(work.plan.variables)])
-    return replace(found, varied=varied, spec=spec, document=document)
+    result = _read(outputs(records, summary, spec.sweep is not None and spec.sweep.curves))
+    dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
+    document = document_of(spec, result.summary, dimensions, summary.exit_code())
+    varied = tuple(result.table.headers[: len(work.plan.variables)])
+    return replace(result, varied=varied, spec=spec, document=document)
 
 
 def sensitivity(
@@ -172,7 +174,7 @@ def sensitivity(
     spec = spec_of(spec)
     if isinstance(parameters, Mapping):
         parameters = {path: in_words(values, spec, path) for path, values in parameters.items()}
-    block = stated(
+    block = given_arguments(
         method=method,
         parameters=parameters,
         correlated=correlated,

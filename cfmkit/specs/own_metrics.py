@@ -33,18 +33,18 @@ class OwnMetric:
     function: Callable[[Any], Any]  # of a `Result`; SI, None or NaN where there is no value
 
 
-_TABLE: dict[str, OwnMetric] = {}
-_STAMP = [""]  # changes with the table: nothing that was computed with other functions is reused
+_METRICS_BY_NAME: dict[str, OwnMetric] = {}
+_TABLE_STAMP = [""]  # changes with the table: nothing that was computed with other functions is reused
 
 
 def own_metrics() -> Mapping[str, OwnMetric]:
     """Return the metrics of the user by name."""
-    return _TABLE
+    return _METRICS_BY_NAME
 
 
 def stamp() -> str:
     """Return a text that no other state of the table, and no other process, has; empty if there are no metrics."""
-    return _STAMP[0]
+    return _TABLE_STAMP[0]
 
 
 def register_metric(
@@ -86,11 +86,11 @@ def register_metric(
 
 def enter(metric: OwnMetric) -> OwnMetric:
     """Put a metric into the table; what is there already stays, so that its results remain valid."""
-    known = _TABLE.get(metric.name)
-    if known is None or replace(known, definition="") != replace(metric, definition=""):
-        _TABLE[metric.name] = metric
-        _STAMP[0] = secrets.token_hex(16)
-    return _TABLE[metric.name]
+    entered = _METRICS_BY_NAME.get(metric.name)
+    if entered is None or replace(entered, definition="") != replace(metric, definition=""):
+        _METRICS_BY_NAME[metric.name] = metric
+        _TABLE_STAMP[0] = secrets.token_hex(16)
+    return _METRICS_BY_NAME[metric.name]
 
 
 def name_of(metric: Any) -> Any:
@@ -103,9 +103,9 @@ def name_of(metric: Any) -> Any:
     """
     if isinstance(metric, str) or not callable(metric):
         return metric
-    for known in _TABLE.values():
-        if known.function is metric:
-            return known.name
+    for entered in _METRICS_BY_NAME.values():
+        if entered.function is metric:
+            return entered.name
     return register_metric(metric).name
 
 

@@ -137,7 +137,7 @@ class _Crew:
         self.pace: float | None = None
         self.empty = False
         self.messages: Messages = SimpleQueue()
-        self.what = registered(), pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
+        self.what = pack_registrations(), pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
 
     def __enter__(self) -> _Crew:
         return self
@@ -240,7 +240,7 @@ class _Crew:
                 yield job, Lost(Status.TIMEOUT, OVER if over else f"not finished within {allowed:g} s")
 
 
-def registered() -> bytes:
+def pack_registrations() -> bytes:
     """Return what a worker registers before it begins: families and metrics that were added to this process.
 
     Raises
@@ -251,15 +251,15 @@ def registered() -> bytes:
     from cfmkit import families
     from cfmkit.specs import own_metrics
 
-    records = families.registered().values()
+    records = families.list_registered().values()
     metrics = own_metrics.own_metrics().values()
     additions: list[Family | OwnMetric] = [*records, *metrics]
     for added in additions:
         try:
             sent = pickle.dumps(added)
         except (pickle.PicklingError, AttributeError, TypeError):
-            sent = _MAIN
-        if _MAIN in sent:
+            sent = _MAIN_MODULE
+        if _MAIN_MODULE in sent:
             raise UsageError(
                 f"{added.name!r} cannot be computed in other processes: put it in a module that they can import, "
                 "or use jobs=1"
@@ -268,7 +268,7 @@ def registered() -> bytes:
     return pickle.dumps([*entries[0], *entries[1]])
 
 
-_MAIN = b"__main__"
+_MAIN_MODULE = b"__main__"
 """Name of the module of a notebook or a script, as pickles have it: in a worker it is another one."""
 
 

@@ -23,10 +23,10 @@ VARY = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
 @pytest.fixture(autouse=True)
 def nothing_stays(monkeypatch):
     """Leave neither metrics nor families behind."""
-    monkeypatch.setattr(own_metrics, "_TABLE", {})
-    monkeypatch.setattr(own_metrics, "_STAMP", [""])
-    monkeypatch.setattr(families, "_REGISTERED", {})
-    monkeypatch.setattr(families, "_STAMPS", {})
+    monkeypatch.setattr(own_metrics, "_METRICS_BY_NAME", {})
+    monkeypatch.setattr(own_metrics, "_TABLE_STAMP", [""])
+    monkeypatch.setattr(families, "_REGISTERED_FAMILIES", {})
+    monkeypatch.setattr(families, "_REGISTRATION_STAMPS", {})
     monkeypatch.setattr(families, "_WITH_OWN_METRICS", {})
 
 
@@ -150,7 +150,7 @@ def test_a_registered_family_is_one_like_any_other_until_another_of_its_name_is(
 def test_a_record_that_cannot_be_used_is_refused(record, reported):
     with pytest.raises(cfmkit.UsageError, match=reported):
         cfmkit.register(record())
-    assert families.registered() == {}
+    assert families.list_registered() == {}
 
 
 def test_other_processes_compute_registered_families_and_metrics_of_modules():

@@ -19,15 +19,15 @@ from cfmkit.specs.yamlio.text_decoding import LARGEST
 if TYPE_CHECKING:
     from cfmkit.specs.yamlio.document import YamlDocument
 
-BASE = "base"
+BASE_KEY = "base"
 MAX_FILES = 16
 """In a chain of bases: more are a mistake."""
 
-_KEY = re.compile(rb"^(\xef\xbb\xbf)?[\"']?base[\"']?\s*:", re.MULTILINE)
+_BASE_KEY = re.compile(rb"^(\xef\xbb\xbf)?[\"']?base[\"']?\s*:", re.MULTILINE)
 
 
 def with_base(document: YamlDocument, above: tuple[str, ...] = ()) -> YamlDocument:
-    """Return a document with the values of its base where it has none of its own; as it is if it names none.
+    """Return a document with the values of its base where it has none of its override; as it is if it names none.
 
     Parameters
     ----------
@@ -41,24 +41,26 @@ def with_base(document: YamlDocument, above: tuple[str, ...] = ()) -> YamlDocume
     cfmkit.errors.SpecError
         If the base cannot be read, is no specification, or the files name each other; with the place in the right file.
     """
-    if not isinstance(document.tree, dict) or BASE not in document.tree:
+    if not isinstance(document.tree, dict) or BASE_KEY not in document.tree:
         return document
-    named = document.tree[BASE]
+    named = document.tree[BASE_KEY]
     path, fault = _path_of(document, named, above)
     if path is None:
-        raise SpecError([*document.problems, document.problem((BASE,), fault)])
+        raise SpecError([*document.problems, document.problem((BASE_KEY,), fault)])
     source = os.path.join(os.path.dirname(document.source), named)
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST + 1)
     except OSError as error:
-        raise SpecError([document.problem((BASE,), f"{visible(named)} cannot be read: {reason_of(error)}")]) from None
+        raise SpecError(
+            [document.problem((BASE_KEY,), f"{visible(named)} cannot be read: {reason_of(error)}")]
+        ) from None
     base = read_document(data, source, path.parent)
     if not isinstance(base.tree, dict) or base.is_broken:
         raise SpecError([*document.problems, *base.problems])
     base = with_base(base, (*above, os.path.realpath(document.path)))
-    own = {key: value for key, value in document.tree.items() if key != BASE}
-    tree = merged(base.tree, own)
+    override = {key: value for key, value in document.tree.items() if key != BASE_KEY}
+    tree = merge(base.tree, override)
     return dataclasses.replace(document, tree=tree, base=base, problems=(*document.problems, *base.problems))
 
 
@@ -74,7 +76,7 @@ def _path_of(document: YamlDocument, named: Any, above: tuple[str, ...]) -> tupl
     chain = [*above, os.path.realpath(document.path)]
     if path in chain:
         circle = [*chain[chain.index(path) :], path]
-        return None, f"these files name each other: {' -> '.join(visible(os.path.basename(one)) for one in circle)}"
+        return None, f"these files name each other: {' -> '.join(visible(os.path.basename(file)) for file in circle)}"
     if len(chain) >= MAX_FILES:
         return None, f"more than {MAX_FILES} files in a chain of bases"
     if not os.path.isfile(path):
@@ -82,35 +84,35 @@ def _path_of(document: YamlDocument, named: Any, above: tuple[str, ...]) -> tupl
     return Path(document.folder) / named, ""
 
 
-def merged(base: Any, own: Any) -> Any:
+def merge(base: Any, override: Any) -> Any:
     """Return a tree with own values over those of a base.
 
     Examples
     --------
-    >>> merged({"a": {"b": 1, "c": 2}, "d": (1, 2)}, {"a": {"c": 3}, "d": (4,)})
+    >>> merge({"a": {"b": 1, "c": 2}, "d": (1, 2)}, {"a": {"c": 3}, "d": (4,)})
     {'a': {'b': 1, 'c': 3}, 'd': (4,)}
     """
-    if not isinstance(base, dict) or not isinstance(own, dict):
-        return own
+    if not isinstance(base, dict) or not isinstance(override, dict):
+        return override
     return {
-        key: merged(base[key], own[key]) if key in base and key in own else {**base, **own}[key]
-        for key in {**base, **own}
+        key: merge(base[key], override[key]) if key in base and key in override else {**base, **override}[key]
+        for key in {**base, **override}
     }
 
 
 def base_files(path: str | os.PathLike[str]) -> tuple[Path, ...]:
     """Return the files that a specification takes values from, the nearest first; without those that cannot be read."""
-    found: list[Path] = []
+    files: list[Path] = []
     file = Path(path)
-    while len(found) < MAX_FILES:
+    while len(files) < MAX_FILES:
         try:
             data = file.read_bytes()
         except (OSError, ValueError):
             break
-        tree = read_document(data, "", file.parent).tree if _KEY.search(data) else None
-        named = tree.get(BASE) if isinstance(tree, dict) else None
+        tree = read_document(data, "", file.parent).tree if _BASE_KEY.search(data) else None
+        named = tree.get(BASE_KEY) if isinstance(tree, dict) else None
         if not isinstance(named, str) or not named or "\0" in named:
             break
         file = file.parent / named
-        found.append(file)
-    return tuple(found)
+        files.append(file)
+    return tuple(files)
