@@ -143,7 +143,7 @@ class Explorer:
         return found | {"seconds": time.perf_counter() - start}
 
     def influence(self, path: str) -> dict[str, Any]:
-        """Return the share of its bounds by which `RELATIVE_STEP` more of a value moves the requirements, or the mean effort.
+        """Return the share of its bounds by which 1 % more of a value moves the requirements, or the mean effort.
 
         Zero where the value cannot be changed alone, and of values that are no part of the mechanism.
         """

@@ -111,7 +111,6 @@ def sensitivity(
     correlated: Sequence[Mapping[str, Any]] | None = None,
     samples: int | None = None,
     metrics: Iterable[Metric] | None = None,
-    on_failure: Literal["fail", "resample", "bound"] | None = None,
     min_yield: str | float | None = None,
     costs: Mapping[str, float] | None = None,
     design: bool | None = None,
@@ -136,8 +135,6 @@ def sensitivity(
         Points per parameter, trajectories, base samples or parts.
     metrics : iterable of str or callable, optional
         Names, or functions of a `Result` (see `metric`). Default: those of the requirements.
-    on_failure : str, optional
-        What becomes of samples without a result.
     min_yield : str or float, optional
         Share of parts that must meet all requirements.
     costs : mapping, optional
@@ -180,7 +177,6 @@ def sensitivity(
         correlated=correlated,
         samples=samples,
         metrics=names_of(metrics),
-        on_failure=on_failure,
         min_yield=min_yield,
         costs=costs,
         design=design,

@@ -14,20 +14,9 @@ import spare_family
 
 import cfmkit
 from cfmkit import families
-from cfmkit.specs import own_metrics
 
 CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"
 VARY = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
-
-
-@pytest.fixture(autouse=True)
-def nothing_stays(monkeypatch):
-    """Leave neither metrics nor families behind."""
-    monkeypatch.setattr(own_metrics, "_METRICS_BY_NAME", {})
-    monkeypatch.setattr(own_metrics, "_TABLE_STAMP", [""])
-    monkeypatch.setattr(families, "_REGISTERED_FAMILIES", {})
-    monkeypatch.setattr(families, "_REGISTRATION_STAMPS", {})
-    monkeypatch.setattr(families, "_WITH_OWN_METRICS", {})
 
 
 def swing(result):
