@@ -64,7 +64,7 @@ def told(error: BaseException, terminal: Terminal) -> Document:
     """Report an error to the user, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
-    answer = answer_to(error)
+    answer = answer_to(error, terminal.excerpts)
     terminal.complain(answer.complaints)
     return answer
 
@@ -79,9 +79,9 @@ def fail(error: BaseException, terminal: Terminal) -> ExitCode:
     return answer.exit_code
 
 
-def answer_to(error: BaseException) -> Document:
-    """Return the answer that an exception is."""
-    code, lines, entries = code_of(error), list(_lines(error)), list(_entries(error))
+def answer_to(error: BaseException, excerpts: bool = False) -> Document:
+    """Return the answer that an exception is; its lines with those of the file that they are about, if wanted."""
+    code, lines, entries = code_of(error), list(_lines(error, excerpts)), list(_entries(error))
     data = {"message": "; ".join(str(entry["message"]) for entry in entries)}
     return Document(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))
 
@@ -93,12 +93,12 @@ def code_of(error: BaseException) -> ExitCode:
     return error.exit_code if isinstance(error, Stopped) else errors.code_of(error)
 
 
-def _lines(error: BaseException) -> Iterator[str]:
+def _lines(error: BaseException, excerpts: bool) -> Iterator[str]:
     """Yield what standard error shows; faults of a file start with their place, as editors want it."""
     if isinstance(error, SpecError):
         for number, line in enumerate(errors.lines_of(error)):
             yield line
-            yield from error.problems[number].excerpt if number < MAX_EXCERPTS else ()
+            yield from error.problems[number].excerpt if excerpts and number < MAX_EXCERPTS else ()
         return
     for entry in _entries(error):
         yield f"error    {entry['message']}"

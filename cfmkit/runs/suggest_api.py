@@ -32,6 +32,8 @@ def suggest(
     hysteresis: str | float | None = None,
     cycles: int | None = None,
     min_yield: str | float | None = None,
+    safety: str | float | None = None,
+    springs: str | Sequence[str] | None = None,
     prefer: Sequence[str] | None = None,
 ) -> SuggestionsView:
     """Return mechanisms of every family that do what is required, the best first, and those not judged in full.
@@ -66,6 +68,10 @@ def suggest(
         Required life.
     min_yield : str or float, optional
         Share of manufactured parts that must meet all of it: the key `yield` of the file.
+    safety : str or float, optional
+        Smallest safety factor.
+    springs : str or sequence of str, optional
+        Which springs may be used.
     prefer : sequence of str, optional
         What decides the order: ``size``, ``ripple``, ``parts``, ``stress``, ``depth``.
 
@@ -91,9 +97,22 @@ def suggest(
         return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
     keys = given_arguments(
-        force=force, torque=torque, travel=travel, angle=angle, ripple=ripple, envelope=envelope, material=material,
-        process=process, adjustable=adjustable, hysteresis=hysteresis, cycles=cycles, prefer=prefer,
-    ) | ({} if min_yield is None else {"yield": min_yield})  # fmt: skip
+        force=force,
+        torque=torque,
+        travel=travel,
+        angle=angle,
+        ripple=ripple,
+        envelope=envelope,
+        material=material,
+        process=process,
+        adjustable=adjustable,
+        hysteresis=hysteresis,
+        cycles=cycles,
+        safety=safety,
+        springs=springs,
+        prefer=prefer,
+    )
+    keys |= {} if min_yield is None else {"yield": min_yield}
     name = None if request is None else os.fspath(request)
     block = read_request(name, {key: written(value) for key, value in keys.items()})
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
