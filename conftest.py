@@ -49,6 +49,19 @@ def _trees_are_forgotten() -> Iterator[None]:
     sources.forget()
 
 
+@pytest.fixture(autouse=True)
+def _registrations_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave neither metrics nor families that a test registers to the next one."""
+    from cfmkit import families
+    from cfmkit.specs import own_metrics
+
+    monkeypatch.setattr(own_metrics, "_METRICS_BY_NAME", {})
+    monkeypatch.setattr(own_metrics, "_TABLE_STAMP", [""])
+    monkeypatch.setattr(families, "_REGISTERED_FAMILIES", {})
+    monkeypatch.setattr(families, "_REGISTRATION_STAMPS", {})
+    monkeypatch.setattr(families, "_WITH_OWN_METRICS", {})
+
+
 SLOW_CASES = Path(__file__).parent / "tests" / "slow_cases.txt"
 
 

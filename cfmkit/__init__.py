@@ -31,9 +31,6 @@ if TYPE_CHECKING:
         figures,
         load,
         loads,
-        sensitivity,
-        suggest,
-        sweep,
     )
     from cfmkit.curves import Curve
     from cfmkit.errors import (
@@ -58,8 +55,11 @@ if TYPE_CHECKING:
     from cfmkit.runs.examples import Example, examples
     from cfmkit.runs.measure_and_calibrate_api import calibrate, correct, measure
     from cfmkit.runs.notebook_result import AnalysisView
+    from cfmkit.runs.register import metric, register
+    from cfmkit.runs.study_result import StudyResult
+    from cfmkit.runs.suggest_api import suggest
+    from cfmkit.runs.sweep_and_sensitivity_api import sensitivity, sweep
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.study_result import StudyResult
 
 _HOMES = {
     "cfmkit.api": (
@@ -73,9 +73,6 @@ _HOMES = {
         "figures",
         "load",
         "loads",
-        "sensitivity",
-        "suggest",
-        "sweep",
     ),
     "cfmkit.runs.batch": ("BatchResult", "batch"),
     "cfmkit.runs.examples": ("Example", "examples"),
@@ -101,7 +98,10 @@ _HOMES = {
     "cfmkit.runs.notebook_result": ("AnalysisView",),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.specs.spec": ("Spec",),
-    "cfmkit.studies.study_result": ("StudyResult",),
+    "cfmkit.runs.register": ("metric", "register"),
+    "cfmkit.runs.study_result": ("StudyResult",),
+    "cfmkit.runs.suggest_api": ("suggest",),
+    "cfmkit.runs.sweep_and_sensitivity_api": ("sensitivity", "sweep"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -148,6 +148,8 @@ __all__ = [
     "load",
     "loads",
     "measure",
+    "metric",
+    "register",
     "sensitivity",
     "suggest",
     "sweep",

@@ -10,9 +10,10 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import Named
-from cfmkit.errors import UsageError
+from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, origin
-from cfmkit.families.run_control import Run, read_time
+from cfmkit.families.run_control import Run
+from cfmkit.specs.own_metrics import names_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,15 +21,15 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.errors import Problem
     from cfmkit.export.contours import Drawing
-    from cfmkit.metrics import Outcome, Window
-    from cfmkit.results import Design, Quantity, Result
-    from cfmkit.runs.notebook_result import AnalysisView
+    from cfmkit.metrics import Window
+    from cfmkit.results import Design, Result
+    from cfmkit.runs.notebook_result import AnalysisView, Metrics
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.study_result import StudyResult
-    from cfmkit.studies.suggest.search import Suggestions
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
+    Metric: TypeAlias = str | Callable[[Result], float | None]
 
 
 def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
@@ -57,7 +58,7 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
     """
     from cfmkit.runs.specfile import bind, read_spec
 
-    return bind(read_spec(os.fspath(path), (changes,) if isinstance(changes, str) else changes))
+    return bind(read_spec(os.fspath(path), _each_change(changes)))
 
 
 def loads(text: str | bytes, source: str = "text") -> Spec:
@@ -85,8 +86,9 @@ def loads(text: str | bytes, source: str = "text") -> Spec:
     """
     from cfmkit.runs.specfile import bind
     from cfmkit.specs.yamlio import read_document
+    from cfmkit.specs.yamlio.base_file import with_base
 
-    return bind(read_document(text, source))
+    return bind(with_base(read_document(text, source)))
 
 
 def dumps(spec: Spec, complete: bool = False) -> str:
@@ -123,14 +125,12 @@ def spec_of(spec: AnySpec) -> Spec:
     """
     from cfmkit.specs.spec import Spec
 
-    if isinstance(spec, Spec):
-        return spec
-    if isinstance(spec, str | os.PathLike):
-        return load(spec)
-    raise UsageError(
-        f"a specification or the path of its YAML file is needed, not {type(spec).__name__}; "
-        "cfmkit.load reads a file, cfmkit.loads reads text"
-    )
+    return spec if isinstance(spec, Spec) else load(_path_of(spec))
+
+
+def given_arguments(**keys: Any) -> dict[str, Any]:
+    """Return the keyword arguments that were given: those that are not None."""
+    return {key: value for key, value in keys.items() if value is not None}
 
 
 def _result_of(result: Result | AnySpec) -> Result:
@@ -202,17 +202,17 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
 
 def evaluate(
     result: Result | AnySpec,
-    names: Iterable[str] | None = None,
+    names: Iterable[Metric] | None = None,
     window: Window | str | tuple[float, float] | None = None,
-) -> dict[str, Quantity]:
+) -> Metrics:
     """Return constant-force metrics and the family's own scalar results, by name, in SI.
 
     Parameters
     ----------
     result : Result, Spec or path-like
         Of any status; a specification is analysed.
-    names : iterable of str, optional
-        Only these; ``[branch]`` picks a branch. Default: all.
+    names : iterable of str or callable, optional
+        Only these; ``[branch]`` picks a branch; functions of a `Result` are metrics, too (see `metric`). Default: all.
     window : Window or str or tuple of float, optional
         Where to measure: ``"40 mm:210 mm"``, or numbers [m or rad]; default: ``analysis.window``, else the full travel.
 
@@ -228,148 +228,78 @@ def evaluate(
     >>> round(found["force_ripple[load]"].value, 4)
     0.0124
     """
+    from cfmkit.families.base import with_own_metrics
     from cfmkit.metrics import evaluate as measured
+    from cfmkit.runs.notebook_result import Metrics
     from cfmkit.runs.values_with_units import read_window
 
-    found = _result_of(result)
-    return measured(found, names, read_window(window, found.curve.kind) if window is not None else None)
+    chosen = names_of(names)  # registers functions, which are values of the result then
+    measurable = with_own_metrics(_result_of(result))
+    over = read_window(window, measurable.curve.kind) if window is not None else None
+    return Metrics(measured(measurable, chosen, over))
 
 
-def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
-    """Return the outcome of each requirement; a specification is analysed first.
+def check(spec: AnySpec, changes: Iterable[str] = ()) -> tuple[Problem, ...]:
+    """Return what is wrong with a specification, as ``cfmkit check`` does; nothing is computed, and empty means valid.
 
-    Examples
-    --------
-    >>> import cfmkit
-    >>> [one.ok for one in cfmkit.check("configs/cam.yaml")]
-    [True, True, True]
-    """
-    from cfmkit.metrics import check as checked
-    from cfmkit.metrics import values_of_family
-
-    result = _result_of(result)
-    values = values_of_family(family(result.spec.family).values)
-    return checked(result.spec.part_requirements, result, values)
-
-
-def sweep(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
-    """Return a mechanism in many variants: one row per point, whether it could be solved or not.
+    Whether a mechanism meets its requirements is what an analysis says: ``cfmkit.analyze(spec).requirements``.
 
     Parameters
     ----------
     spec : Spec or path-like
-        What is varied.
-    jobs : int
-        Processes.
-    **block
-        As in the specification's block `sweep`, which they replace: `vary` (path -> ``"start:stop:n"``, a list of
-        texts with units, or a NumPy array in SI units), `combine`, `samples`, `metrics`, `design`, `curves`; and
-        `seed`. Without them the block counts.
+        A specification or its file.
+    changes : iterable of str
+        Values that replace those of the file, as `load` takes them.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If there is nothing to vary, too much, or a metric that does not exist.
-    cfmkit.errors.SpecError
-        If a path or value is wrong.
+        If the file cannot be read.
 
     Examples
     --------
     >>> import cfmkit
-    >>> spec = cfmkit.load("configs/cam.yaml")
-    >>> vary = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
-    >>> cfmkit.sweep(spec, vary=vary, metrics=["theoretical_force"]).table["theoretical_force"].tolist()
-    [36.232, 72.464]
+    >>> cfmkit.check("configs/cam.yaml")
+    ()
+    >>> [problem.path for problem in cfmkit.check("configs/cam.yaml", ["mechanism.roller_radius=16 kg"])]
+    ['mechanism.roller_radius']
     """
-    from cfmkit.studies.sweep_and_sensitivity_api import swept
+    from cfmkit.runs.specfile import bind, changed, read_spec
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.yamlio import read_document
 
-    return swept(spec_of(spec), jobs, block)
+    try:
+        if isinstance(spec, Spec):
+            bind(changed(read_document(dumps(spec), spec.name), _each_change(changes)))
+        else:
+            bind(read_spec(os.fspath(_path_of(spec)), _each_change(changes)))
+    except SpecError as error:
+        return error.problems
+    return ()
 
 
-def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
-    """Return which value matters most, or how many made parts will meet the requirements.
+def _each_change(changes: Iterable[str]) -> Iterable[str]:
+    return (changes,) if isinstance(changes, str) else changes
 
-    Parameters
-    ----------
-    spec : Spec or path-like
-        What is varied.
-    jobs : int
-        Processes.
-    **block
-        As in the specification's block `sensitivity`, whose values they replace: `method`, `parameters`,
-        `samples`, `metrics`, `seed`, ...
+
+def _path_of(spec: Any) -> str | os.PathLike[str]:
+    """Return the path of a specification's file.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If there is nothing to vary, too much, or a metric that does not exist.
-    cfmkit.errors.SpecError
-        If a path or value is wrong.
-    cfmkit.errors.SolutionError
-        If the specification itself has no solution.
-
-    Examples
-    --------
-    >>> import cfmkit
-    >>> spec = cfmkit.load("configs/cam.yaml")
-    >>> parameters = {"mechanism.springs.stiffness": {"normal": "1 %"}}
-    >>> found = cfmkit.sensitivity(spec, method="tolerance", samples=20, parameters=parameters)
-    >>> found.summary["yield"]["value"]
-    0.8
+        If it is no path; a result has its requirements with it.
     """
-    from cfmkit.studies.sweep_and_sensitivity_api import examined
+    if isinstance(spec, str | os.PathLike):
+        return spec
+    from cfmkit.results import Result
 
-    return examined(spec_of(spec), jobs, block)
-
-
-def suggest(
-    request: str | os.PathLike[str] | None = None,
-    *,
-    seed: int = 0,
-    jobs: int = 1,
-    time_budget: str | float | None = 180.0,
-    **keys: Any,
-) -> Suggestions:
-    """Return mechanisms of every family that do what is required, the best first, and those not judged in full.
-
-    Parameters
-    ----------
-    request : path-like, optional
-        A YAML file with a block `suggest`.
-    seed : int
-        Random seed.
-    jobs : int
-        Processes; 1: only this one, in which a long job cannot be stopped when the time budget ends.
-    time_budget : str or float, optional
-        A text with its unit (``"20 s"``, ``"2 min"``), or a number [s]; None: no limit.
-    **keys
-        Keys of the request, which replace those of the file: texts with units (``force="20 N"``), numbers for shares,
-        lists (``envelope=["80 mm", "60 mm", "6 mm"]``).
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        If the request contradicts itself, or is malformed.
-
-    Examples
-    --------
-    >>> import cfmkit
-    >>> found = cfmkit.suggest(force="10 kN", travel="10 mm", envelope=["20 mm", "20 mm", "1 mm"], material="pla")
-    >>> len(found.proposals), len(found.answers)
-    (0, 4)
-    """
-    from cfmkit.runs.read_suggest_file import read_request
-    from cfmkit.studies.pool import Pool
-    from cfmkit.studies.serial_and_cluster_executors import serial
-    from cfmkit.studies.suggest.search import suggest as searched
-
-    def written(value: Any) -> str:
-        return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
-
-    name = None if request is None else os.fspath(request)
-    block = read_request(name, {key: written(value) for key, value in keys.items()})
-    executor = serial if jobs == 1 else Pool(jobs)
-    return searched(block.request(), Run(seed, time_budget=read_time(time_budget), executor=executor), block.prefer)
+    hint = (
+        "result.requirements says whether they are met"
+        if isinstance(spec, Result)
+        else "cfmkit.load reads a file, cfmkit.loads reads text"
+    )
+    raise UsageError(f"a specification or the path of its YAML file is needed, not {type(spec).__name__}; {hint}")
 
 
 def export(

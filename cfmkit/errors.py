@@ -19,11 +19,14 @@ A solver that stops early is not an exception: it is a `cfmkit.results.Status`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 _LONG_QUOTE = re.compile(r"(?P<quote>['\"])(?P<text>(?:(?!(?P=quote)).){200,})(?P=quote)", re.DOTALL)
 
+
+EXCERPT_LENGTH = 90
+"""Characters of a line that is shown below a problem: a terminal of 100 has room for them."""
 
 _LONG_WORD = re.compile(r"\S{400,}")
 """Longer than the paths of files that people have; names of keys, files and options stand without quotes."""
@@ -99,6 +102,7 @@ class Problem:
     column: int
     path: str
     message: str
+    text: str = field(default="", compare=False, repr=False)  # the line of the source, if it has lines
 
     def __post_init__(self) -> None:
         """Keep the message short, whatever it quotes."""
@@ -108,6 +112,17 @@ class Problem:
         """Return the one line that the user reads: ``file:line:col: path: message``."""
         place = f"{self.source}:{self.line}:{self.column}" if self.line else self.source
         return ": ".join(part for part in (_words_shortened(place), _words_shortened(self.path), self.message) if part)
+
+    @property
+    def excerpt(self) -> tuple[str, ...]:
+        """The line of the source and a caret below its column; empty where there is none."""
+        if not self.line or not self.text.strip():
+            return ()
+        start = max(self.column - 1 - EXCERPT_LENGTH // 2, 0) if len(self.text) > EXCERPT_LENGTH else 0
+        shown = "".join(char if char.isprintable() else " " for char in self.text[start : start + EXCERPT_LENGTH])
+        head = f"{self.line:>5} | "
+        caret = " " * max(min(self.column - 1 - start, len(shown)), 0) + "^"
+        return f"{head}{shown.rstrip()}", f"{' ' * 5} | {caret}"
 
 
 class SpecError(InputError):

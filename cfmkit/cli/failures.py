@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
 
+MAX_EXCERPTS = 10
+"""Problems with the line of the file below them: more are a list to read, not a place to look at."""
+
 ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 """What the option parser raises; typer does not name it itself."""
 
@@ -61,7 +64,7 @@ def told(error: BaseException, terminal: Terminal) -> Document:
     """Report an error to the user, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
-    answer = answer_to(error)
+    answer = answer_to(error, terminal.excerpts)
     terminal.complain(answer.complaints)
     return answer
 
@@ -76,9 +79,9 @@ def fail(error: BaseException, terminal: Terminal) -> ExitCode:
     return answer.exit_code
 
 
-def answer_to(error: BaseException) -> Document:
-    """Return the answer that an exception is."""
-    code, lines, entries = code_of(error), list(_lines(error)), list(_entries(error))
+def answer_to(error: BaseException, excerpts: bool = False) -> Document:
+    """Return the answer that an exception is; its lines with those of the file that they are about, if wanted."""
+    code, lines, entries = code_of(error), list(_lines(error, excerpts)), list(_entries(error))
     data = {"message": "; ".join(str(entry["message"]) for entry in entries)}
     return Document(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))
 
@@ -90,10 +93,12 @@ def code_of(error: BaseException) -> ExitCode:
     return error.exit_code if isinstance(error, Stopped) else errors.code_of(error)
 
 
-def _lines(error: BaseException) -> Iterator[str]:
+def _lines(error: BaseException, excerpts: bool) -> Iterator[str]:
     """Yield what standard error shows; faults of a file start with their place, as editors want it."""
     if isinstance(error, SpecError):
-        yield from errors.lines_of(error)
+        for number, line in enumerate(errors.lines_of(error)):
+            yield line
+            yield from error.problems[number].excerpt if excerpts and number < MAX_EXCERPTS else ()
         return
     for entry in _entries(error):
         yield f"error    {entry['message']}"
@@ -101,7 +106,8 @@ def _lines(error: BaseException) -> Iterator[str]:
 
 def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
     if isinstance(error, SpecError):
-        yield from (asdict(problem) for problem in error.problems)
+        for problem in error.problems:
+            yield {name: value for name, value in asdict(problem).items() if name != "text"}
     else:
         yield {"message": shortened(_reported(error))}
 

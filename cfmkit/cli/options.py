@@ -150,6 +150,7 @@ class FigureChoice(Common):
         ),
     ] = None
     no_titles: Annotated[bool, flag("--no-titles", text="Omit the titles of the figures.")] = False
+    plain: Annotated[bool, flag("--plain", text="Figures for journals: no bands, notes, marks or titles.")] = False
     figure_style: Annotated[
         str | None,
         option("--figure-style", metavar="FILE", text="Matplotlib style file (.mplstyle), applied over cfmkit's own."),
@@ -166,11 +167,25 @@ class FigureChoice(Common):
         """
         from cfmkit.plots.figure_options import form_of
 
-        said = {"--figures": self.figures, "--figure-width": self.figure_width, "--figure-style": self.figure_style}
-        given = [name for name, value in said.items() if value is not None] + ["--no-titles"] * self.no_titles
+        overlay: str | None = getattr(self, "overlay", None)
+        said = {
+            "--figures": self.figures,
+            "--figure-width": self.figure_width,
+            "--figure-style": self.figure_style,
+            "--overlay": overlay,
+            "--no-titles": self.no_titles or None,
+            "--plain": self.plain or None,
+        }
+        given = [name for name, value in said.items() if value is not None]
         if self.no_plots and given and not getattr(self, "report", False):
             raise UsageError(f"--no-plots draws no figures and cannot be combined with {given[0]}")
-        return form_of(self.figures, self.figure_width, not self.no_titles, self.figure_style)
+        return form_of(self.figures, self.figure_width, not self.no_titles, self.figure_style, self.plain, overlay)
+
+
+Overlay = Annotated[
+    str | None,
+    option("--overlay", metavar="DIR", text="Folder of an earlier design or analyze, whose curve is drawn as well."),
+]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -48,6 +48,11 @@ class Terminal:
         return max(NARROWEST, min(shutil.get_terminal_size((WIDEST, 24)).columns, WIDEST))
 
     @property
+    def excerpts(self) -> bool:
+        """True if faults of a file are shown with its lines: on a terminal, or with ``-v``; scripts count lines."""
+        return self.verbose > 0 or (sys.stderr is not None and sys.stderr.isatty())
+
+    @property
     def tracebacks(self) -> bool:
         """Whether the user wants to see them."""
         return self.verbose >= 2

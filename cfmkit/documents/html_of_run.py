@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.documents import html
-from cfmkit.documents.document import GridColumn, PageTable
 from cfmkit.documents.html import NAME, escaped_json, part, references_of
-from cfmkit.documents.run_document import document_of
+from cfmkit.documents.run_document import document_of, metrics_table
 from cfmkit.families import family
-from cfmkit.metrics import split_name
 from cfmkit.plots.figures import moving_of
 from cfmkit.specs.units import format_short, to_border
 
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.documents.run_document import RunCommand
     from cfmkit.documents.run_outcome import Report
-    from cfmkit.results import Quantity, Result
+    from cfmkit.results import Result
 
 
 def page(
@@ -57,36 +55,11 @@ def page(
         subject=f"{record.name}: {record.summary}",
         command=command,
         texts=texts,
-        metrics=_metrics(report),
+        metrics=metrics_table(report.metrics) if report.metrics else None,
         film=film,
         script=part("report.js") if film else "",
         **references_of(record.name),
     )
-
-
-def _metrics(report: Report) -> PageTable | None:
-    """Return one row for each metric, with a column for each branch; those without a value say why."""
-    if not report.metrics:
-        return None
-    branches = tuple(dict.fromkeys(report.result.curve.branches)) if report.result.curves else ()
-    several = branches if len(branches) > 1 else ()
-    names = dict.fromkeys(split_name(name)[0] if split_name(name)[1] in branches else name for name in report.metrics)
-    rows = []
-    for name in names:
-        each = [report.metrics.get(f"{name}[{branch}]") for branch in several]
-        worst = report.metrics.get(name) or report.metrics[f"{name}[{branches[0]}]"]
-        values = [_value(worst), *("" if one is None else _value(one) for one in each)]
-        rows.append((name, *values, worst.definition))
-    heads = ("metric", "worst" if several else "value", *several, "what it is")
-    return PageTable("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
-
-
-def _value(quantity: Quantity) -> str:
-    if quantity.word is not None:
-        return quantity.word
-    if quantity.value is None:
-        return f"none: {quantity.reason}" if quantity.reason else "none"
-    return format_short(quantity.value, quantity.dimension, 6)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,12 @@
-"""A document as a notebook shows it: its headline, notes and warnings in less than 2 000 characters, and one figure."""
+"""A document as a notebook shows it: its headline, notes and warnings in less than 2 000 characters, and one figure.
+
+Tables of studies stand below, with their first rows.
+"""
 
 from __future__ import annotations
 
 from html import escape
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from cfmkit.tables.html import html_table
@@ -12,7 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.documents.document import Document
+    from cfmkit.documents.document import Document, PageTable
 
 MAX_CHARACTERS = 2000
 """Of the text, without the figure."""
@@ -21,16 +25,34 @@ MAX_FACTS, MAX_WARNINGS = 5, 4
 """Values that are not required, and warnings, that are shown."""
 
 
-def shown(document: Document, figures: Mapping[str, Callable[[], Figure]]) -> str:
-    """Return the HTML of a document with the first of some figures."""
+MAX_ROWS = 10
+"""Of a table: it is to be seen beside the code."""
+
+
+NO_FIGURES: Mapping[str, Callable[[], Figure]] = MappingProxyType({})
+
+
+def shown(document: Document, figures: Mapping[str, Callable[[], Figure]] = NO_FIGURES, more: str = "") -> str:
+    """Return the HTML of a document with its tables and the first of some figures; `more` follows."""
     from cfmkit.plots.vector_formats import first_picture
 
-    return f"<div>{text_of(document)}{first_picture(figures)}</div>"
+    tables = "".join(table_of(table, table.most or MAX_ROWS) for table in document.tables if table.most != 0)
+    return f"<div>{text_of(document)}{tables}{first_picture(figures)}{more}</div>"
+
+
+def table_of(table: PageTable, most: int | None = None) -> str:
+    """Return a table as HTML, its first rows where their number is limited."""
+    rows = [tuple(cell if isinstance(cell, str) else cell.text for cell in row) for row in table.rows[:most]]
+    rest = len(table.rows) - len(rows)
+    heading = f"<p>{escape(table.heading)}</p>" if table.heading else ""
+    more = f"<p>{rest} more row{'s' if rest > 1 else ''}</p>" if rest else ""
+    return heading + html_table(tuple(column.head for column in table.columns), rows) + more
 
 
 def text_of(document: Document) -> str:
-    """Return the text as HTML: as many rows as there is room for, requirements first."""
-    head = f"<strong>{escape(document.title)}</strong> {escape(document.summary)}: {escape(document.verdict)}"
+    """Return the text as HTML: as many rows as fit, requirements first."""
+    verdict = f": {escape(document.verdict)}" if document.verdict else ""
+    head = f"<strong>{escape(document.title)}</strong> {escape(document.summary)}{verdict}"
     marks = {True: "ok", False: "MISSED", None: ""}
     required = [row for row in document.headline if row.required]
     facts = [row for row in document.headline if not row.required][:MAX_FACTS]

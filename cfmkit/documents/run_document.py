@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
     BAD,
+    GOOD,
     SHORT,
     Document,
+    GridColumn,
     Note,
+    PageTable,
+    Span,
     ValueRow,
     WarningEntry,
     Written,
@@ -25,7 +29,7 @@ from cfmkit.specs.units import border_unit, format_short, to_border
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from cfmkit.documents.run_outcome import Report
     from cfmkit.metrics import Outcome
@@ -191,7 +195,7 @@ def span(low: float, high: float, dimension: str) -> str:
 # --- title ------------------------------------------------------------------------------------------------------------
 
 
-def _window(report: Report) -> Window | None:
+def shown_window(report: Report) -> Window | None:
     """Return the window of the title: that of the analysis, else the one that all requirements share."""
     if (own := window_of(report.result)) is not None:
         return left_of(own, report.result)
@@ -204,7 +208,7 @@ def _summary(report: Report) -> str:
     result = report.result
     if not result.status.usable or not result.curves:
         return ""
-    curve, window = result.curve, _window(report)
+    curve, window = result.curve, shown_window(report)
     name = f"{curve.kind}_mean"
     measured = report.metrics
     if window is not None and window_of(result) is None:
@@ -245,6 +249,46 @@ def metrics_of(report: Report) -> tuple[ValueRow, ...]:
         )
         for name in names
     )
+
+
+def metrics_table(metrics: Mapping[str, Quantity]) -> PageTable:
+    """Return one row for each metric, with a column for each branch; those without a value say why."""
+    named = [(name, *split_name(name)) for name in metrics]
+    branches = tuple(dict.fromkeys(branch for _, base, branch in named if branch is not None and base in metrics))
+    rows = []
+    for name, base, branch in named:
+        if branch in branches and base in metrics:
+            continue
+        by_branch = [metrics.get(f"{name}[{item}]") for item in branches]
+        values = [
+            _long_value(metrics[name]),
+            *("" if quantity is None else _long_value(quantity) for quantity in by_branch),
+        ]
+        rows.append((name, *values, metrics[name].definition))
+    heads = ("metric", "worst" if branches else "value", *branches, "what it is")
+    return PageTable("All metrics", tuple(map(GridColumn, heads)), tuple(rows), 0)
+
+
+def _long_value(quantity: Quantity) -> str:
+    if quantity.value is None:
+        return f"none: {quantity.reason}" if quantity.reason else "none"
+    return short_value(quantity, 6)
+
+
+def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
+    """Return one row for each requirement: its metric, the value, the bounds, and whether they are kept."""
+    rows = tuple(
+        (words(outcome.metric), *_value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
+        for outcome in outcomes
+    )
+    return PageTable("Requirements", tuple(map(GridColumn, ("", "value", "required", ""))), rows)
+
+
+def _value_and_bounds(outcome: Outcome) -> tuple[str, str]:
+    """Return the value of an outcome and its bounds, as its sentence has them."""
+    reported = outcome.sentence.removeprefix(words(outcome.metric)).strip().rpartition(": ")[0]
+    value, _, bounds = reported.rpartition(", ")
+    return value, bounds.removeprefix("allowed ").removeprefix("required ")
 
 
 def _facts(report: Report) -> Iterator[ValueRow]:
@@ -380,7 +424,7 @@ def _required(report: Report, requirement: Requirement, outcome: Outcome) -> Val
 
 def _is_title(report: Report, window: Window) -> bool:
     """Return True if a window is the one that the title states."""
-    shown = _window(report)
+    shown = shown_window(report)
     if shown is None:
         return False
     slack = 1e-9 * max(abs(shown.lo), abs(shown.hi))

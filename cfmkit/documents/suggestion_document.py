@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from cfmkit.errors import ExitCode
 
+NO_VALUE = "-"
+
 NOT_JUDGED = "open"
 """Of a value that no model here has, or of which the material says nothing; a note says the reason."""
 
@@ -151,10 +153,12 @@ def _columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]
         if key in block or any(one[name] is not None for one in listed):
             shown = (lambda value: f"{value:.2g}") if name == "life" else (lambda value: f"{100 * value:.3g} %")
             columns[name] = partial(_value, name, shown)
-    return columns | {
-        "parts": lambda one: "-" if one["parts"] is None else str(one["parts"]),
+    columns |= {
+        "parts": lambda one: NO_VALUE if one["parts"] is None else str(one["parts"]),
         "verdict": lambda one: str(one["verdict"]),
     }
+    empty = (NOT_JUDGED, NO_VALUE, "")
+    return {name: cell for name, cell in columns.items() if any(cell(one) not in empty for one in listed)}
 
 
 def _value(name: str, shown: Callable[[float], str], one: Mapping[str, Any]) -> str:

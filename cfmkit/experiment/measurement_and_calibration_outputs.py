@@ -213,11 +213,11 @@ def files(
     yield "metrics.json", json_bytes(data_of(reports))
     if plots:
         from cfmkit.experiment.figures import figures
-        from cfmkit.plots.figure_options import PLAIN
+        from cfmkit.plots.figure_options import DEFAULT_FORM
 
         for number, report in enumerate(reports.values(), 1):
             drawn = figures(report.source, report.numbers)
-            yield from (form or PLAIN).files(
+            yield from (form or DEFAULT_FORM).files(
                 drawn if len(reports) == 1 else {f"{k}-{number}": v for k, v in drawn.items()}
             )
 

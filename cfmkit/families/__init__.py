@@ -1,16 +1,24 @@
-"""The registry of families: one line each, imported when first needed; other packages add theirs by entry points."""
+"""The registry of families: one line each, imported when first needed; other packages add theirs by entry points.
+
+A program adds one with `register`, and metrics of its own with `cfmkit.metric`: both hold for its process.
+"""
 
 from __future__ import annotations
 
+import secrets
+from dataclasses import replace
 from difflib import get_close_matches
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
-from cfmkit.errors import UsageError
+from cfmkit.errors import UsageError, visible
 from cfmkit.families import entry_point_plugins
 from cfmkit.families.entry_point_plugins import Unusable
+from cfmkit.specs import own_metrics
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cfmkit.families.base import Family
 
 FAMILIES = {
@@ -21,10 +29,56 @@ FAMILIES = {
 }
 """Those of this package."""
 
+_REGISTERED_FAMILIES: dict[str, Family] = {}
+_REGISTRATION_STAMPS: dict[str, str] = {}
+_WITH_OWN_METRICS: dict[str, tuple[str, Family, Family]] = {}
+
+
+def register(record: Family) -> Family:
+    """Add a family to those of this process, in place of one that was registered under its name; return it.
+
+    Parameters
+    ----------
+    record : Family
+        Its name is what ``family:`` of a specification says.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is no such record, a field is of another type, or cfmkit or an installed package has the name.
+    """
+    from cfmkit.families.base import Family
+
+    if not isinstance(record, Family):
+        raise UsageError(f"a cfmkit.families.base.Family is needed, not {type(record).__name__}")
+    fault = entry_point_plugins.fault_of_record(record, needs_interface=False) or _fault_of_name(record)
+    if record.name in FAMILIES:
+        fault = "cfmkit itself has a family of this name"
+    elif record.name in {offer.name for offer in entry_point_plugins.offers()}:
+        fault = "an installed package has a family of this name"
+    if fault:
+        raise UsageError(f"the family {visible(str(record.name))!r} cannot be registered: {fault}")
+    _REGISTERED_FAMILIES[record.name] = record
+    _REGISTRATION_STAMPS[record.name] = secrets.token_hex(16)
+    return record
+
+
+def _fault_of_name(record: Family) -> str:
+    """Return why specifications of a family cannot name it; empty if they can."""
+    allowed = get_args(record.spec_type.model_fields["family"].annotation)
+    if not allowed or record.name in allowed:
+        return ""
+    return f"'family' of its specifications is {' or '.join(map(repr, allowed))}"
+
+
+def list_registered() -> Mapping[str, Family]:
+    """Return the families that were added to this process, by name."""
+    return _REGISTERED_FAMILIES
+
 
 def names() -> tuple[str, ...]:
     """Return the names of all families, those of other packages last; nothing is imported for it."""
-    return (*FAMILIES, *entry_point_plugins.usable_names(FAMILIES))
+    return (*FAMILIES, *_REGISTERED_FAMILIES, *entry_point_plugins.usable_names((*FAMILIES, *_REGISTERED_FAMILIES)))
 
 
 def clashing() -> tuple[str, ...]:
@@ -34,18 +88,41 @@ def clashing() -> tuple[str, ...]:
 
 
 def family(name: str) -> Family:
-    """Return the family called `name`.
+    """Return the family called `name`, with the metrics of the user among its values.
 
     Raises
     ------
     cfmkit.families.Unusable
         If another package has it, but it cannot be used; the message says why.
     cfmkit.errors.UsageError
-        If there is none; the message names the nearest.
+        If there is none; the message names the nearest. Or if a metric of the user has the name of another one.
     """
+    record = _record(name)
+    return record if not own_metrics.own_metrics() else _with_own_metrics(record)
+
+
+def _with_own_metrics(record: Family) -> Family:
+    """Return a family whose values have the metrics of the user; the same record until one of them changes."""
+    stamp, plain, extended = _WITH_OWN_METRICS.get(record.name, ("", None, record))
+    if stamp != own_metrics.stamp() or plain is not record:
+        from cfmkit.metrics import known_metrics
+
+        taken = {*record.values, *(item.name for item in known_metrics(None))}
+        metrics = own_metrics.own_metrics()
+        if clash := [name for name in metrics if name in taken]:
+            raise UsageError(f"the metric {clash[0]!r} needs another name: {record.phrase} has one of this name")
+        about = {name: (metric.dimension, metric.definition) for name, metric in metrics.items()}
+        extended = replace(record, values={**record.values, **about})
+        _WITH_OWN_METRICS[record.name] = own_metrics.stamp(), record, extended
+    return extended
+
+
+def _record(name: str) -> Family:
     if name in FAMILIES:
         record: Family = import_module(FAMILIES[name]).FAMILY
         return record
+    if name in _REGISTERED_FAMILIES:
+        return _REGISTERED_FAMILIES[name]
     for offer in entry_point_plugins.offers():
         if offer.name == name:
             return entry_point_plugins.record_of(offer, FAMILIES)
@@ -60,9 +137,9 @@ def examined() -> tuple[tuple[entry_point_plugins.InstalledFamily | None, Family
     Returns
     -------
     tuple of (InstalledFamily or None, Family or str)
-        Those of this package come first, without an offer. All others are imported.
+        Those of this package and of this process come first, without an offer. All others are imported.
     """
-    own = tuple((None, family(name)) for name in FAMILIES)
+    own = tuple((None, family(name)) for name in (*FAMILIES, *_REGISTERED_FAMILIES))
     return own + tuple((offer, _tried(offer)) for offer in entry_point_plugins.offers())
 
 
@@ -84,23 +161,43 @@ def _tried(offer: entry_point_plugins.InstalledFamily) -> Family | str:
 
 
 def origin(name: str) -> dict[str, str]:
-    """Return what computes a family of another package; empty for those of this package.
+    """Return what computes a family of another package, and metrics of the user; empty for cfmkit alone.
 
     Returns
     -------
     dict
         ``package``, ``version`` and ``content``, the SHA-256 of its files: what is kept for a later run is of these.
+        ``registered`` where functions of this process compute: those of no other process are the same.
     """
-    if name in FAMILIES:
+    stamps = [*filter(None, (_REGISTRATION_STAMPS.get(name), own_metrics.stamp()))]
+    return _package_of(name) | ({"registered": " ".join(stamps)} if stamps else {})
+
+
+def _package_of(name: str) -> dict[str, str]:
+    if name in FAMILIES or name in _REGISTERED_FAMILIES:
         return {}
     offers = entry_point_plugins.offers()
     return next((entry_point_plugins.code_of(offer) for offer in offers if offer.name == name), {})
 
 
 def origins() -> dict[str, dict[str, str]]:
-    """Return what computes each family of another package."""
-    offers = entry_point_plugins.offers()
-    return {one.name: entry_point_plugins.code_of(one) for one in offers if one.name not in FAMILIES}
+    """Return what computes each family of another package or of this process, and metrics of the user."""
+    computed = {one.name: origin(one.name) for one in entry_point_plugins.offers() if one.name not in FAMILIES}
+    computed |= {name: origin(name) for name in _REGISTERED_FAMILIES}
+    return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
-__all__ = ["FAMILIES", "Unusable", "clashing", "examined", "family", "names", "origin", "origins", "records", "skipped"]
+__all__ = [
+    "FAMILIES",
+    "Unusable",
+    "clashing",
+    "examined",
+    "family",
+    "list_registered",
+    "names",
+    "origin",
+    "origins",
+    "records",
+    "register",
+    "skipped",
+]

@@ -8,8 +8,11 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
+from cfmkit.arrays import LazyMapping
+from cfmkit.errors import CfmError, UsageError
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
 from cfmkit.results import OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
+from cfmkit.specs.own_metrics import own_metrics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.rows import SolvedRows
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
+    from cfmkit.specs.own_metrics import OwnMetric
     from cfmkit.specs.spec import Spec
 
 
@@ -271,8 +275,9 @@ class Family:
         return function
 
     def analyze(self, spec: Spec, run: Run) -> Result:
-        """Return what the model that a specification picks makes of it, with its box where a requirement is on that."""
-        return self.with_envelope(self.model_of(spec)(spec, run), {one.metric for one in spec.requirements})
+        """Return the result of the model that a specification picks, with the user's metrics and, if asked, its box."""
+        result = with_own_metrics(self.model_of(spec)(spec, run))
+        return self.with_envelope(result, {one.metric for one in spec.requirements})
 
     def with_envelope(self, result: Result, names: Collection[str]) -> Result:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
@@ -295,6 +300,40 @@ class Family:
         name = self.elastic_networks
         found: tuple[DrivenNetwork, ...] = function_named(name)(spec) if name else ()
         return found
+
+
+def with_own_metrics(result: Result) -> Result:
+    """Return a result with the metrics of the user among its values, each computed when it is read."""
+    metrics = own_metrics()
+    if not metrics:
+        return result
+
+    def compute(name: str) -> Quantity:
+        return _own_quantity(metrics[name], result) if name in metrics else result.values[name]
+
+    return replace(result, values=LazyMapping((*result.values, *metrics), compute))
+
+
+def _own_quantity(metric: OwnMetric, result: Result) -> Quantity:
+    """Return what a function of the user makes of a result.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the function fails, or returns something else than a number.
+    """
+    about = metric.dimension, metric.definition
+    if not result.curves:
+        return Quantity(None, *about, reason=result.message)
+    try:
+        value = metric.function(result)
+        number = math.nan if value is None else float(value)
+    except CfmError as error:
+        return Quantity(None, *about, reason=str(error))
+    except Exception as error:
+        reported = " ".join(f"{type(error).__name__}: {error}".split())
+        raise UsageError(f"the metric {metric.name!r} failed: {reported}") from error
+    return Quantity(number, *about) if math.isfinite(number) else Quantity(None, *about, reason="it is not finite")
 
 
 def sized(result: Result, space: BoundingBox | None) -> Result:

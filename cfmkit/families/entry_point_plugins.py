@@ -179,13 +179,20 @@ def _sentence_of(error: BaseException) -> str:
 
 def _fault_of(record: Any, offer: InstalledFamily) -> str:
     """Return why a record cannot be used; empty if it can."""
-    from cfmkit.families.base import INTERFACE, Family, packaged
+    from cfmkit.families.base import Family
 
     if not isinstance(record, Family):
         return f"{offer.target} is a {type(record).__name__}, not a Family"
     if record.name != offer.name:
         return f"its record is called {record.name!r}"
-    if record.interface != INTERFACE:
+    return fault_of_record(record)
+
+
+def fault_of_record(record: Family, needs_interface: bool = True) -> str:
+    """Return why a record cannot be used; empty if it can. A record that is made now need not state its interface."""
+    from cfmkit.families.base import INTERFACE, Family, packaged
+
+    if record.interface != INTERFACE and (needs_interface or record.interface is not None):
         made = "does not state its interface" if record.interface is None else f"is for interface {record.interface}"
         return f"its record {made}, this cfmkit has interface {INTERFACE}; another version of one of them is needed"
     for one in fields(Family):

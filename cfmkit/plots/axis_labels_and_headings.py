@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, size_mm, styled
+from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, is_plain, size_mm, styled
 from cfmkit.plots.tick_numbers import WholeNumbers, brief
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
@@ -104,6 +104,8 @@ class Heading:
 def write_heading(figure: Figure, heading: Heading) -> None:
     """Write a heading at the top left, each part on one line: names that are too long are cut, the subject is not."""
     titles = has_titles()
+    if is_plain():
+        return
     if titles:
         _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL + 0.5, "weight": "bold"})
     if heading.note:  # what is wrong is said in any case
@@ -135,16 +137,28 @@ def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: di
 
 
 @styled
-def color_key(figure: Figure, corner_mm: tuple[float, float], entries: Sequence[tuple[str, str]]) -> None:
-    """Write texts in their colours side by side from the lower left corner [mm], no farther than the print reaches."""
-    width, height = size_mm(figure)
-    left, bottom = corner_mm
+def color_key(ax: Axes, entries: Sequence[tuple[str, str]]) -> None:
+    """Write texts in their colours above axes side by side, on as many lines as the width of the print demands."""
+    points = 72.0 / ax.figure.dpi
+    start = ax.get_window_extent().x0 * points
+    reach = ax.figure.bbox.width * points - start - LEFT * MM * 72.0
+    lines: list[list[Any]] = [[]]
+    across = 0.0
     for text, color in entries:
-        written = figure.text(left / width, bottom / height, text, size=SMALL, color=color, ha="left", va="bottom")
-        left += written.get_window_extent().width / figure.dpi / MM + KEY_GAP
-        if left - KEY_GAP > width - LEFT:
-            written.remove()
-            return
+        written = ax.annotate(
+            text, (0.0, 1.0), xycoords="axes fraction", xytext=(across, 0.0), textcoords="offset points",
+            size=SMALL, color=color, ha="left", va="bottom",
+        )  # fmt: skip
+        wide = written.get_window_extent().width * points
+        if across + wide > reach and lines[-1]:
+            lines.append([])
+            across = 0.0
+        written.set_position((across, 0.0))
+        lines[-1].append(written)
+        across += wide + KEY_GAP * MM * 72.0
+    for number, line in enumerate(reversed(lines)):
+        for written in line:
+            written.set_position((written.get_position()[0], 2.0 + 1.4 * SMALL * number))
 
 
 def plain_ticks(axis: Axis) -> None:
@@ -161,6 +175,8 @@ def plain_ticks(axis: Axis) -> None:
 @styled
 def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> None:
     """Write a small grey remark at a place in fractions of the axes."""
+    if is_plain():
+        return
     look: dict[str, Any] = {"size": SMALL, "color": GREY, "transform": ax.transAxes} | options
     ax.text(*place, text, **look)
 

@@ -15,7 +15,7 @@ from cfmkit.metrics.metric_values import window_of
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, write_heading
 from cfmkit.plots.bands_from_requirements import bands_of
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.style import GREY, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, axes_mm, is_plain, new_figure, styled
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def loop_figure(result: Result, look: CurveLook | None = None, subject: str = ""
     heading = Heading.of(result, subject or f"{curve.kind} over {curve.motion_name}")
     write_heading(figure, heading)
     room = 86.5 - heading.height_mm
-    detail = enlarged(result, look)
+    detail = None if is_plain() else enlarged(result, look)
     if detail is None:
         plot_curve(result, axes_mm(figure, (17, 12, 138, room)), look)
         return figure

@@ -8,7 +8,7 @@ allows is shaded.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ from cfmkit.plots.axis_labels_and_headings import axis_label, finite_range, show
 from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, padded, shade
-from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, size_mm, styled
+from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, is_plain, overlay, size_mm, styled
 from cfmkit.results import Result
 from cfmkit.specs.units import to_border
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
 
 SAME = 2e-3
 """Branches closer than this fraction of the axes are one line, with one name: 0.2 mm of a print of 100 mm is less
@@ -85,6 +86,8 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
         What to draw beside the lines.
     """
     look = look or CurveLook()
+    if is_plain():
+        look = replace(look, bands=False, levels=(), regions=())
     curves = _curves(source)
     lines = _lines(curves)
     for line in lines:
@@ -92,9 +95,12 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
     if not curves:
         return ax
     kind = curves[0].kind
+    earlier = _earlier_lines(kind) if isinstance(source, Result) else []
+    for line in earlier:
+        ax.plot(*line.points.T, color=line.color, linewidth=1.0, dashes=(3, 1.5), zorder=2.8, gid="earlier")
     bands = bands_of(source) if look.bands and isinstance(source, Result) else ()
     wanted = _target_line(source) if isinstance(source, Result) else None
-    _limit(ax, (lines if wanted is None else [*lines, wanted], bands), look, kind)
+    _limit(ax, ([*lines, *earlier] if wanted is None else [*lines, *earlier, wanted], bands), look, kind)
     if len(curves) > 1 and look.names and look.window is None:
         ax.set_xlim(right=ax.get_xlim()[1] + _name_room(ax) * float(np.ptp(ax.get_xlim())))
     region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
@@ -109,7 +115,15 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
     if look.names:
         place_labels(
             ax,
-            [*_name_lines(ax, lines), *target_names, *_unstable_name(lines), *level_names, *band_names, *region_names],
+            [
+                *_name_lines(ax, lines),
+                *map(_name_earlier, earlier[:1]),
+                *target_names,
+                *_unstable_name(lines),
+                *level_names,
+                *band_names,
+                *region_names,
+            ],
         )
     return ax
 
@@ -254,6 +268,20 @@ def _target_line(result: Result) -> _Line | None:
     effort = to_border(target.at(places), curve.kind)
     points = np.column_stack([to_border(places, curve.motion_dimension), effort])
     return _Line(points, np.ones(len(places), dtype=np.bool_), GREY, "target")
+
+
+def _earlier_lines(kind: Kind) -> list[_Line]:
+    """Return the branches of the earlier run that is to be drawn as well."""
+    earlier = overlay()
+    if earlier is None:
+        return []
+    earlier.require(kind)
+    name = f"earlier: {earlier.name}"
+    return [_Line(points, np.ones(len(points), dtype=np.bool_), GREY, name) for points in earlier.branches]
+
+
+def _name_earlier(line: _Line) -> Label:
+    return Label(line.name, line.color, line.points, prefer=0.3)
 
 
 def _draw_target(ax: Axes, line: _Line) -> Label:

@@ -1,8 +1,7 @@
 """Form of the figures: formats, width of print, headings, and a style file of one's own.
 
-A drawing says its sizes in millimetres of print (`cfmkit.plots.style.new_figure`, `axes_mm`). For another width it is
-drawn twice: once to hear which boxes it asks for, and once with the boxes stretched, while the room between them, which
-holds labels in letters of a fixed size, stays as it is. So no drawing needs to know of other widths.
+A drawing says its sizes in millimetres of print (`cfmkit.plots.style.new_figure`, `axes_mm`). For another width
+`cfmkit.plots.figure_width` lays it out anew, so no drawing needs to know of other widths.
 """
 
 from __future__ import annotations
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.plots.overlay import EarlierCurve
+
 FORMATS = ("png", "svg", "pdf")
 
 NARROWEST, WIDEST = 0.06, 0.6
@@ -30,31 +31,30 @@ class FigureForm:
     formats: tuple[str, ...] = ("png",)  # one file for each
     width: float | None = None  # of the print [m]; default: each figure as it is drawn
     titles: bool = True  # whether headings stand above figures; in print the caption says what they say
+    plain: bool = False  # for journals: no bands, notes, marks or headings
+    overlay: EarlierCurve | None = field(default=None, compare=False, repr=False)  # of an earlier run
     settings: tuple[tuple[str, Any], ...] = field(default=(), repr=False)  # of matplotlib, on top of ours
 
     @property
-    def plain(self) -> bool:
+    def is_default(self) -> bool:
         """Whether nothing but the default is requested."""
-        return self == PLAIN
+        return self == DEFAULT_FORM
 
     @property
     def on_screen(self) -> bool:
         """Whether figures are drawn as a page shows them, whatever files they become."""
-        return replace(self, formats=("png",)).plain
+        return replace(self, formats=("png",)).is_default
 
     def draw(self, make: Callable[[], Figure]) -> Figure:
         """Return a figure in this form."""
-        from cfmkit.plots.figure_resizing import laid_out, noted
-        from cfmkit.plots.style import is_to_scale, with_settings
+        from cfmkit.plots.figure_width import draw_in_width
+        from cfmkit.plots.style import style, with_settings
 
-        with with_settings(self.settings, self.titles):
-            if self.width is None and self.titles:
+        with with_settings(self.settings, self.titles, self.plain, self.overlay), style():
+            if self.width is None and self.titles and not self.plain:
                 return make()
-            figure, layout = noted(make)
-            if not layout.asked:
-                return figure
-            width = layout.size[0] if self.width is None else self.width * 1e3
-            return laid_out(make, layout.narrowed(width, self.titles, is_to_scale(figure)))
+            titles = self.titles and not self.plain
+            return draw_in_width(make, None if self.width is None else self.width * 1e3, titles)
 
     def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
         """Yield a figure's files as (name, content), below ``figures/``."""
@@ -62,7 +62,7 @@ class FigureForm:
         from cfmkit.plots.vector_formats import written
 
         for kind in self.formats:
-            with with_settings(self.settings, self.titles):
+            with with_settings(self.settings, self.titles, self.plain):
                 content = written(figure, kind)
             yield f"figures/{stem}.{kind}", content
 
@@ -81,15 +81,23 @@ class FigureForm:
         drawn : mapping of str to Figure
             Those that were drawn in this form already; they serve where it is no other than a page's.
         """
-        return {stem: drawn[stem] if self.on_screen and stem in drawn else make() for stem, make in makers.items()}
+        form = FigureForm(overlay=self.overlay)
+        return {
+            stem: drawn[stem] if self.on_screen and stem in drawn else form.draw(make) for stem, make in makers.items()
+        }
 
 
-PLAIN = FigureForm()
+DEFAULT_FORM = FigureForm()
 """PNG, as each figure is drawn."""
 
 
 def form_of(
-    formats: str | None = None, width: str | None = None, titles: bool = True, style: str | None = None
+    formats: str | None = None,
+    width: str | None = None,
+    titles: bool = True,
+    style: str | None = None,
+    plain: bool = False,
+    overlay: str | None = None,
 ) -> FigureForm:
     """Return the form that options ask for.
 
@@ -103,11 +111,15 @@ def form_of(
         Whether figures have headings.
     style : str, optional
         Path of a style file of matplotlib.
+    plain : bool
+        Whether they are for a journal: without bands, notes, marks and headings.
+    overlay : str, optional
+        Output folder of an earlier run, whose curve is drawn as well.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If one of them is malformed.
+        If one of them is malformed, or the folder has no curve.
 
     Examples
     --------
@@ -118,7 +130,11 @@ def form_of(
     names = tuple(dict.fromkeys(name.strip().lower() for name in listed if name.strip()))
     if unknown := [name for name in names if name not in FORMATS] or ([""] if not names else []):
         raise UsageError(f"--figures: there is no format {visible(unknown[0])!r}; there are {', '.join(FORMATS)}")
-    return FigureForm(names, None if width is None else _width(width), titles, () if style is None else settings(style))
+    from cfmkit.plots.overlay import read_earlier
+
+    earlier = None if overlay is None else read_earlier(overlay)
+    looks = () if style is None else settings(style)
+    return FigureForm(names, None if width is None else _width(width), titles, plain, earlier, looks)
 
 
 def _width(text: str) -> float:

@@ -26,6 +26,7 @@ from cfmkit.plots.style import (
     VERMILLION,
     axes_mm,
     has_titles,
+    is_plain,
     new_figure,
     size_mm,
     styled,
@@ -66,14 +67,16 @@ def draw_histogram(found: Findings, number: int) -> Figure:
     _head(figure, title)
     width, height = size_mm(figure)
     place = (LEFT / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
-    figure.text(*place, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL, color=INK)
+    if not is_plain():
+        figure.text(*place, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL, color=INK)
     if len(known):
         axes.hist(known, _edges(known).tolist(), color=BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
-    limits = [limit for one in setup.limits(metric) for limit in _ends(one)]
+    allowed = () if is_plain() else setup.limits(metric)
+    limits = [limit for one in allowed for limit in _ends(one)]
     nominal = float(metric_values(setup.nominal.values[number], metric.dimension))
     _frame(axes, [*known.tolist(), *limits, nominal])
-    _limits(axes, setup.limits(metric))
+    _limits(axes, allowed)
     axes.axvline(nominal, color=INK, linewidth=1.0, linestyle="--")
     axes.annotate(
         "nominal",

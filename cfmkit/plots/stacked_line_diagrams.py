@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from cfmkit.plots.axis_labels_and_headings import (
     write_heading,
 )
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.style import GREY, TROUBLE, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, TROUBLE, axes_mm, is_plain, new_figure, styled
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -88,6 +88,8 @@ class Diagram:
 @styled
 def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
     """Draw a diagram on axes; return the axes."""
+    if is_plain():
+        diagram = replace(diagram, limits=(), regions=())
     x = to_border(np.asarray(diagram.over, dtype=float), diagram.x.dimension)
     names = []
     for item in diagram.series:

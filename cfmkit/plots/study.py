@@ -18,7 +18,19 @@ from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.rounding_noise import is_level, levelled
 from cfmkit.plots.stacked_line_diagrams import padded
 from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
-from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, color_bar, new_figure, styled
+from cfmkit.plots.style import (
+    BLUE,
+    GREY,
+    INK,
+    LINES,
+    SMALL,
+    VERMILLION,
+    axes_mm,
+    color_bar,
+    is_plain,
+    new_figure,
+    styled,
+)
 from cfmkit.plots.tick_numbers import digits_that_differ, widen
 
 if TYPE_CHECKING:
@@ -208,7 +220,7 @@ def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
 
 def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
     ends = edges(x)
-    for k in np.flatnonzero(~meets):
+    for k in np.flatnonzero(~meets) if not is_plain() else ():
         axes.axvspan(ends[k], ends[k + 1], facecolor=EMPTY, edgecolor=GREY, hatch=HATCH, linewidth=0, zorder=0)
     axes.set_xlim(ends[0], ends[-1])
 
@@ -305,7 +317,7 @@ def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
         mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=COLOURS, rasterized=True)
         _level_lines(axes, up, along, values)
         color_bar(mesh, axes_mm(figure, box), metric.label)
-    if not meets.all():
+    if not meets.all() and not is_plain():
         _hatch_cells(axes, x, y, ~meets)
     axes.set(xlabel=across.axis, ylabel=down.axis)
     along.dress(axes, "x")

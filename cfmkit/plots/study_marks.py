@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, write_heading
-from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, size_mm, styled
+from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, is_plain, size_mm, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,7 +36,7 @@ HEAD = 12.0
 def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
-    if key and _key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
+    if not is_plain() and key and _key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
         figure.legends[-1].remove()
         _key(figure, key, 1)
 
@@ -98,7 +98,7 @@ def ticks(axis: Any, parameter: DrawnScale) -> None:
 
 def star(axes: Axes, x: float, y: float) -> bool:
     """Mark the best point, and return whether it has a place."""
-    has_place = bool(np.isfinite([x, y]).all())
+    has_place = bool(np.isfinite([x, y]).all()) and not is_plain()
     if has_place:
         axes.plot(
             [x], [y], marker="*", markersize=12, color=VERMILLION, markeredgecolor="white", clip_on=False, zorder=5

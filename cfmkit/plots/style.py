@@ -19,7 +19,7 @@ from __future__ import annotations
 import struct
 import warnings
 import zlib
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -29,7 +29,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cfmkit.plots.figure_resizing import current
+from cfmkit.plots.figure_width import active_layout
 from cfmkit.plots.tick_numbers import WholeNumbers
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
     from matplotlib.figure import SubFigure
     from numpy.typing import NDArray
+
+    from cfmkit.plots.overlay import EarlierCurve
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -110,6 +112,8 @@ def _parameters() -> Any:
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 _SETTINGS_OF_USER: ContextVar[tuple[tuple[str, Any], ...]] = ContextVar("settings", default=())
 _TITLES: ContextVar[bool] = ContextVar("titles", default=True)
+_PLAIN: ContextVar[bool] = ContextVar("plain", default=False)
+_OVERLAY: ContextVar[EarlierCurve | None] = ContextVar("overlay", default=None)
 
 
 @contextmanager
@@ -142,12 +146,21 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
 @styled
 def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     """Return an empty figure of a print size in millimetres, on the Agg canvas; in a layout, the one that it has."""
-    layout = current()
+    layout = active_layout()
     if layout is not None:
         width_mm, height_mm = layout.sized(width_mm, height_mm)
     figure = Figure(figsize=(width_mm * MM, height_mm * MM))
     FigureCanvasAgg(figure)
     return figure
+
+
+@styled
+def new_axes() -> Axes:
+    """Return axes that fill a new figure of `matplotlib.pyplot` (160 x 100 mm), which notebooks show."""
+    from matplotlib import pyplot
+
+    figure = pyplot.figure(figsize=(160.0 * MM, 100.0 * MM))
+    return axes_mm(figure, (17.0, 12.0, 138.0, 84.0))
 
 
 def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
@@ -158,23 +171,31 @@ def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
 
 def has_titles() -> bool:
     """Return whether headings are to be written."""
-    return _TITLES.get()
+    return _TITLES.get() and not is_plain()
+
+
+def is_plain() -> bool:
+    """Return whether lines, their names and axes are all: no bands, no notes, no marks, no headings."""
+    return _PLAIN.get()
+
+
+def overlay() -> EarlierCurve | None:
+    """Return the curve of an earlier run that is drawn beside the nominal one; None if there is none."""
+    return _OVERLAY.get()
 
 
 @contextmanager
-def with_settings(settings: tuple[tuple[str, Any], ...], titles: bool) -> Iterator[None]:
-    """Apply more settings of matplotlib, and whether headings are written, inside a ``with`` block."""
-    mine, headed = _SETTINGS_OF_USER.set(settings), _TITLES.set(titles)
-    try:
+def with_settings(
+    settings: tuple[tuple[str, Any], ...] = (),
+    titles: bool = True,
+    plain: bool = False,
+    overlay: EarlierCurve | None = None,
+) -> Iterator[None]:
+    """Apply settings of matplotlib, whether headings and notes are written, and an overlay, inside a ``with`` block."""
+    with ExitStack() as stack:
+        for variable, value in ((_SETTINGS_OF_USER, settings), (_TITLES, titles), (_PLAIN, plain), (_OVERLAY, overlay)):
+            stack.callback(variable.reset, variable.set(value))  # type: ignore[arg-type]
         yield
-    finally:
-        _SETTINGS_OF_USER.reset(mine)
-        _TITLES.reset(headed)
-
-
-def is_to_scale(figure: Figure) -> bool:
-    """Return whether something in a figure has one scale in both directions."""
-    return any(ax.get_aspect() != "auto" for ax in figure.axes)
 
 
 @styled
@@ -215,9 +236,11 @@ def _chunk(name: bytes, data: bytes) -> bytes:
 def axes_mm(figure: Figure, box: tuple[float, float, float, float], **options: Any) -> Axes:
     """Return new axes in a box (left, bottom, width, height) [mm of print]."""
     width, height = size_mm(figure)
-    layout = current()
+    layout = active_layout()
     left, bottom, across, up = box if layout is None else layout.placed(box)
     axes = figure.add_axes((left / width, bottom / height, across / width, up / height), **options)
+    if layout is not None:
+        layout.axes.append(axes)
     axes.xaxis.set_major_formatter(WholeNumbers())
     axes.yaxis.set_major_formatter(WholeNumbers())
     return axes

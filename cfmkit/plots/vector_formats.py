@@ -80,7 +80,8 @@ def inline(drawn: bytes, name: str) -> str:
     """
     text = drawn.decode()
     label = re.sub("[-_]+", " ", name).strip()
-    text = text[text.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+    role = "group" if "<a " in text else "img"  # what is inside of one picture cannot be reached by a keyboard
+    text = text[text.index("<svg") :].replace("<svg", f'<svg role="{role}" aria-label="{label}"', 1)
     text = re.sub(r"<style.*?</style>", "", text, flags=re.DOTALL)  # it would hold for the whole page
     text = re.sub(r' id="([^"]*)"', rf' id="{name}-\1"', text)
     text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)

@@ -14,14 +14,13 @@ from cfmkit.arrays import Several, named
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.metrics.compare import TOLERANCE
-from cfmkit.plots.figure_options import PLAIN, FigureForm
+from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
-from cfmkit.tables.html import first_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -56,7 +55,7 @@ class BatchWork:
         """Everything in it that decides what a run finds and writes."""
         given = self.common
         page = ["report"] if given.page else []  # without a page: as it always was, so that earlier batches are reused
-        form = [] if given.form.plain else [repr(given.form), repr(given.form.settings)]
+        form = [] if given.form.is_default else [repr(given.form), repr(given.form.settings)]
         return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page, *form]
 
     def __call__(self, job: BatchJob) -> Entry:
@@ -84,7 +83,7 @@ class BatchWork:
         spec = spec_of(wanted)
         verb = _verb(self.verb or _natural(spec), self.fresh)
         name = " ".join(spec.name.split())
-        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec))
+        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
         try:
             outcome = carried_out(verb, wanted, self.arguments)
         except CfmError as error:
@@ -100,12 +99,15 @@ def _natural(spec: Spec) -> str:
     return "design" if designs else "analyze"
 
 
-def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
-    """Return the data files that a specification names, and the hashes of their content."""
+def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
+    """Return the files that a specification takes values and data from, and the hashes of their content."""
     from cfmkit.specs.data_file_paths import named_in
+    from cfmkit.specs.yamlio.base_file import base_files
     from cfmkit.store import file_hash
 
-    return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
+    folder = os.path.dirname(file) or "."
+    bases = tuple((os.path.relpath(base, folder), file_hash(base.resolve())) for base in base_files(file))
+    return (*bases, *((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump())))
 
 
 def _verb(name: str, fresh: bool) -> Verb:
@@ -282,6 +284,8 @@ class BatchResult:
         What was written there.
     compared : BatchComparison or None
         With an earlier batch.
+    accepted : str
+        The folder of the reference that has these results now; empty if none was to be replaced.
     """
 
     entries: tuple[Entry, ...]
@@ -289,6 +293,7 @@ class BatchResult:
     folder: str
     files: tuple[str, ...]
     compared: BatchComparison | None = None
+    accepted: str = ""
 
     def __post_init__(self) -> None:
         """Keep the texts of what is inside short."""
@@ -301,7 +306,10 @@ class BatchResult:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the first specifications with their verdicts."""
-        return f"<div>{first_rows(self.table)}</div>"
+        from cfmkit.documents.batch_document import document_of
+        from cfmkit.documents.notebook import shown
+
+        return shown(document_of(self.entries, self.exit_code, compared=self.compared))
 
     @property
     def summary(self) -> Mapping[str, Any]:
@@ -341,6 +349,7 @@ def batch(
     summary: str | None = None,
     compare: str | os.PathLike[str] | None = None,
     compare_tolerance: float | None = None,
+    accept: bool = False,
     page: bool = False,
     form: FigureForm | None = None,
     arguments: Sequence[str] = (),
@@ -383,6 +392,9 @@ def batch(
         The folder of an earlier batch; what has changed beyond the tolerance is a missed requirement. It may be `out`.
     compare_tolerance : float, optional
         Relative change of a metric that counts as none; default: 1e-6.
+    accept : bool
+        Make the results the reference: they replace those in the folder `compare`, which need not exist yet. Changes
+        are still listed, but are no missed requirement.
     page : bool
         Whether to write a ``report.html`` for each, and one for all that links them.
     form : FigureForm, optional
@@ -425,7 +437,7 @@ def batch(
         addressed(change)
     named = _named(specs)
     files = sources(named, place)
-    common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
+    common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
@@ -435,7 +447,9 @@ def batch(
     if not 0 <= tolerance < 1:
         meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
         raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")
-    before = None if compare is None else earlier(os.fspath(compare))
+    reference = "" if compare is None else os.fspath(compare)
+    begins = accept and batch_output_files.check_reference(reference, place)
+    before = None if compare is None or begins else earlier(reference)
     watched = monitor or Unwatched()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
@@ -443,20 +457,22 @@ def batch(
         compared = None
         if before is not None:
             changed = changes_of(before, entries, place, tolerance)
-            compared = BatchComparison(os.fspath(compare or ""), tolerance, changed, gone(before, entries))
+            compared = BatchComparison(reference, tolerance, changed, gone(before, entries))
         code = exit_code(entries, watched.stopped)
-        if compared is not None and compared.beyond and not watched.stopped:
+        if compared is not None and compared.beyond and not watched.stopped and not accept:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
         written = batch_output_files.write(
             folder, entries, batch_output_files.about(work.arguments, work.common.seed, named, code), page, compared
         )
+    if accepted := accept and not watched.stopped:
+        batch_output_files.write_reference(reference, place, entries, work.arguments)
     if report is not None:
         report(junit_of(entries))
     if reported is not None:
         from cfmkit.documents.markdown import summary as in_markdown
 
         reported(in_markdown(entries, compared))
-    return BatchResult(entries, code, place, written, compared)
+    return BatchResult(entries, code, place, written, compared, reference if accepted else "")
 
 
 def _named(specs: Any) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.metrics import known_metrics, values_of_family
 from cfmkit.specs.keys_and_schema import schema as plain_schema
+from cfmkit.specs.yamlio.base_file import BASE_KEY
 from cfmkit.store import atomic_write
 from cfmkit.tables.json_writing import json_bytes
 
@@ -32,6 +33,8 @@ def schema(records: Iterable[Family]) -> dict[str, Any]:
     """
     known = {record.name: record for record in records}
     found = plain_schema({name: record.spec_type for name, record in known.items()})
+    for choice in found.get("oneOf", [found]):
+        _allow_base(choice)
     for title, block in found.get("$defs", {}).items():
         prefix, dot, name = title.rpartition(".")
         names = [*metric_names(known[prefix] if dot else next(iter(known.values())))]
@@ -41,6 +44,16 @@ def schema(records: Iterable[Family]) -> dict[str, Any]:
         elif name in ("Sweep", "Sensitivity") and "items" in properties.get("metrics", {}):
             properties["metrics"] = properties["metrics"] | {"items": _closed(properties["metrics"]["items"], names)}
     return found
+
+
+def _allow_base(choice: dict[str, Any]) -> None:
+    """Let a specification name a base, which may have its other blocks: an editor cannot know what it says."""
+    choice["properties"] = choice.get("properties", {}) | {BASE_KEY: BASE_SCHEMA}
+    if required := choice.pop("required", None):
+        choice["anyOf"] = [{"required": [BASE_KEY]}, {"required": required}]
+
+
+BASE_SCHEMA = {"type": "string", "description": "another specification, whose values those of this file override"}
 
 
 def metric_names(record: Family) -> Iterator[str]:

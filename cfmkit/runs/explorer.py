@@ -9,16 +9,19 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit import api
-from cfmkit.documents.document import TONES
+from cfmkit.documents.document import command_line
 from cfmkit.documents.html import escaped_json, part, template
-from cfmkit.documents.run_document import verdict_of
-from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
+from cfmkit.documents.run_document import document_of, shown_window
+from cfmkit.documents.run_outcome import report_on
+from cfmkit.errors import CfmError, OutputError, SpecError, UsageError, lines_of, visible
+from cfmkit.results import Status
 from cfmkit.runs.specfile import bind, changed, read_spec
 from cfmkit.specs.units.strict_decimal_number import NUMBER
 
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Curve
     from cfmkit.results import Result
+    from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.yamlio import YamlDocument
 
@@ -39,6 +43,9 @@ MOST_POINTS = 600
 
 SPAN = 0.5
 """Share of a value by which its slider goes down and up: far enough to see a trend, near enough to stay a mechanism."""
+
+RELATIVE_STEP = 0.01
+"""Share of a value by which it is changed to find its influence: above the noise of solvers, and a small change."""
 
 PAIRS = {name: ("x", "y") for name in ("at", "mirror")} | {
     name: ("from", "to") for name in ("window", "over", "travel")
@@ -104,8 +111,9 @@ class Explorer:
         """Return the specification with changes."""
         return bind(changed(self.document, changes))
 
+    @cached_property
     def sliders(self) -> tuple[Slider, ...]:
-        """Return a slider for every number of the specification, those that it leaves to their defaults included."""
+        """A slider for every number of the specification, those that it leaves to their defaults included."""
         from cfmkit.specs.keys_and_schema import keys
         from cfmkit.specs.yamlio import read_document
 
@@ -124,11 +132,45 @@ class Explorer:
         """Return what a page shows of the changed specification: curve, metrics, requirements, or what is wrong."""
         start = time.perf_counter()
         try:
-            result = api.analyze(self.spec(changes))
-            found = _shown(result)
+            found = _shown(api.analyze(self.spec(changes)))
         except CfmError as error:
             found = {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
+            if isinstance(error, SpecError):
+                found["places"] = [
+                    {"path": problem.path or problem.source.removeprefix("--set "), "message": problem.message}
+                    for problem in error.problems
+                ]
         return found | {"seconds": time.perf_counter() - start}
+
+    def influence(self, path: str) -> dict[str, Any]:
+        """Return the share of its bounds by which 1 % more of a value moves the requirements, or the mean effort.
+
+        Zero where the value cannot be changed alone, and of values that are no part of the mechanism.
+        """
+        slider = next((item for item in self.sliders if item.path == path), None)
+        if slider is None:
+            return {"influence": 0.0}
+        size = abs(slider.value) or slider.high - slider.low
+        step = 1.0 if slider.whole else RELATIVE_STEP * size
+        written = f"{path}={slider.value + step:.12g} {slider.unit}".rstrip()
+        try:
+            moved = _judge(api.analyze(self.spec([written])))
+            nominal = self._nominal
+        except CfmError:
+            return {"influence": 0.0}
+        shares = [
+            abs(moved[name][0] - value) / size for name, (value, size) in nominal.items() if name in moved and size
+        ]
+        return {"influence": max(shares, default=0.0) * RELATIVE_STEP * size / step}
+
+    @cached_property
+    def _nominal(self) -> dict[str, tuple[float, float]]:
+        return _judge(api.analyze(self.spec()))
+
+    def command(self, changes: Sequence[str]) -> str:
+        """Return the command that analyses the specification with changes."""
+        settings = [word for change in changes for word in ("--set", change)]
+        return command_line("cfmkit", "analyze", self.source, *settings)
 
     def drawing(self, changes: Sequence[str]) -> dict[str, Any]:
         """Return the mechanism in the middle of its travel as SVG; empty where its family draws none."""
@@ -173,7 +215,7 @@ class Explorer:
         """Return the page; its script reports with a token who it is, and runs only with the nonce of this answer."""
         spec = self.spec()
         groups: dict[str, list[Slider]] = {}
-        for slider in self.sliders():
+        for slider in self.sliders:
             groups.setdefault(slider.path.rpartition(".")[0], []).append(slider)
         data = {"token": token, "source": self.source, "first": self.answer(())}
         text: str = template("explorer.html.j2", "cfmkit.runs").render(
@@ -241,34 +283,60 @@ def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
 
 
 def _shown(result: Result) -> dict[str, Any]:
-    """Return a result as data for the page."""
-    from cfmkit.documents.run_outcome import report_on
-    from cfmkit.families import family
-    from cfmkit.specs.units import border_unit, format_short
+    """Return a result as data for the page: its document, which the command line prints, and its curve."""
+    from cfmkit.plots.bands_from_requirements import bands_of
+    from cfmkit.specs.units import border_unit, to_border
 
     report = report_on(result)
-    first = (*family(result.spec.family).leading, "force_mean", "torque_mean", "force_ripple", "torque_ripple")
-    known = {name: report.metrics[name] for name in dict.fromkeys(first) if name in report.metrics}
+    document = document_of(report)
     found: dict[str, Any] = {
-        "tone": TONES.get(int(report.exit_code), "warn"),
-        "verdict": verdict_of(report),
-        "message": report.message,
+        "tone": document.tone,
+        "verdict": document.verdict,
+        "summary": document.summary,
+        "message": "" if result.status is Status.COMPLETE else report.message,
         "requirements": [{"sentence": one.sentence, "ok": one.ok} for one in report.requirements],
-        "warnings": [{"name": one.name, "message": one.message} for one in report.warnings],
-        "metrics": [
-            [name.replace("_", " "), one.word or format_short(one.value, one.dimension), one.definition]
-            for name, one in known.items()
-            if one.value is not None
+        "rows": [
+            {"label": one.label, "value": one.value, "bound": one.bound, "ok": one.ok, "about": one.about}
+            for one in document.headline
         ],
+        "notes": [[one.word, one.text] for one in document.notes if one.text != report.message],
+        "warnings": [{"name": one.name, "short": one.short, "text": one.text} for one in document.warnings],
     }
     if result.curves:
         curve = result.curves[0]
+        window, motion = shown_window(report), curve.motion_dimension
         found["curve"] = {
-            "x": f"{curve.motion_name} [{border_unit(curve.motion_dimension)}]",
+            "x": f"{curve.motion_name} [{border_unit(motion)}]",
             "y": f"{curve.kind} [{border_unit(curve.kind)}]",
             "branches": dict(_branches(curve)),
+            "window": None if window is None else [float(to_border(end, motion)) for end in (window.lo, window.hi)],
+            "bands": [
+                {
+                    "low": None if band.low is None else float(to_border(band.low, curve.kind)),
+                    "high": None if band.high is None else float(to_border(band.high, curve.kind)),
+                    "from": float(to_border(band.start, motion)),
+                    "to": float(to_border(band.stop, motion)),
+                    "text": band.text,
+                    "ok": band.met,
+                }
+                for band in bands_of(result)
+            ],
         }
     return found
+
+
+def _judge(result: AnalysisView) -> dict[str, tuple[float, float]]:
+    """Return the value of each required metric with the size of its bound, and the mean effort with its own, in SI."""
+    judged = {
+        outcome.metric: (outcome.value, max(abs(end) for end in (outcome.min, outcome.max) if end is not None))
+        for outcome in result.requirements
+        if outcome.value is not None
+    }
+    if result.curves:
+        name = f"{result.curve.kind}_mean"
+        mean = api.evaluate(result, [name])[name].value
+        judged |= {} if mean is None else {"mean": (mean, abs(mean))}
+    return judged
 
 
 def _branches(curve: Curve) -> Iterator[tuple[str, list[list[float | None]]]]:

@@ -242,21 +242,23 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, path: str, changes: list[str], name: str) -> tuple[int, dict[str, Any]]:
         explorer = self.server.explorer
+        answers: dict[str, Callable[[], dict[str, Any]]] = {
+            "/answer": lambda: explorer.answer(changes),
+            "/influence": lambda: explorer.influence(name),
+            "/drawing": lambda: explorer.drawing(changes),
+            "/yaml": lambda: {"yaml": explorer.yaml(changes)},
+            "/command": lambda: {"command": explorer.command(changes)},
+            "/save": lambda: explorer.save(name, changes),
+        }
+        if path not in answers:
+            return 404, {}
         try:
-            if path == "/answer":
-                return 200, explorer.answer(changes)
-            if path == "/drawing":
-                return 200, explorer.drawing(changes)
-            if path == "/yaml":
-                return 200, {"yaml": explorer.yaml(changes)}
-            if path == "/save":
-                return 200, explorer.save(name, changes)
+            return 200, answers[path]()
         except CfmError as error:
             return 200, {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
         except Exception as error:
             self.server.failed(error)
             return 500, {"problem": [f"a bug in cfmkit: {type(error).__name__}: {error}"]}
-        return 404, {}
 
     def _is_local(self) -> bool:
         """Return whether it was reached by a name of this computer, and from no page but its own."""

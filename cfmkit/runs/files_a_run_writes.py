@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from cfmkit import api
 from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.families import family
-from cfmkit.plots.figure_options import PLAIN, FigureForm
+from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.plots.figures import moving_of
 from cfmkit.results import PART_NOT_DRAWN, Finding
 from cfmkit.runs.part_on_paper import part_on_paper
@@ -32,7 +32,7 @@ def files(
     plots: bool = True,
     page: bool = False,
     command: str = "",
-    form: FigureForm = PLAIN,
+    form: FigureForm = DEFAULT_FORM,
     animate: str | None = None,
     started: RunCommand | None = None,
 ) -> Iterator[tuple[str, bytes]]:

@@ -1,23 +1,51 @@
-"""Results as a notebook shows them: metrics, requirements and one figure, in a few kilobytes.
+"""Results of Python functions, which measure, draw and show themselves when they are asked to.
 
-What `cfmkit.analyze` gives back is an `AnalysisView`: a `Result` that also measures itself when it is asked to.
+`cfmkit.analyze` returns an `AnalysisView`, which is a `Result`; `cfmkit.suggest` returns a `SuggestionsView`.
+A notebook shows them by the documents that the command line prints.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from cfmkit.arrays import Named, Several
 from cfmkit.families import family
-from cfmkit.results import Result
+from cfmkit.results import Quantity, Result
+from cfmkit.studies.suggest.search import Suggestions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
 
     from cfmkit.metrics import Outcome
-    from cfmkit.results import Quantity
+    from cfmkit.studies.suggest.spec import SuggestBlock
+
+
+class Metrics(Named[Quantity]):
+    """Metrics by name; a notebook shows all of them as a table."""
+
+    def _repr_html_(self) -> str:
+        """Return the table: a row a metric, a column a branch."""
+        from cfmkit.documents.notebook import table_of
+        from cfmkit.documents.run_document import metrics_table
+
+        return table_of(metrics_table(self))
+
+
+class Requirements(Several["Outcome"]):
+    """Outcomes of requirements, in the order of the specification; a notebook shows them as a table."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """Return the table: a row a requirement."""
+        from cfmkit.documents.notebook import table_of
+        from cfmkit.documents.run_document import requirements_table
+
+        return table_of(requirements_table(self))
 
 
 @dataclass(frozen=True, repr=False)
@@ -34,14 +62,40 @@ class AnalysisView(Result):
         """Every metric and scalar result by name, in SI: ``result.metrics["force_mean"].value``."""
         from cfmkit.metrics import evaluate
 
-        return Named(evaluate(self))
+        return Metrics(evaluate(self))
 
     @cached_property
-    def requirements(self) -> tuple[Outcome, ...]:
+    def requirements(self) -> Sequence[Outcome]:
         """Outcome of each requirement of the specification."""
         from cfmkit.metrics import check, values_of_family
 
-        return Several(check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values)))
+        return Requirements(check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values)))
+
+    def plot(self, ax: Axes | None = None, *, bands: bool = True, names: bool = True, arrows: bool = True) -> Axes:
+        """Draw force over displacement, or torque over angle, and return the axes.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            To draw on, as one of several in a figure of your own; default: a new figure of `matplotlib.pyplot`,
+            160 x 100 mm, which a notebook shows.
+        bands : bool
+            Shade what the requirements allow.
+        names : bool
+            Write the names of branches, bands and levels beside them.
+        arrows : bool
+            Draw an arrow along each branch, in the direction of the motion.
+
+        Raises
+        ------
+        cfmkit.errors.SolutionError
+            If nothing was solved.
+        """
+        from cfmkit.plots.curves import CurveLook, plot_curve
+        from cfmkit.plots.style import new_axes
+
+        _ = self.curve  # the error says why there is none
+        return plot_curve(self, new_axes() if ax is None else ax, CurveLook(bands, names, arrows))
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
@@ -50,5 +104,35 @@ class AnalysisView(Result):
         from cfmkit.documents.run_outcome import Report
         from cfmkit.plots.figures import figures
 
-        report = Report(self, self.metrics, self.requirements)
+        report = Report(self, self.metrics, tuple(self.requirements))
         return shown(document_of(report), figures(family(self.spec.family), self))
+
+
+@dataclass(frozen=True, repr=False)
+class SuggestionsView(Suggestions):
+    """Proposals with what was requested; a notebook shows their table and the mechanisms to one scale."""
+
+    block: SuggestBlock | None = field(default=None, compare=False)  # always there; it follows fields with defaults
+
+    @classmethod
+    def of(cls, suggestions: Suggestions, block: SuggestBlock) -> SuggestionsView:
+        """Return suggestions with the block `suggest` that they answer."""
+        return cls(**{item.name: getattr(suggestions, item.name) for item in fields(suggestions)}, block=block)
+
+    def __repr__(self) -> str:
+        """Return the proposals in a line: family and variant of the first ten."""
+        from cfmkit.runs.suggestion_files import message
+
+        listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
+        return f"<Suggestions: {'; '.join([message(self), *listed])}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        from cfmkit.documents.notebook import shown
+        from cfmkit.documents.suggestion_document import document_of
+        from cfmkit.runs.suggestion_files import as_json, exit_code
+        from cfmkit.studies.suggest.figures import to_one_scale
+
+        assert self.block is not None  # `of`
+        figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
+        return shown(document_of(as_json(self, self.block), exit_code(self)), figures)

@@ -17,7 +17,7 @@ from cfmkit.documents import run_outcome
 from cfmkit.documents.run_document import RunCommand
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.run_control import Run
-from cfmkit.plots.figure_options import PLAIN, FigureForm
+from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.results import OVERWRITTEN, Finding, Status
 from cfmkit.runs.files_a_run_writes import files, warnings_of_part
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
@@ -122,7 +122,7 @@ class RunTask:
     plots: bool = True  # whether to draw
     of_many: bool = False  # whether it is one of many, and changes may be for others
     page: bool = False  # whether to write ``report.html``
-    form: FigureForm = PLAIN  # how figures are written
+    form: FigureForm = DEFAULT_FORM  # how figures are written
     animate: str | None = None  # whether to write the mechanism in motion, and as what
 
 

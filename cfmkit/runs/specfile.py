@@ -41,10 +41,11 @@ def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> 
         If the file cannot be read, or an option is malformed or for a specification of another family.
     """
     from cfmkit.specs.yamlio import read_document
+    from cfmkit.specs.yamlio.base_file import with_base
 
     if name == STDIN:
-        return changed(read_document(standard_input(), "stdin", Path.cwd()), changes, of_many)
-    return changed(read_document(content(name), name, Path(name).absolute().parent), changes, of_many)
+        return changed(with_base(read_document(standard_input(), "stdin", Path.cwd())), changes, of_many)
+    return changed(with_base(read_document(content(name), name, Path(name).absolute().parent)), changes, of_many)
 
 
 def changed(document: YamlDocument, changes: Iterable[str], of_many: bool = False) -> YamlDocument:
@@ -238,8 +239,8 @@ def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
 
 def placed(document: YamlDocument, path: str, message: str) -> Problem:
     """Return a problem with the place of a path in the file, or the option that set it."""
-    line, column = document.place(path)
-    return Problem(document.source if line else "--set", line, column, path, message)
+    found = document.problem(path, message)
+    return found if found.line else Problem("--set", 0, 0, path, message)
 
 
 def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:

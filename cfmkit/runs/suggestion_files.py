@@ -189,7 +189,7 @@ def files(
     yield "metrics.json", json_bytes(as_json(found, block))
     yield "suggestions.csv", table(found)
     in_time = not deadlines.figures.late()
-    drawn = _pictures(found) if found.listed and in_time and (plots or command is not None) else {}
+    drawn = {"proposals": _picture(found)} if found.listed and in_time and (plots or command is not None) else {}
     if plots:
         from cfmkit.plots.style import png
 
@@ -206,14 +206,12 @@ def files(
             yield f"{folder_name(index + 1, one)}/{name}", data
 
 
-def _pictures(found: Suggestions) -> dict[str, Figure]:
-    """Return the pictures of a search, by name."""
-    from cfmkit.studies.suggest import pareto_and_scale_drawings
+def _picture(found: Suggestions) -> Figure:
+    """Return all proposals to one scale; on a page each leads to its report."""
+    from cfmkit.studies.suggest.figures import to_one_scale
 
-    return {
-        "pareto": pareto_and_scale_drawings.pareto(found.listed, found.request),
-        "proposals": pareto_and_scale_drawings.to_one_scale(found.listed, found.request),
-    }
+    links = [f"{folder_name(number, one)}/{html.NAME}" for number, one in enumerate(found.listed, 1)]
+    return to_one_scale(found.listed, found.request, links)
 
 
 def _made(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
+from cfmkit.specs.own_metrics import name_of
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
     DIMENSIONS,
@@ -39,6 +40,11 @@ class Requirement(Model):
         None,
         description="window, e.g. [2 mm, 240 mm], or shares of the travel: [1 %, 100 %]; default: analysis.window",
     )
+
+    @field_validator("metric", mode="before")
+    @classmethod
+    def _named(cls, metric: Any) -> Any:
+        return name_of(metric)
 
     @field_validator("metric")
     @classmethod

@@ -7,5 +7,5 @@ A study sees a specification, dotted paths and names of metrics; it knows no fam
 `serial_and_cluster_executors` and `pool` are ways to get that done, `journal` and `row_blocks_for_journal`
 remember what is finished, `engine` puts these together, `choose_metrics_to_note` names what is
 noted, `tables` writes it, `summary` sums it up, and `sweep_request_and_files` is the study that
-varies a specification. `sweep_and_sensitivity_api` is how Python asks for a study.
+varies a specification.
 """

@@ -30,8 +30,10 @@ from cfmkit.studies import worker_process
 from cfmkit.studies.serial_and_cluster_executors import BUG, Lost, never
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
+    from cfmkit.families.base import Family
+    from cfmkit.specs.own_metrics import OwnMetric
     from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
     Messages = SimpleQueue[tuple["_Worker", bytes | None]]
@@ -61,14 +63,15 @@ class _Worker:
     started: float | None = None
     listener: threading.Thread = field(init=False)
 
-    def listen(self, work: bytes, messages: Messages) -> None:
-        """Send the work, then put (worker, message) on a queue whenever the worker says something; None at its end."""
+    def listen(self, what: Iterable[bytes], messages: Messages) -> None:
+        """Send registrations and work, then put (worker, message) on a queue as the worker reports; None at its end."""
 
         def serve() -> None:
             with suppress(OSError):
-                worker_process.send(self.process.stdin, work)
-                while (message := worker_process.receive(self.process.stdout)) is not None:
-                    messages.put((self, message))
+                for message in what:
+                    worker_process.send(self.process.stdin, message)
+                while (reported := worker_process.receive(self.process.stdout)) is not None:
+                    messages.put((self, reported))
             messages.put((self, None))
 
         self.listener = threading.Thread(target=serve, daemon=True)
@@ -134,7 +137,7 @@ class _Crew:
         self.pace: float | None = None
         self.empty = False
         self.messages: Messages = SimpleQueue()
-        self.what = pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
+        self.what = pack_registrations(), pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
 
     def __enter__(self) -> _Crew:
         return self
@@ -235,6 +238,38 @@ class _Crew:
                 if not over:
                     self.again.extend(one.given)
                 yield job, Lost(Status.TIMEOUT, OVER if over else f"not finished within {allowed:g} s")
+
+
+def pack_registrations() -> bytes:
+    """Return what a worker registers before it begins: families and metrics that were added to this process.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If another process cannot import one of them.
+    """
+    from cfmkit import families
+    from cfmkit.specs import own_metrics
+
+    records = families.list_registered().values()
+    metrics = own_metrics.own_metrics().values()
+    additions: list[Family | OwnMetric] = [*records, *metrics]
+    for added in additions:
+        try:
+            sent = pickle.dumps(added)
+        except (pickle.PicklingError, AttributeError, TypeError):
+            sent = _MAIN_MODULE
+        if _MAIN_MODULE in sent:
+            raise UsageError(
+                f"{added.name!r} cannot be computed in other processes: put it in a module that they can import, "
+                "or use jobs=1"
+            )
+    entries = [(families.register, record) for record in records], [(own_metrics.enter, metric) for metric in metrics]
+    return pickle.dumps([*entries[0], *entries[1]])
+
+
+_MAIN_MODULE = b"__main__"
+"""Name of the module of a notebook or a script, as pickles have it: in a worker it is another one."""
 
 
 def until(executor: Executor, deadline: float | None) -> Executor:

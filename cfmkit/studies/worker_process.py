@@ -1,5 +1,6 @@
-"""The worker process of a pool: reads the work and then jobs from standard input, and writes the outcomes to standard
-output, each with its length in front.
+"""The worker process of a pool: reads what to register, the work and then jobs from standard input.
+
+It writes the outcomes to standard output, each with its length in front.
 
 It ends when its parent does, however that ends: the thread that reads finds the end of the pipe, which the operating
 system closes with the parent; on Linux the kernel is asked to end the process, too, in case a solver never lets that
@@ -62,6 +63,8 @@ def main(parent: int) -> None:
     inlet, outlet = _pipes()
     received: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_read, args=(inlet, received), daemon=True).start()
+    for register, added in pickle.loads(received.get()):
+        register(added)
     work = pickle.loads(received.get())
     with contextlib.suppress(BrokenPipeError):
         _serve(work, received, outlet)

@@ -400,3 +400,12 @@ def test_a_shell_without_completion_is_refused(cli, monkeypatch):
     done = cli("--show-completion")
     assert done.code == 2
     assert "bash, zsh, fish and PowerShell" in done.err
+
+
+def test_faults_are_shown_with_their_line_and_a_caret_where_v_asks_for_it(cli):
+    (cli.folder / "one.yaml").write_text("family: cam\nmechanism:\n  roller_radius: 16 kg\n")
+    plain, verbose = cli("check", "one.yaml").err.splitlines(), cli("check", "-v", "one.yaml").err.splitlines()
+    assert all(line.startswith("one.yaml:") for line in plain)
+    assert [line for line in verbose if line.startswith("one.yaml:")] == plain
+    at = next(number for number, line in enumerate(verbose) if "16 kg' is a mass" in line)
+    assert verbose[at + 1 : at + 3] == ["    3 |   roller_radius: 16 kg", "      |                  ^"]

@@ -86,7 +86,7 @@ def test_evaluate_takes_names_and_branches(result):
 
 
 def test_check_gives_an_outcome_for_each_requirement(spec, result):
-    assert [outcome.metric for outcome in cfmkit.check(result)] == [item.metric for item in spec.requirements]
+    assert [outcome.metric for outcome in result.requirements] == [item.metric for item in spec.requirements]
 
 
 def test_design_of_a_family_that_cannot_be_designed_is_a_usage_error(monkeypatch, spec):
@@ -214,7 +214,7 @@ def test_the_name_of_an_option_stands_for_the_option_that_it_is_short_for():
 def test_functions_take_the_path_of_a_file_as_well_as_a_specification(spec, result):
     for path in (CAM, str(CAM)):
         assert np.array_equal(cfmkit.analyze(path).curve.force, result.curve.force, equal_nan=True)
-    assert cfmkit.check(CAM) == cfmkit.check(spec) == cfmkit.check(result)
+    assert cfmkit.check(CAM) == cfmkit.check(spec) == ()
     assert cfmkit.evaluate(CAM, ["force_mean"]) == cfmkit.evaluate(result, ["force_mean"])
     assert cfmkit.design(CAM).spec == cfmkit.design(spec).spec
     assert cfmkit.drawing(CAM).name == cfmkit.drawing(spec).name

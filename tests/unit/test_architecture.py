@@ -117,7 +117,7 @@ def test_families_do_not_import_each_other():
 
 
 ALLOWED = {
-    "matplotlib": lambda path: unit_of(path) == "plots" or path.name in ("figures.py", "pareto_and_scale_drawings.py"),
+    "matplotlib": lambda path: unit_of(path) == "plots" or path.name == "figures.py",
     "typer": lambda path: unit_of(path) == "cli",
     "rich": lambda path: unit_of(path) == "cli" or path.parts[-2:] == ("documents", "terminal.py"),
     "pydantic": lambda path: unit_of(path) == "specs" or path.name.endswith("spec.py"),

@@ -248,3 +248,33 @@ def test_the_hook_leaves_alone_what_other_tools_read(name, left_out):
 def test_a_complete_curve_that_misses_a_requirement_now_is_a_change_in_words(tmp_path):
     (found,) = changes({"a": Earlier("complete", 0, {})}, [one(code=ExitCode.REQUIREMENT_MISSED)], str(tmp_path))
     assert found.sentence == "status: complete -> complete, requirement missed"
+
+
+def test_accepted_results_are_the_reference_that_the_next_batch_is_compared_with(folder):
+    """The reference is made where there is none, and holds what a comparison reads, nothing else."""
+    first = batch(compare="reference", accept=True)
+    assert (first.exit_code, first.compared, first.accepted) == (ExitCode.OK, None, "reference")
+    files = sorted(str(path.relative_to("reference")) for path in Path("reference").rglob("*") if path.is_file())
+    specs = sorted(f"{one.folder}/metrics.json" for one in first.entries)
+    assert files == sorted(["manifest.json", "metrics.json", *specs])
+    thicker = ["mechanism.positive.width=10.01 mm"]
+    assert batch(compare="reference", changes=thicker).exit_code is ExitCode.REQUIREMENT_MISSED
+    accepted = batch(compare="reference", changes=thicker, accept=True)
+    assert accepted.compared.beyond
+    assert accepted.exit_code is ExitCode.OK
+    again = batch(compare="reference", changes=thicker)
+    assert again.compared.changes == ()
+
+
+@pytest.mark.parametrize(("more", "reported"), [({}, "name its folder with --compare"), ({"compare": "out"}, "itself")])
+def test_results_are_not_accepted_without_a_reference_of_their_own(folder, more, reported):
+    with pytest.raises(UsageError, match=reported):
+        batch(accept=True, **more)
+
+
+def test_a_folder_that_is_none_of_a_batch_is_not_replaced(folder):
+    Path("mine").mkdir()
+    Path("mine/metrics.json").write_text("{}")
+    with pytest.raises(UsageError, match="is not the folder of a batch"):
+        batch(compare="mine", accept=True)
+    assert Path("mine/metrics.json").read_text() == "{}"

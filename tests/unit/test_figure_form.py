@@ -11,8 +11,7 @@ from cfmkit import api
 from cfmkit.errors import UsageError
 from cfmkit.plots import style
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
-from cfmkit.plots.figure_options import PLAIN, FigureForm, form_of
-from cfmkit.plots.figure_resizing import FigureLayout
+from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm, form_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.parts import to_scale
 
@@ -39,33 +38,40 @@ def boxes(figure):
     ]
 
 
-def test_another_width_stretches_the_axes_and_leaves_the_room_for_their_labels():
+def tight(figure):
+    """Return left, bottom, right and top of everything that is drawn of each axes [mm]."""
+    figure.canvas.draw()
+    found = [ax.get_tightbbox() for ax in figure.axes]
+    return np.array([[box.x0, box.y0, box.x1, box.y1] for box in found]) / figure.dpi / SIZE
+
+
+def test_another_width_keeps_axes_beside_each_other_and_all_of_them_on_the_paper():
     narrow = form_of(width="84 mm").draw(made)
-    assert np.allclose(style.size_mm(narrow)[0], 84)
+    width, height = style.size_mm(narrow)
+    assert np.isclose(width, 84)
+    assert 60 < height < 110
     wide, bar = boxes(narrow)
-    assert np.allclose(wide[:2], (16, 14))
-    assert np.allclose(wide[2], 112 - (160 - 84))
-    assert np.allclose(bar[2], 4)
-    assert np.allclose(bar[0] - wide[0] - wide[2], 133 - 16 - 112)
-    assert 60 < style.size_mm(narrow)[1] < 100
+    assert wide[0] + wide[2] < bar[0]
+    assert np.allclose(wide[[1, 3]], bar[[1, 3]])
+    assert wide[2] / bar[2] == pytest.approx(112 / 4, rel=0.05)
+    extents = tight(narrow)
+    assert (extents[:, :2] >= 0).all()
+    assert (extents[:, 2:] <= (width, height)).all()
+    assert extents[:, 0].min() < 4  # nothing is left free that the numbers do not need
+    assert extents[:, 2].max() > 80
 
 
-def test_what_is_to_scale_is_stretched_by_one_factor_in_both_directions():
+def test_what_is_to_scale_changes_by_one_factor_in_both_directions():
     axes, _ = boxes(form_of(width="84 mm").draw(lambda: made(scaled=True)))
-    assert np.isclose(axes[2] / 112, axes[3] / 76)
+    assert axes[2] / axes[3] == pytest.approx(112 / 76, rel=1e-3)
 
 
 def test_without_titles_the_heading_and_its_room_are_gone():
     with_heading, without = (FigureForm(titles=titles).draw(made) for titles in (True, False))
     assert [text.get_text() for text in with_heading.texts] == ["name: subject"]
     assert without.texts == []
-    assert np.isclose(style.size_mm(with_heading)[1] - style.size_mm(without)[1], style_heading())
-
-
-def style_heading():
-    from cfmkit.plots.figure_resizing import HEADING
-
-    return HEADING
+    free = [style.size_mm(one)[1] - tight(one)[:, 3].max() for one in (with_heading, without)]
+    assert free[1] < 3.0 < free[0]
 
 
 def test_what_is_wrong_is_said_without_titles_too():
@@ -109,9 +115,9 @@ def test_a_style_file_changes_the_look_and_only_inside(cam, tmp_path):
     file.write_text("axes.grid: False\nsavefig.dpi: 100\n")
     form = form_of(style=str(file))
     loop = {"loop": api.figures(cam)["loop"]}
-    ours, theirs = dict(PLAIN.files(loop)), dict(form.files(loop))
+    ours, theirs = dict(DEFAULT_FORM.files(loop)), dict(form.files(loop))
     assert ours != theirs
-    assert dict(PLAIN.files(loop)) == ours
+    assert dict(DEFAULT_FORM.files(loop)) == ours
 
 
 @pytest.mark.parametrize(
@@ -158,7 +164,7 @@ def test_boxes_that_would_be_too_narrow_beside_each_other_stand_below_each_other
     assert style.size_mm(narrow)[1] <= 230
     lows = [box[1] for box in found]
     assert lows == sorted(lows, reverse=True)
-    assert all(upper[1] - (lower[1] + lower[3]) > 14 for upper, lower in itertools.pairwise(found))
+    assert all(upper[1] > lower[3] for upper, lower in itertools.pairwise(tight(narrow)))
     assert all(label.get_visible() for ax in narrow.axes for label in ax.get_yticklabels())
     wide = form_of(width="140 mm").draw(side_by_side)
     assert len({box[1] for box in boxes(wide)}) == 1
@@ -176,14 +182,20 @@ def test_the_unit_of_a_long_axis_name_goes_to_a_line_of_its_own():
 
 def test_panels_side_by_side_below_a_wide_diagram_stand_below_each_other_in_a_column():
     row = [(17.0 + 47.25 * k, 12.0, 43.5, 30.0) for k in range(3)]
-    found = FigureLayout((160.0, 100.0), [*row, (17.0, 62.0, 138.0, 30.0)]).narrowed(84.0, False, True)
-    assert found.stacked
-    lows, highs = ([box[1] + share * box[3] for box in found.boxes] for share in (0, 1))
-    order = sorted(range(4), key=lambda at: -lows[at])
-    assert order == [3, 0, 1, 2]
-    assert all(lows[above] > highs[below] for above, below in itertools.pairwise(order))
-    assert found.boxes[0][2:] == pytest.approx((43.5, 30.0))
-    assert max(left + wide for left, _, wide, _ in found.boxes) <= 84.0
+
+    def drawn():
+        figure = style.new_figure(160.0, 100.0)
+        for box in (*row, (17.0, 62.0, 138.0, 30.0)):
+            style.axes_mm(figure, box)
+        for ax in figure.axes[:3]:
+            to_scale(ax, (0.0, 0.0, 0.435, 0.3))
+        return figure
+
+    extents = tight(form_of(width="84 mm").draw(drawn))
+    order = np.argsort(-extents[:, 1])
+    assert order.tolist() == [3, 0, 1, 2]
+    assert all(extents[above, 1] > extents[below, 3] for above, below in itertools.pairwise(order))
+    assert extents[:, 2].max() <= 84.0
 
 
 def test_a_heading_stays_on_a_narrow_paper():
@@ -232,3 +244,63 @@ def test_notes_and_names_below_axes_stay_on_a_narrow_paper():
         box = text.get_window_extent()
         assert box.x0 >= 0.0
         assert box.x1 <= figure.bbox.width
+
+
+def test_a_plain_figure_has_lines_their_names_and_axes_but_no_bands_notes_or_heading(cam):
+    draw = api.figures(cam)["loop"]
+    full, plain = draw(), form_of(plain=True).draw(draw)
+    assert len(full.axes) == 2
+    (ax,) = plain.axes
+    assert plain.texts == []
+    assert sorted(text.get_text() for text in ax.texts if text.get_text()) == ["load", "unload"]
+    assert [one for one in ax.get_children() if one.get_gid() == "band"] == []
+    assert any(one.get_gid() == "band" for one in full.axes[1].get_children())
+    assert len(ax.lines) == 2
+    springs = form_of(plain=True).draw(api.figures(cam)["springs"])
+    assert len(springs.axes[0].lines) == 1
+
+
+@pytest.mark.parametrize("name", ["contact", "curvature", "mechanism", "undercut"])
+def test_every_plain_figure_can_be_drawn_for_one_column(cam, name):
+    figure = form_of(plain=True, width="84 mm").draw(api.figures(cam)[name])
+    assert figure.texts == []
+    assert (tight(figure)[:, 2] <= 84.0).all()
+
+
+def test_the_colours_of_poses_are_named_in_one_column_too():
+    result = cfmkit.analyze("configs/beam_lan2010.yaml")
+    for width in ("84 mm", "60 mm"):
+        figure = form_of(width=width).draw(api.figures(result)["shapes"])
+        figure.canvas.draw()
+        key = [text for text in figure.axes[0].texts if text.get_text().endswith(" mm")]
+        assert [text.get_text() for text in key] == ["4.5 mm", "9 mm", "13.5 mm", "18 mm"]
+        assert len({text.get_color() for text in key}) == 4
+        written = [text.get_window_extent() for text in [*key, *figure.texts]]
+        assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1 for box in written)
+        assert not any(one.overlaps(other) for k, one in enumerate(written) for other in written[:k])
+
+
+def test_the_curve_of_an_earlier_run_is_drawn_beside_the_new_one(cam, tmp_path):
+    from cfmkit.tables import curve_table, to_csv
+
+    folder = tmp_path / "before"
+    folder.mkdir()
+    earlier = cfmkit.analyze(cfmkit.load("configs/cam.yaml", ["mechanism.springs.stiffness=0.6 N/mm"]))
+    (folder / "curve.csv").write_bytes(to_csv(curve_table(earlier.curves)))
+    figure = form_of(overlay=str(folder)).draw(api.figures(cam)["loop"])
+    drawn = [line for line in figure.axes[1].lines if line.get_gid() == "earlier"]
+    assert len(drawn) == 2
+    np.testing.assert_allclose(drawn[0].get_ydata(), earlier.curve.on("load").effort)
+    assert "earlier: before" in [text.get_text() for text in figure.axes[1].texts]
+    assert [line for line in api.figures(cam)["loop"]().axes[1].lines if line.get_gid() == "earlier"] == []
+
+
+def test_an_overlay_that_is_none_is_refused_in_one_line(cam, tmp_path):
+    with pytest.raises(UsageError, match=re.escape("there is no curve.csv; name the folder of a design or analysis")):
+        form_of(overlay=str(tmp_path))
+    (tmp_path / "curve.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(UsageError, match="is not a curve of cfmkit"):
+        form_of(overlay=str(tmp_path))
+    (tmp_path / "curve.csv").write_text("branch,angle [deg],torque [N*mm],stable\nload,0,0,true\nload,1,2,true\n")
+    with pytest.raises(UsageError, match="a curve of torque, and this one is of force"):
+        form_of(overlay=str(tmp_path)).draw(api.figures(cam)["loop"])

@@ -194,7 +194,7 @@ def test_a_strip_is_moved_until_nine_of_ten_parts_are_good(few):
     moved = design.spec.mechanism.beam
     assert moved.thickness < 0.00095 < spec.mechanism.beam.thickness
     assert design.search["margins_solved"].quantity.value >= 0.85
-    assert all(one.ok for one in cfmkit.check(cfmkit.analyze(design.spec)))
+    assert all(one.ok for one in cfmkit.analyze(design.spec).requirements)
 
 
 def bought(deviation):

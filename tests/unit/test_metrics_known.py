@@ -74,7 +74,7 @@ def test_requirements_take_either_name_with_bounds_of_a_torque():
 def test_a_bound_of_a_force_on_a_torque_is_refused_once_the_curve_is_known():
     spec = with_requirements({"metric": "force_mean", "min": "1 N"})
     with pytest.raises(SpecError, match="is a force"):
-        cfmkit.check(cfmkit.analyze(spec))
+        _ = cfmkit.analyze(spec).requirements
 
 
 def test_a_sweep_over_torques_notes_either_name_in_the_same_bytes():

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit.families import family
+from cfmkit.metrics import check, values_of_family
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.tables import Table
 
@@ -47,11 +49,11 @@ def test_a_batch_is_shown_with_a_row_per_specification_and_its_text_is_short(tmp
     assert "<script>" not in shown
 
 
-def test_a_result_measures_itself_as_evaluate_and_check_do(result):
+def test_a_result_measures_itself_as_evaluate_and_the_metrics_do(result):
     assert {name: one.value for name, one in result.metrics.items()} == {
         name: one.value for name, one in cfmkit.evaluate(result).items()
     }
-    assert result.requirements == cfmkit.check(result)
+    assert result.requirements == check(result.spec.part_requirements, result, values_of_family(family("cam").values))
 
 
 def test_a_result_is_shown_with_metrics_requirements_and_one_figure(result):
@@ -77,7 +79,8 @@ def test_a_study_is_shown_with_its_best_point_requirements_a_figure_and_its_firs
     assert len(repr(study)) < 2000
     shown = study._repr_html_()
     assert shown.count("<svg") == 1
-    assert "points that meet it" in shown
+    assert "met at 12 of 12" in shown
+    assert "best: --set mechanism.roller_radius=8mm" in shown
     assert set(study.figures) <= set(study.table.headers) | {
         header.partition(" [")[0] for header in study.table.headers
     }
@@ -169,3 +172,59 @@ def test_texts_of_drawings_files_and_measured_curves_are_short(tmp_path):
     for one in (cfmkit.drawing(spec), cfmkit.export(spec), *named):
         assert 10 < len(repr(one)) < 2000, type(one)
         assert "array([" not in repr(one)
+
+
+def test_metrics_and_requirements_are_tables_with_a_column_for_each_branch(result):
+    shown = result.metrics._repr_html_()
+    assert "<th>metric</th><th>worst</th><th>load</th><th>unload</th><th>what it is</th>" in shown
+    assert shown.count("<tr>") == 1 + sum("[" not in name for name in result.metrics)
+    assert f"<td>{result.metrics['force_mean[unload]'].value:.6g} N</td>" in shown
+    met = result.requirements._repr_html_()
+    assert met.count("<td>ok</td>") == len(result.requirements)
+    assert "<td>&lt;= 170 mm</td>" in met
+    assert pickle.loads(pickle.dumps(result.requirements)) == result.requirements
+
+
+def test_a_result_is_drawn_on_axes_of_a_figure_of_ones_own(result):
+    from matplotlib import pyplot
+
+    figure, (left, right) = pyplot.subplots(1, 2)
+    try:
+        assert result.plot(left) is left
+        assert result.plot(right, bands=False, names=False, arrows=False) is right
+        assert left.get_xlabel() == "displacement [mm]"
+        assert len(left.texts) > len(right.texts) == 0
+        np.testing.assert_allclose(right.lines[0].get_xdata(), 1e3 * result.curve.on("load").motion)
+        own = result.plot()
+        assert own.figure.get_size_inches() * 25.4 == pytest.approx((160, 100))
+        pyplot.close(own.figure)
+    finally:
+        pyplot.close(figure)
+
+
+def test_what_was_not_solved_cannot_be_drawn():
+    from cfmkit.runs.notebook_result import AnalysisView
+
+    failed = AnalysisView.of(Result(cfmkit.load(CONFIGS / "cam.yaml"), Status.NO_EQUILIBRIUM, "nothing holds it"))
+    with pytest.raises(cfmkit.SolutionError, match="nothing holds it"):
+        failed.plot()
+
+
+def test_suggestions_are_shown_as_the_page_of_the_command():
+    found = cfmkit.suggest(force="10 kN", travel="10 mm", envelope=["20 mm", "20 mm", "1 mm"], material="pla")
+    shown = found._repr_html_()
+    assert all(f"<td>{name}</td>" in shown for name in ("cam", "beam", "vcfm", "slider-crank"))
+    assert 10 < len(repr(found)) < 2000
+    assert "<svg" not in shown
+
+
+@pytest.mark.slow
+def test_proposals_are_shown_with_their_numbers_and_drawn_to_one_scale():
+    """Slow: one proposal is designed and judged."""
+    keys = {"force": "10 N", "travel": "3 mm", "envelope": ["80 mm", "70 mm", "13 mm"], "material": "pla"}
+    found = cfmkit.suggest(**keys, time_budget="60 s")
+    assert found.proposals
+    shown = found._repr_html_()
+    assert shown.count("<svg") == 1
+    assert f"<td>1 {found.proposals[0].family}</td>" in shown
+    assert len(repr(found)) < 2000

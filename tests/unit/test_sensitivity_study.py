@@ -148,9 +148,9 @@ def test_the_engine_gives_the_values_of_a_single_analysis():
     for k, path in enumerate(setup.paths):
         for value, numbers in zip(found.points[k, :, k], found.outputs[k], strict=True):
             result = cfmkit.analyze(setup.study.spec.replace({path: float(value)}))
-            met = [outcome.ok for outcome in cfmkit.check(result)]
+            met = [outcome.ok for outcome in result.requirements]
             assert numbers[-len(met) :].tolist() == [float(one) for one in met]
-            outcomes = [outcome.value for outcome in cfmkit.check(result)]
+            outcomes = [outcome.value for outcome in result.requirements]
             np.testing.assert_allclose(numbers[0], outcomes[0], rtol=1e-9)
 
 

@@ -68,7 +68,7 @@ def test_a_bare_design_block_leads_to_an_analysis_of_what_was_requested(tmp_path
     assert spec.analysis.preloads == pytest.approx((0.0, rise * MM * adjustment / force))
     for model in ("analytic", "exact"):
         found = api.analyze(spec.replace({"analysis.fidelity": model}))
-        outcomes = {outcome.metric: outcome for outcome in api.check(found)}
+        outcomes = {outcome.metric: outcome for outcome in found.requirements}
         assert {"force_ripple", "deviation_from_target", "force_change_max", "safety_factor"} == set(outcomes)
         assert all(outcome.ok for outcome in outcomes.values())
         # the widths that these forces take are those of wide leaves, which no change of the design cures

@@ -11,6 +11,7 @@ from cfmkit.cli.options import (
     Animate,
     Computing,
     Measuring,
+    Overlay,
     WithReport,
     data_record,
     flag,
@@ -43,6 +44,7 @@ class AnalyzeOptions(Computing, Measuring):
 
     report: WithReport = False
     animate: Animate = None
+    overlay: Overlay = None
     data: Annotated[
         str | None,
         option("--data", metavar="FILE.csv", text="Measured curve to overlay; reports the errors of the model."),

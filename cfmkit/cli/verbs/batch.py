@@ -74,6 +74,9 @@ class BatchOptions(Changing, FigureChoice):
         str | None,
         option("--compare-tolerance", metavar="SHARE", text="Relative change that is tolerated; default: 0.0001 %."),
     ] = None
+    accept: Annotated[
+        bool, flag("--accept", text="Make the results the reference: replace those in the folder of --compare.")
+    ] = False
     fail_fast: Annotated[bool, flag("--fail-fast", text="Start no more specs once one has failed.")] = False
     jobs: Jobs = None
     timeout_per_point: Timeout = None
@@ -116,6 +119,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
             summary=options.summary,
             compare=options.compare,
             compare_tolerance=_tolerance(options),
+            accept=options.accept,
             page=options.report,
             form=options.form,
             arguments=terminal.arguments,
@@ -124,10 +128,15 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
         )
     written = Written(found.folder, found.files, run_study_in_folder.now() - start)
     named = tuple(Note("written", file, whole=True) for file in (options.junit, options.summary) if file)
+    if found.accepted:
+        named = (*named, Note("accepted", f"{found.accepted} has these results now", whole=True))
     document = document_of(found.entries, found.exit_code, written, found.compared)
     return replace(
         document,
-        data=dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
+        data=dict(found.summary)
+        | written.data
+        | {"junit": options.junit, "reused": _reused(found.entries)}
+        | ({"accepted": found.accepted} if found.accepted else {}),
         notes=(*document.notes, *named),
         complaints=(
             *_complaints(found, options, terminal),

@@ -45,7 +45,7 @@ class Checked:
 def run(options: CheckOptions, terminal: Terminal) -> Document:
     """Check specs without computing anything: every problem of every file, with its line and column."""
     files = _files(options.specs)
-    found = [_checked(name, options.changes, len(files) > 1) for name in files]
+    found = [_checked(name, options.changes, len(files) > 1, terminal.excerpts) for name in files]
     bad = sum(item.spec is None for item in found)
     message = f"{bad} of {len(found)} files are not valid" if bad else ""
 
@@ -68,13 +68,13 @@ def _files(named: list[str]) -> list[str]:
     return found
 
 
-def _checked(name: str, changes: tuple[str, ...], of_many: bool) -> Checked:
+def _checked(name: str, changes: tuple[str, ...], of_many: bool, excerpts: bool) -> Checked:
     from cfmkit.runs.specfile import bind, read_spec
 
     try:
         return Checked(name, bind(read_spec(name, changes, of_many)), Document())
     except CfmError as error:
-        return Checked(name, None, answer_to(error))
+        return Checked(name, None, answer_to(error, excerpts))
 
 
 def _code(codes: list[ExitCode]) -> ExitCode:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, WithReport, option, seconds
+from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, Overlay, WithReport, option, seconds
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -26,6 +26,7 @@ class DesignOptions(Computing):
 
     report: WithReport = False
     animate: Animate = None
+    overlay: Overlay = None
     jobs: Jobs = None
     fresh: Fresh = False
     time_budget: Annotated[

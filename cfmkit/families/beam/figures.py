@@ -130,7 +130,7 @@ def shapes(result: Result) -> Figure:
         parts.spring(ax, ends[0], ends[1], 0.02 * max(width, height), f"spring-{number}")
     peak = _poses(solution, ax, drawn)
     motion = f"{result.curve.motion_name}:"
-    color_key(figure, (17.0, 12.0 + height * scale + 2.0), [(motion, INK), *_key(solution, list(drawn))])
+    color_key(ax, [(motion, INK), *_key(solution, list(drawn))])
     _supports(solution, ax)
     _contacts(solution, ax, box, list(drawn))
     parts.to_scale(ax, box)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -19,12 +20,11 @@ from cfmkit.specs.units.fields import BareFloat, BareInt
 from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
 from cfmkit.specs.yamlio.path_notation import Path, dotted, typed
-from cfmkit.specs.yamlio.text_decoding import Fault
+from cfmkit.specs.yamlio.text_decoding import LARGEST, Fault
 from cfmkit.specs.yamlio.tree_builder import DEEPEST, Reading, read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path as FilePath
 
 
 SpecType = TypeVar("SpecType", bound=BaseModel)
@@ -40,6 +40,8 @@ class YamlDocument:
     source: str  # the file's name for messages
     folder: FilePath | None = None  # what file names in the specification are relative to
     problems: tuple[Problem, ...] = ()  # every fault found while reading
+    base: YamlDocument | None = None  # what gives the values that this one does not have: see `base_file.with_base`
+    _lines: tuple[str, ...] = field(default=(), repr=False, compare=False)  # of the text
     _reading: Reading = field(default_factory=Reading, repr=False, compare=False)
     _spoilt: tuple[Path, ...] = field(default=(), repr=False, compare=False)
     _options: tuple[tuple[Path, str], ...] = field(default=(), repr=False, compare=False)
@@ -49,9 +51,25 @@ class YamlDocument:
         """Paths that options have set, dotted, in their order."""
         return tuple(".".join(map(str, path)) for path, _ in self._options)
 
+    @property
+    def path(self) -> FilePath:
+        """The file, as far as the document is one of a folder."""
+        return (self.folder or FilePath()) / FilePath(self.source).name
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the tree is not complete, so that what is missing in it means nothing."""
+        return self._reading.broken
+
     def place(self, path: str | Path) -> tuple[int, int]:
-        """Return (line, column) of the value at a path, or of the nearest block above it; (0, 0) in an option."""
-        return self._place(self._path(path), self._reading.values)[:2]
+        """Return (line, column) of the value at a path, or of the nearest block above it; (0, 0) in an option.
+
+        Of a value of the base it is the place where the base is named.
+        """
+        path = self._path(path)
+        if self._option_at(path):
+            return 0, 0
+        return self._own_place(path if self._owner(path) is self else ("base",), at_key=False)
 
     def set(self, option: str) -> YamlDocument:
         """Return the document changed by an option such as ``a.b=1 mm``.
@@ -117,26 +135,50 @@ class YamlDocument:
     def problem(self, path: str | Path, message: str, at_key: bool = False) -> Problem:
         """Return a problem at a path, with its place in the file or the option that set it."""
         path = self._path(path)
-        line, column, option = self._place(path, self._reading.keys if at_key else self._reading.values)
         reported = dotted(path)
-        if option:
+        if option := self._option_at(path):
             return Problem(option, 0, 0, "" if option == f"--set {reported}" else reported, message)
-        return Problem(self.source, line, column, reported, message)
+        owner = self._owner(path)
+        line, column = owner._own_place(path, at_key)
+        return Problem(owner.source, line, column, reported, message, owner._line(line))
 
     def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> YamlDocument:
         new = [Problem(option.label, 0, 0, dotted(path), message) for path, message in faults]
         spoilt = (*self._spoilt, typed(option.path, self.tree))
         return dataclasses.replace(self, problems=(*self.problems, *new), _spoilt=spoilt)
 
-    def _place(self, path: Path, table: dict[Path, tuple[int, int]]) -> tuple[int, int, str]:
-        """Return (line, column, option): the option that set it or made its block, else where the file has it."""
+    def _option_at(self, path: Path) -> str:
+        """Return the option that set a value or made its block; empty if a file has it."""
         for own, label in reversed(self._options):
-            if path[: len(own)] == own or (own[: len(path)] == path and path not in self._reading.values):
-                return 0, 0, label
+            if path[: len(own)] == own or (own[: len(path)] == path and not self._is_written(path)):
+                return label
+        return ""
+
+    def _is_written(self, path: Path) -> bool:
+        return path in self._reading.values or (self.base is not None and self.base._is_written(path))
+
+    def _owner(self, path: Path) -> YamlDocument:
+        """Return the document that a value is from: the base, where this one neither has it nor replaces its block."""
+        if self.base is None or not self.base._is_written(path):
+            return self
+        node = self._reading.tree
+        for part in path:
+            if not isinstance(node, dict):
+                return self
+            if part not in node:
+                return self.base._owner(path)
+            node = node[part]
+        return self
+
+    def _own_place(self, path: Path, at_key: bool) -> tuple[int, int]:
+        table = self._reading.keys if at_key else self._reading.values
         for length in range(len(path), -1, -1):
             if found := table.get(path[:length]) or self._reading.values.get(path[:length]):
-                return *found, ""
-        return 1, 1, ""
+                return found
+        return 1, 1
+
+    def _line(self, number: int) -> str:
+        return self._lines[number - 1] if 0 < number <= len(self._lines) else ""
 
     def _path(self, path: str | Path) -> Path:
         return typed(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
@@ -158,11 +200,28 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
     if not reading.broken and not isinstance(reading.tree, dict):
         reading.broken = True
         reading.faults.append(_no_block(reading))
+    lines = _lines_of(data)
     problems = tuple(
-        Problem(source, fault.line, fault.column, dotted(fault.path), fault.message) for fault in reading.faults
+        Problem(
+            source,
+            fault.line,
+            fault.column,
+            dotted(fault.path),
+            fault.message,
+            lines[fault.line - 1] if 0 < fault.line <= len(lines) else "",
+        )
+        for fault in reading.faults
     )
     spoilt = tuple(fault.path for fault in reading.faults if fault.path and fault.spoils)
-    return YamlDocument(reading.tree, source, folder, problems, reading, spoilt)
+    return YamlDocument(reading.tree, source, folder, problems, None, lines, reading, spoilt)
+
+
+def _lines_of(data: bytes | str) -> tuple[str, ...]:
+    """Return the lines of a text, as YAML counts them; none of what is larger than a specification may be."""
+    if len(data) > LARGEST:
+        return ()
+    text = data.decode("utf-8", "replace") if isinstance(data, bytes) else data
+    return tuple(re.split("\r\n|[\r\n\x85\u2028\u2029]", text.removeprefix("\ufeff")))
 
 
 def _no_block(reading: Reading) -> Fault:
@@ -174,7 +233,11 @@ def _no_block(reading: Reading) -> Fault:
 
 def _sorted(problems: Sequence[Problem]) -> list[Problem]:
     """Return problems in the order of the file, those of options last, and not more than can be read."""
-    ordered = sorted(dict.fromkeys(problems), key=lambda one: (one.line == 0, one.line, one.column))
+    sources = list(dict.fromkeys(one.source for one in problems))
+    ordered = sorted(
+        dict.fromkeys(problems),
+        key=lambda one: (one.line == 0, sources.index(one.source) if one.line else 0, one.line, one.column),
+    )
     if len(ordered) <= MOST_PROBLEMS:
         return ordered
     last = ordered[MOST_PROBLEMS]

@@ -24,7 +24,7 @@ from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
-from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, is_plain, new_figure, styled
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.stock.springs.made_to_measure import loaded_length
 
@@ -194,7 +194,7 @@ def _kind(solution: Solution) -> str:
 
 def _band(ax: Axes, solution: Solution) -> None:
     """Shade the constant band and name it; of a mechanism that snaps through it says nothing."""
-    if np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE:
+    if is_plain() or np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE:
         return
     dimension = motion_scale(solution).dimension
     low, high = (float(to_border(float(end[0]), dimension)) for end in solution.band)

@@ -1,4 +1,4 @@
-"""Pictures of what came of a request: size against ripple, and all proposals to one scale in the envelope."""
+"""The figure of what came of a request: all proposals to one scale in the envelope."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.plots.style import BAND, GREY, INK, LINES, NORMAL, SMALL, axes_mm, new_figure, styled
+from cfmkit.plots.style import BAND, GREY, NORMAL, SMALL, axes_mm, new_figure, styled
 from cfmkit.studies.suggest.proposal_making_and_judging import by_own_model
 
 if TYPE_CHECKING:
@@ -39,54 +39,18 @@ def named(number: int, proposal: Proposal) -> str:
 
 
 @styled
-def pareto(proposals: Sequence[Proposal], request: Request) -> Figure:
-    """Return the area that each proposal needs against its ripple; the larger the bubble, the more it is stressed."""
-    names = [_within(38.0, named(number, one)) for number, one in enumerate(proposals[:MOST], 1)]
-    key = "bubbles: stress over the\nallowable one; the smallest:\nno stress is modelled.\nDashed: what was required"
-    height = max(100.0, 18.0 + LINE * sum(len(text.split("\n")) for text in [*names, key]) + 1.2 * len(names))
-    figure = new_figure(160.0, height)
-    ax = axes_mm(figure, (17.0, 13.0, 100.0, height - 24.0))
-    kinds = list(dict.fromkeys(one.family for one in proposals))
-    areas, ripples = [], []
-    for number, one in enumerate(proposals[:MOST], 1):
-        values = one.numbers
-        area = 1e4 * float(values["across"] or 0.0) * float(values["along"] or 0.0)
-        ripple = 100.0 * float(values["ripple"] or 0.0)
-        factor = values.get("safety_factor")
-        used = 1.0 / factor if factor else 0.0
-        color = LINES[kinds.index(one.family) % len(LINES)]
-        ax.scatter(
-            [area], [ripple], s=20.0 + 200.0 * used, color=color, alpha=0.55, linewidths=0.6, edgecolors=INK,
-            clip_on=False, zorder=3,
-        )  # fmt: skip
-        ax.annotate(str(number), (area, ripple), ha="center", va="center", fontsize=SMALL, zorder=5)
-        areas.append(area)
-        ripples.append(ripple)
-    given = 1e4 * request.envelope[0] * request.envelope[1]
-    ax.axvline(given, color=BAND, linewidth=0.8, dashes=(5, 2))
-    ax.axhline(100.0 * request.ripple, color=BAND, linewidth=0.8, dashes=(5, 2))
-    ax.set_xlim(0.0, 1.08 * max([given, *areas]))
-    ax.set_ylim(0.0, 1.12 * max([100.0 * request.ripple, *ripples]))
-    ax.set_xlabel("size in the plane [cm²]")
-    ax.set_ylabel(f"ripple over the {'travel' if request.kind == 'force' else 'angle'} [%]")
-    figure.text(
-        0.02,
-        1.0 - 3.5 / height,
-        "Size and ripple of the proposals" + _left_out(proposals),
-        fontsize=NORMAL,
-        color=INK,
-    )
-    top = 10.0
-    for text, kind in [*zip(names, (one.family for one in proposals), strict=False), (key, None)]:
-        color = GREY if kind is None else LINES[kinds.index(kind) % len(LINES)]
-        figure.text(0.745, 1.0 - top / height, text, fontsize=SMALL, color=color, va="top")
-        top += LINE * len(text.split("\n")) + 1.2
-    return figure
+def to_one_scale(proposals: Sequence[Proposal], request: Request, links: Sequence[str] = ()) -> Figure:
+    """Return every proposal as it is made, to one scale, in the envelope.
 
-
-@styled
-def to_one_scale(proposals: Sequence[Proposal], request: Request) -> Figure:
-    """Return every proposal as it is made, to one scale, in the envelope."""
+    Parameters
+    ----------
+    proposals : sequence of Proposal
+        The first `MOST` are drawn.
+    request : Request
+        Its envelope is dashed.
+    links : sequence of str
+        Where each drawing leads on a page; none in a picture.
+    """
     drawn = [_drawn(one) for one in proposals[:MOST]]
     sizes = [_envelope_in_drawing(space, request) for _, space in drawn]
     wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))
@@ -106,7 +70,10 @@ def to_one_scale(proposals: Sequence[Proposal], request: Request) -> Figure:
         (moving.draw_as_made or moving.draw)(ax, 0)
         _frame(ax, space, size, (wide, high))
         # from the column's edge on, where a name has the room that it is broken for
-        figure.text(place / 160.0, (below + cell[1] + 0.5) / total, names[number], fontsize=SMALL, va="bottom")
+        name = figure.text(place / 160.0, (below + cell[1] + 0.5) / total, names[number], fontsize=SMALL, va="bottom")
+        if links:
+            name.set_url(links[number])
+            _cover(ax, links[number])
     figure.text(
         0.02,
         1.0 - 5.0 / total,
@@ -115,6 +82,13 @@ def to_one_scale(proposals: Sequence[Proposal], request: Request) -> Figure:
     )
     figure.text(0.02, 1.5 / total, _scale_reported(request), fontsize=SMALL, color=GREY)
     return figure
+
+
+def _cover(ax: Axes, link: str) -> None:
+    """Lay over axes what leads to a link where it is clicked."""
+    from matplotlib.patches import Rectangle
+
+    ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, alpha=0.0, zorder=9, url=link))
 
 
 def _left_out(proposals: Sequence[Proposal]) -> str:
@@ -165,4 +139,4 @@ def _frame(ax: Axes, space: Any, size: tuple[float, float], view: tuple[float, f
     ax.set_axis_off()
 
 
-__all__ = ["named", "pareto", "to_one_scale"]
+__all__ = ["named", "to_one_scale"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import named
+from cfmkit.documents.document import Document
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -39,6 +40,8 @@ class StudyResult:
         What was varied.
     findings : Findings, optional
         What a sensitivity study found, which its pictures are drawn from.
+    document : Document
+        What the command line prints of it.
     """
 
     table: Table
@@ -49,6 +52,7 @@ class StudyResult:
     varied: tuple[str, ...] = ()
     spec: Spec | None = None
     findings: Findings | None = field(default=None, repr=False, compare=False)
+    document: Document = field(default_factory=Document, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Keep the texts of what is inside short."""
@@ -59,23 +63,11 @@ class StudyResult:
         return f"<StudyResult: {self.summary.get('message', '')}; {self.table!r}>"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: how the study ended, its best point, requirements, a figure, first points."""
-        from html import escape
+        """Return what a notebook shows: the document of the study, a figure, and the first points."""
+        from cfmkit.documents.notebook import shown
+        from cfmkit.tables.html import first_rows
 
-        from cfmkit.plots.vector_formats import first_picture
-        from cfmkit.tables.html import first_rows, html_table
-
-        parts = [f"<p>{escape(str(self.summary.get('message', '')))}</p>"]
-        if best := self.summary.get("best"):
-            reported = ", ".join(f"{path} {value}" for path, value in best["values"].items())
-            parts.append(f"<p>{escape(reported)}: {escape(best['sense'])} {escape(best['by'].replace('_', ' '))}</p>")
-            rows = [(name, _reported(one), one["definition"]) for name, one in self.summary["metrics"].items()]
-            parts.append(html_table(("metric of the best point", "value", "what it is"), rows[:MOST_TOLD]))
-        required = [one for one in self.summary.get("requirements", ()) if "of" in one]
-        if required:
-            met = [(f"{one['metric']}{_bounds(one)}", f"{one['met']} of {one['of']}") for one in required]
-            parts.append(html_table(("requirement", "points that meet it"), met))
-        return f"<div>{''.join(parts)}{first_picture(self.figures)}{first_rows(self.table)}</div>"
+        return shown(self.document, self.figures, first_rows(self.table))
 
     @property
     def figures(self) -> Mapping[str, Callable[[], Figure]]:
@@ -117,21 +109,3 @@ class StudyResult:
             if unit is not None:
                 found[header.partition(" [")[0]].attrs["units"] = unit
         return found
-
-
-MOST_TOLD = 8
-"""Metrics of the best point that a notebook shows: more are in `StudyResult.summary`."""
-
-
-def _reported(metric: Mapping[str, Any]) -> str:
-    value, unit = metric["value"], metric["unit"]
-    if not isinstance(value, float | int):
-        return "" if value is None else str(value)
-    return f"{value:.5g}" + (f" {unit}" if unit not in (None, "", "1") else "")
-
-
-def _bounds(one: Mapping[str, Any]) -> str:
-    low, high = (
-        f" {sign} {one[end]}" if one.get(end) is not None else "" for sign, end in ((">=", "min"), ("<=", "max"))
-    )
-    return low + high

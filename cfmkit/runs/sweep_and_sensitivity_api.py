@@ -1,0 +1,264 @@
+"""Sweeps and sensitivity studies as Python asks for them: with blocks of a file, or arrays of NumPy, in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.api import given_arguments, spec_of
+from cfmkit.errors import QuantityError, UsageError
+from cfmkit.runs.study_result import StudyResult
+from cfmkit.specs.own_metrics import names_of
+from cfmkit.specs.units import format_quantity
+from cfmkit.studies.plan import MOST_POINTS
+from cfmkit.studies.serial_and_cluster_executors import serial
+from cfmkit.studies.variable_paths import CannotVary, leaf
+from cfmkit.tables import read_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from typing import Literal
+
+    from cfmkit.api import AnySpec, Metric
+    from cfmkit.specs.spec import Spec
+    from cfmkit.studies.engine import Records, Work
+    from cfmkit.studies.serial_and_cluster_executors import Executor
+
+
+def sweep(
+    spec: AnySpec,
+    jobs: int = 1,
+    *,
+    vary: Mapping[str, Any] | None = None,
+    combine: Literal["grid", "zip", "lhs", "sobol"] | None = None,
+    samples: int | None = None,
+    metrics: Iterable[Metric] | None = None,
+    design: bool | None = None,
+    curves: bool | None = None,
+    seed: int = 0,
+) -> StudyResult:
+    """Return a mechanism in many variants: one row per point, whether it could be solved or not.
+
+    Parameters
+    ----------
+    spec : Spec or path-like
+        What is varied.
+    jobs : int
+        Processes.
+    vary : mapping, optional
+        Path -> ``"start:stop:n"``, a list of texts with units, or a NumPy array in SI units. This and the next ones
+        replace the specification's block `sweep`; without any of them the block counts.
+    combine : {"grid", "zip", "lhs", "sobol"}, optional
+        All combinations, values in step, a Latin hypercube, or a Sobol sequence.
+    samples : int, optional
+        Points of the last two.
+    metrics : iterable of str or callable, optional
+        Columns: names, or functions of a `Result` (see `metric`). Default: all.
+    design : bool, optional
+        Design the mechanism anew at each point.
+    curves : bool, optional
+        Keep the curve of every point.
+    seed : int
+        Random seed.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to vary, too much, or a metric that does not exist.
+    cfmkit.errors.SpecError
+        If a path or value is wrong.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml")
+    >>> vary = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
+    >>> cfmkit.sweep(spec, vary=vary, metrics=["theoretical_force"]).table["theoretical_force"].tolist()
+    [36.232, 72.464]
+    """
+    from cfmkit.documents.sweep_document import document_of
+    from cfmkit.studies.engine import run
+    from cfmkit.studies.sweep_request_and_files import SweepRequest, outputs, prepare, summary_of
+
+    spec = spec_of(spec)
+    if isinstance(vary, Mapping):
+        vary = {path: in_words(values, spec, path) for path, values in vary.items()}
+    block = given_arguments(
+        vary=vary, combine=combine, samples=samples, metrics=names_of(metrics), design=design, curves=curves
+    )
+    if block:
+        spec = spec.replace({"sweep": block})
+    work = prepare(spec, SweepRequest(seed=_seed(seed)))
+    records = run(work, _executor(jobs))
+    summary = summary_of(records)
+    result = _read(outputs(records, summary, spec.sweep is not None and spec.sweep.curves))
+    dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
+    document = document_of(spec, result.summary, dimensions, summary.exit_code())
+    varied = tuple(result.table.headers[: len(work.plan.variables)])
+    return replace(result, varied=varied, spec=spec, document=document)
+
+
+def sensitivity(
+    spec: AnySpec,
+    jobs: int = 1,
+    *,
+    method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    correlated: Sequence[Mapping[str, Any]] | None = None,
+    samples: int | None = None,
+    metrics: Iterable[Metric] | None = None,
+    min_yield: str | float | None = None,
+    costs: Mapping[str, float] | None = None,
+    design: bool | None = None,
+    seed: int | None = None,
+) -> StudyResult:
+    """Return which value matters most, or how many made parts will meet the requirements.
+
+    Parameters
+    ----------
+    spec : Spec or path-like
+        What is varied.
+    jobs : int
+        Processes.
+    method : {"oat", "local", "morris", "sobol", "tolerance", "inverse"}, optional
+        One at a time, gradients, Morris screening, Sobol indices, random parts within tolerances, or the tolerances
+        that keep a yield. This and the next ones replace the values of the specification's block `sensitivity`.
+    parameters : mapping, optional
+        Path -> a range ``["199 mm", "201 mm"]`` or a tolerance ``{"normal": "0.1 mm"}``.
+    correlated : sequence of mapping, optional
+        Parameters that deviate together: ``{"parameters": [...], "correlation": 1.0}``.
+    samples : int, optional
+        Points per parameter, trajectories, base samples or parts.
+    metrics : iterable of str or callable, optional
+        Names, or functions of a `Result` (see `metric`). Default: those of the requirements.
+    min_yield : str or float, optional
+        Share of parts that must meet all requirements.
+    costs : mapping, optional
+        Of the method inverse: path -> what its tolerance costs, over its width.
+    design : bool, optional
+        Design the mechanism anew at each sample.
+    seed : int, optional
+        Random seed.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to vary, too much, or a metric that does not exist.
+    cfmkit.errors.SpecError
+        If a path or value is wrong.
+    cfmkit.errors.SolutionError
+        If the specification itself has no solution.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml")
+    >>> parameters = {"mechanism.springs.stiffness": {"normal": "1 %"}}
+    >>> found = cfmkit.sensitivity(spec, method="tolerance", samples=20, parameters=parameters)
+    >>> found.summary["yield"]["value"]
+    0.8
+    """
+    from cfmkit.documents.sensitivity_document import document_of
+    from cfmkit.studies.parts.uncertain_values import with_options
+    from cfmkit.studies.sensitivity.output import outputs
+    from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
+    from cfmkit.studies.sensitivity.setup import prepare
+
+    spec = spec_of(spec)
+    if isinstance(parameters, Mapping):
+        parameters = {path: in_words(values, spec, path) for path, values in parameters.items()}
+    block = given_arguments(
+        method=method,
+        parameters=parameters,
+        correlated=correlated,
+        samples=samples,
+        metrics=names_of(metrics),
+        min_yield=min_yield,
+        costs=costs,
+        design=design,
+        seed=seed,
+    )
+    if block:
+        spec = spec.replace({"sensitivity": with_options(spec.sensitivity, block)})
+    found = carry_out(prepare(spec), partial(_computed, _executor(jobs)))
+    return replace(_read(outputs(found)), spec=found.setup.study.spec, findings=found, document=document_of(found))
+
+
+def _computed(executor: Executor, work: Work) -> Records:
+    """Return the records of a piece of work."""
+    from cfmkit.studies.engine import run
+
+    return run(work, executor)
+
+
+def in_words(values: Any, spec: Spec, path: str) -> Any:
+    """Return what a file would say for values from NumPy: numbers of a dimension are in SI units, as in results.
+
+    A range is the list of its numbers. What is not from NumPy has no unit where it is a bare number, as in a file.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If an array has more than one dimension, a value is not finite, or a range has more values than a study points.
+    """
+    if isinstance(values, range):
+        if values[MOST_POINTS:]:
+            raise UsageError(f"{path}: a range of more than {MOST_POINTS} values; take fewer")
+        return list(values)
+    if isinstance(values, Mapping):
+        return {key: in_words(value, spec, path) for key, value in values.items()}
+    if isinstance(values, list | tuple) and any(isinstance(value, np.generic | np.ndarray) for value in values):
+        return [in_words(value, spec, path) for value in values]
+    if isinstance(values, np.ndarray):
+        if values.ndim > 1:
+            raise UsageError(f"{path}: an array of {values.ndim} dimensions is not a list of values; flatten it")
+        values = values[()]
+    if isinstance(values, np.ndarray):
+        return [in_words(value, spec, path) for value in values]
+    if not isinstance(values, np.generic):
+        return values
+    dimension = _dimension(spec, path)
+    plain = values.item()
+    if dimension in (None, "ratio") or not isinstance(plain, int | float) or isinstance(plain, bool):
+        return plain
+    try:
+        return format_quantity(plain, dimension)
+    except QuantityError as error:
+        raise UsageError(f"{path}: {error}") from None
+
+
+def _dimension(spec: Spec, path: str) -> str | None:
+    """Return the dimension of a value; None if it has none, or the path is wrong, which others tell better."""
+    try:
+        quantity = leaf(type(spec), path).quantity
+    except CannotVary:
+        return None
+    return quantity.dimensions[0] if quantity else None
+
+
+def _seed(seed: Any) -> int:
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise UsageError(f"seed: {seed!r} is not allowed: must be a whole number >= 0")
+    return seed
+
+
+def _executor(jobs: int) -> Executor:
+    if jobs < 1:
+        raise UsageError(f"jobs: {jobs} is not allowed: must be >= 1")
+    from cfmkit.studies.pool import Pool
+
+    return serial if jobs == 1 else Pool(jobs)
+
+
+def _read(files: Any) -> StudyResult:
+    """Return what the files of a study would say."""
+    import json
+
+    found = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in files}
+    tables = {name.removesuffix(".csv"): read_csv(data) for name, data in found.items() if name.endswith(".csv")}
+    curves, indices, convergence = map(tables.get, ("curves", "indices", "convergence"))
+    return StudyResult(tables["results"], json.loads(found["metrics.json"]), curves, indices, convergence)
