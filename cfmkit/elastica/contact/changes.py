@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.equations import with_closed
 from cfmkit.elastica.contact.terms import gaps, measure
+from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import NodeOnObstacle
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
@@ -22,9 +23,10 @@ from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import hermite
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.problem import NetworkProblem
-    from cfmkit.numerics.continuation.path import Options, PathEvent
+    from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
@@ -57,9 +59,10 @@ class PieceOfPath:
     options: Options
 
     @cached_property
-    def own(self) -> NetworkProblem:
+    def own(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
-        return replace(self.whole, mesh=with_closed(self.whole.mesh, self.closed))
+        mesh = with_closed(self.whole.mesh, self.closed)
+        return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, self)
 
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts."""
@@ -119,10 +122,36 @@ class PieceOfPath:
         )
 
     def roundings(self, values: FloatArray) -> FloatArray:
-        """Return by how much a force or a gap may be negative, (contacts,)."""
+        """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
         closed = np.isin(np.arange(len(values)), list(self.closed))
-        largest = float(np.abs(values[closed]).max(initial=1.0))
-        return np.where(closed, FORCE_ROUNDING * largest, GAP_ROUNDING)
+        largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
+        return np.where(closed.reshape(-1, *(1,) * (values.ndim - 2)), FORCE_ROUNDING * largest, GAP_ROUNDING)
+
+    def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
+        """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
+        whole, kept, n_samples = self.whole, self._kept, FEWEST_SAMPLES + 1
+        x, rate = (self._spread(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
+        drive = np.array([at.drive for at in states])
+        width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
+        moved = np.abs(chord[:, whole.motions]).max(axis=1)
+        slope = np.abs(rate[:, whole.motions]).max(axis=1)
+        dense = SAMPLES_PER_RADIUS * moved * whole.mesh.scales.length <= FEWEST_SAMPLES * self.smallest_radius
+        smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= STEEP * moved
+        s = np.linspace(0.0, 1.0, n_samples)[:, None, None]
+        between = x[:-1] + s * s * (3 - 2 * s) * chord
+        between = between + width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
+        drives = drive[:-1] + s[:, :, 0] * width[:, 0]
+        values = self.values(between.reshape(-1, len(kept)), drives.ravel())
+        values = values.reshape(len(values), n_samples, -1).swapaxes(1, 2)
+        calm = (values[..., 1:] >= -self.roundings(values)[..., None]).all(axis=(0, 2))
+        return calm & dense & smooth
+
+    @cached_property
+    def smallest_radius(self) -> float:
+        """Smallest radius of a pad and the obstacle that it may pass [m]."""
+        items = [contact.item for contact in self.whole.mesh.contacts]
+        radii = [item.outline.smallest_bulge + item.radius for item in items if isinstance(item, NodeOnObstacle)]
+        return min(radii, default=np.inf)
 
     def grows_along(self, at: PathEquilibrium, number: int) -> float:
         """Return how force or gap of a contact changes with the drive at an equilibrium."""
@@ -208,6 +237,30 @@ class PieceOfPath:
 
 
 @dataclass(frozen=True, eq=False)
+class WatchedProblem(NetworkProblem):
+    """The problem of a piece; it knows between which states of a march no contact changes."""
+
+    piece: PieceOfPath | None = None
+
+    def march(self, walk: Walk) -> MarchedSteps:
+        """Return the equilibria on the way to the next requested values, as far as nothing happens."""
+        marched = super().march(walk)
+        if marched.states and self.piece is not None:
+            states = [at for at, _ in marched.states]
+            quiet = self.piece.are_quiet([walk.here, *states]).tolist()
+            self._quiet.update((id(at), at) for at, calm in zip(states, quiet, strict=True) if calm)
+        return marched
+
+    def is_quiet_before(self, at: PathEquilibrium) -> bool:
+        """Return True if no contact changes on the step of a march that ends at a state."""
+        return self._quiet.pop(id(at), None) is not None
+
+    @cached_property
+    def _quiet(self) -> dict[int, PathEquilibrium]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
 class StepBetween:
     """What lies between two points of a piece, by the cubic through them, or the chord where slopes are steep."""
 
@@ -229,10 +282,7 @@ class StepBetween:
     @cached_property
     def shares(self) -> FloatArray:
         """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
-        items = [contact.item for contact in self.part.whole.mesh.contacts]
-        length = self.part.whole.mesh.scales.length
-        radii = [item.outline.smallest_bulge + item.radius for item in items if isinstance(item, NodeOnObstacle)]
-        wanted = SAMPLES_PER_RADIUS * self.moved * length / min(radii, default=np.inf)
+        wanted = SAMPLES_PER_RADIUS * self.moved * self.part.whole.mesh.scales.length / self.part.smallest_radius
         return np.linspace(0.0, 1.0, int(np.clip(np.ceil(wanted), FEWEST_SAMPLES, MOST_SAMPLES)) + 1)
 
     @property

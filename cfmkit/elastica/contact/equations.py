@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.contact.terms import gaps, press
-from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
+from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.poses import poses
 
 if TYPE_CHECKING:
@@ -116,6 +116,33 @@ class ContactEquations(NumpyEquations):
             gradient[term.unknowns] += term.gradient
             hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
         return gradient, hessian
+
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses (k, n) at places (k,) of the way.
+
+        Those without a force are found without contacts, together; it is seen then whether a gap closes.
+        """
+        count, mesh = self.plain.n, self.mesh
+        idle = ~np.asarray(free)[:, count:].any(axis=1)
+        if not idle.any() or any(one.closed for one in mesh.contacts):
+            return super().solve_each(free, way, tolerance, quick)
+        rows, pad = np.flatnonzero(idle), ((0, 0), (0, self.n - count))
+        easy = self.plain.solve_each(free[rows, :count], way[rows], tolerance, quick)
+        z = np.array([self.values(*pair) for pair in zip(np.pad(easy.free, pad), way[rows], strict=True)])
+        judged = [one for one in mesh.contacts if one.closed is None]
+        good = easy.converged & np.all([gaps(mesh, one, z) >= 0 for one in judged], axis=0)
+        left = np.setdiff1d(np.arange(len(free)), rows[good])
+        found = super().solve_each(free[left], way[left], tolerance, quick)
+        whole = SolvedStates(
+            np.ones(len(free), bool), np.zeros((len(free), self.n)), np.zeros((len(free), self.n)),
+            np.zeros(len(free), np.int64), np.zeros(len(free)),
+        )  # fmt: skip
+        padded = easy._replace(free=np.pad(easy.free, pad), rate=np.pad(easy.rate, pad))
+        for total, some, other in zip(whole, padded, found, strict=True):
+            total[rows[good]], total[left] = some[good], other
+        return whole
 
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""

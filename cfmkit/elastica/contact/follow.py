@@ -156,7 +156,8 @@ def _follow_part(
             at, step = None, item.drive
         else:
             at, step = part.grow(item.at), item.at.drive
-            found = None if previous is None else part.find_change(previous, at)
+            quiet = previous is None or part.own.is_quiet_before(item.at)
+            found = None if quiet or previous is None else part.find_change(previous, at)
         if found is not None:
             assert previous is not None
             if isinstance(found, PathStop):
