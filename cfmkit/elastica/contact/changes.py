@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.equations import with_closed
+from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
+from cfmkit.elastica.contact.side_gaps import Stage, carry
 from cfmkit.elastica.contact.terms import gaps, measure
+from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.model.contact import NodeOnObstacle
+from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
@@ -23,9 +26,11 @@ from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import hermite
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.model.contact import Contact
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -43,11 +48,14 @@ NOT_LOCATED = "where {names} {what} was not found near {{place}}"
 class ContactChange(NamedTuple):
     """The begin or end of a contact; unstable directions before and after it."""
 
-    kind: Literal["begins", "ends", "blocks"]
-    number: int  # of the contact
+    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes"]
+    number: int  # of the contact in the arrays of its piece
     at: PathEquilibrium
     before: int
     after: int
+    contact: int = -1  # in `Network.contacts`
+    condition: SideCondition | None = None  # on the side of a beam, that is met
+    piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +70,61 @@ class PieceOfPath:
     def own(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
         mesh = with_closed(self.whole.mesh, self.closed)
-        return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, self)
+        return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, piece=self)
+
+    @cached_property
+    def sides(self) -> SideConditions:
+        """Conditions on the sides of beams."""
+        return SideConditions(self.whole.mesh, self.closed)
+
+    @property
+    def flanks(self) -> tuple[FlankPlace, ...]:
+        """Places at which sides touch."""
+        cuts = self.whole.mesh.elements.cuts
+        return tuple(
+            FlankPlace(one.number, float(cuts[one.element, 1])) for one in self.whole.mesh.contacts if one.slide >= 0
+        )
+
+    def with_flanks(self, flanks: Sequence[FlankPlace], closed: frozenset[int]) -> PieceOfPath:
+        """Return the problem in which sides touch at other places, and nodes as said."""
+        assert self.whole.remesh is not None
+        network = self.whole.mesh.fits.network
+        beams = list(network.beams)
+        order = sorted(flanks, key=lambda one: (beams.index(network.contacts[one.number].beam), one.parameter))  # type: ignore[union-attr]
+        mesh = self.whole.remesh(tuple(order))
+        sides = [k for k, one in enumerate(mesh.contacts) if one.slide >= 0]
+        nodes = [k for k in closed if self.whole.mesh.contacts[k].slide < 0]
+        return PieceOfPath(replace(self.whole, mesh=mesh), frozenset([*nodes, *sides]), self.options)
+
+    def carry(self, at: PathEquilibrium, beyond: PieceOfPath) -> PathEquilibrium:
+        """Return an equilibrium in the unknowns of another piece, but for forces and places of sides."""
+        z, old, new = self.whole.values(at.x, at.drive), self.whole.mesh, beyond.whole.mesh
+        moved = carry(old, z, Stage.of(self.whole, np.array([at.drive])), new)
+        kept = {(one.number, k): one for k, one in self._numbered(old)}
+        for k, one in self._numbered(new):
+            same = kept.get((one.number, k))
+            if same is not None and one.slide >= 0:
+                moved[one.unknown] = z[same.unknown]
+        return at._replace(x=moved[new.free], rate=np.zeros(len(new.free)))
+
+    @staticmethod
+    def _numbered(mesh: Discretisation) -> Iterator[tuple[int, ContactAt]]:
+        """Yield each contact with its place among those of the same item."""
+        seen: dict[int, int] = {}
+        for one in mesh.contacts:
+            seen[one.number] = seen.get(one.number, -1) + 1
+            yield seen[one.number], one
 
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts."""
         return PieceOfPath(self.whole, closed, self.options)
 
     def say(self, number: int) -> str:
-        """Return what a contact is called."""
-        return describe(self.whole, number)
+        """Return what the contact of a row of `values` is called."""
+        count = len(self.whole.mesh.contacts)
+        return describe(
+            self.whole.mesh.contacts[number].item if number < count else self.sides.all[number - count].item
+        )
 
     def say_all(self, number: int) -> str:
         """Return what a contact and those that are closed with it are called, where they block the drive together."""
@@ -110,22 +164,27 @@ class PieceOfPath:
 
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
-        """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n)."""
+        """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n).
+
+        Behind them come the values of the conditions on sides of beams.
+        """
         mesh, way = self.whole.mesh, drives[:, None]
         z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
         z[:, mesh.free] = x
-        return np.array(
-            [
-                z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
-                for number, contact in enumerate(mesh.contacts)
-            ]
-        )
+        found = np.empty((len(mesh.contacts) + len(self.sides.all), len(z)))
+        for number, contact in enumerate(mesh.contacts):
+            found[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
+        found[len(mesh.contacts) :] = self.sides.values(z, Stage.of(self.whole, drives))
+        return found
 
     def roundings(self, values: FloatArray) -> FloatArray:
         """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
         closed = np.isin(np.arange(len(values)), list(self.closed))
         largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
-        return np.where(closed.reshape(-1, *(1,) * (values.ndim - 2)), FORCE_ROUNDING * largest, GAP_ROUNDING)
+        shape = -1, *(1,) * (values.ndim - 2)
+        found = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
+        found[len(self.whole.mesh.contacts) :] = self.sides.roundings.reshape(shape)
+        return found
 
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
@@ -193,13 +252,18 @@ class PieceOfPath:
                 return None
             return self.find_change_at_end(first, self.grow(at), rounding)
         found = [self._locate(step, int(number)) for number in np.flatnonzero(dips.any(axis=1))]
-        missing = next((number for number, change in found if change is None), None)
-        known = [change for _, change in found if change is not None]
+        known = [change for _, change in found if isinstance(change, ContactChange)]
         if not known:
-            assert missing is not None
-            what = "ends" if missing in self.closed else "begins"
-            return PathStop(WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=self.say(missing), what=what))
-        return min(known, key=lambda change: step.share_of(change.at))
+            stops = [change for _, change in found if change is not None]
+            missing = found[0][0]
+            what, names = ("ends" if missing in self.closed else "begins"), self.say(missing)
+            return stops[0] if stops else PathStop(
+                WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=names, what=what))  # fmt: skip
+
+        def share(change: ContactChange) -> float:
+            return step.share_of(change.at if change.piece is None else change.piece.carry(change.at, self))
+
+        return min(known, key=share)
 
     def find_change_at_end(
         self, first: PathEquilibrium, last: PathEquilibrium, rounding: FloatArray
@@ -208,8 +272,13 @@ class PieceOfPath:
         values = self.values(last.x[None], np.array([last.drive]))[:, 0]
         return self.find_change(first, last) if (values < -rounding).any() else None
 
-    def _locate(self, step: StepBetween, number: int) -> tuple[int, ContactChange | None]:
+    def _locate(self, step: StepBetween, number: int) -> tuple[int, ContactChange | PathStop | None]:
         """Return where a contact changes within a step: where its gap and its force are both zero."""
+        from cfmkit.elastica.contact.side_changes import locate_side_change
+
+        if number >= len(self.whole.mesh.contacts):
+            return number, locate_side_change(self, step, number)
+        contact = self.whole.mesh.contacts[number].number
         share = step.crossing(number)
         if share is None:
             return number, None
@@ -225,15 +294,20 @@ class PieceOfPath:
             free[self._slot(number)] = 0.0
             at = step.first._replace(x=free, drive=float(state.way), effort=np.nan, stiffness=np.nan)
             if step.contains(at, guess):
-                return number, ContactChange(kind, number, at, step.first.unstable, step.first.unstable)
+                return number, ContactChange(kind, number, at, step.first.unstable, step.first.unstable, contact)
         at_bracket = step.bisect(number)
         if at_bracket is None:
             return number, None
-        return number, ContactChange(kind, number, at_bracket, step.first.unstable, step.first.unstable)
+        return number, ContactChange(kind, number, at_bracket, step.first.unstable, step.first.unstable, contact)
 
     def _slot(self, number: int) -> int:
         """Return the number of a contact's force among the free unknowns of the whole problem."""
         return int(np.searchsorted(self.whole.mesh.free, self.whole.mesh.contacts[number].unknown))
+
+    def slot_in_own(self, number: int, slide: bool = False) -> int:
+        """Return the number of a contact's force, or place, among the free unknowns of the own problem."""
+        one = self.whole.mesh.contacts[number]
+        return int(np.searchsorted(self.own.mesh.free, one.slide if slide else one.unknown))
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +366,8 @@ class StepBetween:
             return False
         mesh, ends = self.part.whole.mesh, self.part.values(*self.at(np.array([[0.0], [1.0]])))
         arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
-        return bool((ends > FAR * self.moved * (1.0 + arms[:, None])).all())
+        reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
+        return bool((ends > FAR * self.moved * reach[:, None]).all())
 
     @cached_property
     def values(self) -> FloatArray:
@@ -320,7 +395,7 @@ class StepBetween:
     def crossing(self, number: int) -> float | None:
         """Return the first share at which force or gap of a contact vanishes, by straight lines; None if nowhere."""
         values = self.values[number]
-        below = np.flatnonzero(values[1:] < 0)
+        below = np.flatnonzero(values[1:] < -self.part.roundings(self.values)[number])
         if not len(below):
             return None
         behind = int(below[0]) + 1
@@ -355,19 +430,25 @@ class StepBetween:
             return float(part.values(whole.x[None], np.array([whole.drive]))[number, 0])
 
         try:
-            low, high = value(0.0), value(1.0)
-            if low <= 0:
+            known = self.values[number]
+            behind = np.flatnonzero(known[1:] < -part.roundings(self.values)[number])
+            end = int(behind[0]) + 1 if len(behind) else len(known) - 1
+            begin = next((k for k in range(end - 1, -1, -1) if value(float(self.shares[k])) > 0), None)
+            if begin is None:
                 return self.first
-            if high > 0:
+            last = next((k for k in range(end, len(known)) if value(float(self.shares[k])) <= 0), None)
+            if last is None:
                 return None
-            share = float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
+            share = float(brentq(value, self.shares[begin], self.shares[last], xtol=1e-15, rtol=1e-14))
         except ArithmeticError:
             return None
         at = self.solve(share)
         return None if at is None else part.grow(at)
 
 
-def describe(problem: NetworkProblem, number: int) -> str:
-    """Return what a contact is called: a stop by its name, a pad by its node and its obstacle."""
-    item = problem.mesh.contacts[number].item
-    return f"{item.node!r} on {item.name!r}" if isinstance(item, NodeOnObstacle) else f"stop {item.name!r}"
+def describe(item: Contact) -> str:
+    """Return what a contact is called: a stop by its name, a pad by its node, a side by its beam, and the obstacle."""
+    if isinstance(item, Stop):
+        return f"stop {item.name!r}"
+    side = f"node {item.node!r}" if isinstance(item, NodeOnObstacle) else f"beam {item.beam!r}"
+    return f"{item.node!r} on {item.name!r}" if isinstance(item, NodeOnObstacle) else f"{side} on {item.name!r}"

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 def without_contacts(mesh: Discretisation) -> Discretisation:
     """Return the arrays of a network in which every contact is open: forces of contacts are held at zero."""
-    return replace(mesh, contacts=(), free=mesh.free[mesh.free < _first_contact(mesh)])
+    if not mesh.contacts:
+        return mesh
+    return replace(mesh, contacts=(), moving=None, free=mesh.free[mesh.free < _first_contact(mesh)])
 
 
 def with_closed(mesh: Discretisation, closed: frozenset[int]) -> Discretisation:
@@ -58,6 +60,8 @@ class GapBounds:
 
     def are_open(self, z: FloatArray) -> Any:
         """Return which contacts without a force are certainly open, (contacts,)."""
+        if not self.judged.any():
+            return self.judged
         where = poses(self.mesh.attachments, z, self.places).place
         if self.turning.any():
             where = np.where(self.turning[:, None], np.stack([z[self.turns], 0 * z[self.turns]], axis=1), where)

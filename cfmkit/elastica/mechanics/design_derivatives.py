@@ -49,6 +49,11 @@ class Equilibria:
     z: FloatArray
     drive: FloatArray
 
+    def __post_init__(self) -> None:
+        """Move the elements to the places of contacts, which each point has for itself."""
+        if self.mesh.moving is not None:
+            object.__setattr__(self, "mesh", self.mesh.with_places(self.z))
+
     @cached_property
     def residual(self) -> FloatArray:
         """Gradient of the functional by all unknowns at every point, (p, size): zero at free ones."""
@@ -63,7 +68,7 @@ def partials(mesh: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
     e, at = mesh.elements, energy.fields(mesh, z, drive)
     load = energy.line_load(mesh, drive)
     last = z[..., e.unknowns[:, -2:]]
-    first = last + load * e.length[:, None]
+    first = last + load * e.length[..., None]
     w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
     bent = bending(e, at.curvature)
     density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2

@@ -69,7 +69,7 @@ class Event:
 class ContactEvent:
     """The begin or end of a contact, or a contact that blocks the drive; unstable directions before and after."""
 
-    kind: Literal["begins", "ends", "blocks"]
+    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes"]
     number: int  # of the contact in `Network.contacts`
     drive: float  # [m, rad or 1]
     before: int
@@ -181,10 +181,14 @@ class EquilibriumPath(ShortRepr):
         return np.broadcast_to(self.at_contact, (len(self),))
 
     def contact_force(self, number: int) -> FloatArray:
-        """Return the force of a contact at every point, (n,) [N], of a stop that limits a rotation the moment [N m]."""
-        mesh, contact = self.mesh, self.mesh.contacts[number]
-        unit = mesh.scales.moment if contact.item.turns else mesh.scales.force
-        return read_only(self.at.z[:, contact.unknown] * unit)
+        """Return the force of a contact at every point, (n,) [N], of a stop that limits a rotation the moment [N m].
+
+        Of the side of a beam it is the sum over all places.
+        """
+        mesh = self.mesh
+        unit = mesh.scales.moment if self.network.contacts[number].turns else mesh.scales.force
+        own = [contact.unknown for contact in mesh.contacts if contact.number == number]
+        return read_only(self.at.z[:, own].sum(axis=1) * unit)
 
     def contact_gap(self, number: int) -> FloatArray:
         """Return the gap of a contact at every point, (n,) [m or rad]; negative by what an elastic one yields."""
@@ -378,7 +382,7 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
         total = total + fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
     line = mesh.elements.line[:, 1]
     if line.any():
-        rest = partials(mesh, np.zeros((1, mesh.size)), np.zeros(1))["line"]
+        rest = partials(mesh, np.zeros_like(at.z), np.zeros(len(at.z)))["line"]
         moved = rest[:, :, 0] - partials(mesh, at.z, at.drive)["line"][:, :, 0]
         total = total + (moved * line).sum(axis=(1, 2)) * scales.moment / scales.drive
     return total + np.zeros(len(at.z))
@@ -404,5 +408,5 @@ def largest_force(at: Equilibria) -> float:
     mesh, e = at.mesh, at.mesh.elements
     own = at.z[:, e.unknowns]
     curvature = own[..., energy.rotation_columns(mesh.degree)] @ basis(mesh.degree).slopes.T
-    moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)
+    moment = np.abs(e.rigidity * e.length[..., None] * curvature).max(initial=0.0)
     return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))

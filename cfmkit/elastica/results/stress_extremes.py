@@ -94,7 +94,7 @@ def extremes_of_designs(
 ) -> FloatArray:
     """Return the highest combinations along all beams of some designs, (b, p, c); see `forces_of_designs`."""
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
-    elements = len(at.mesh.elements.length)
+    elements = len(at.mesh.elements.beam)
     together, parts = max(1, MAX_TOGETHER // (elements * len(signs) * N_GRID)), []
     for k in range(0, len(at.z), together):
         some = slice(k, k + together)

@@ -1,0 +1,159 @@
+"""Pieces of a path, whose sides of beams touch at different places, as states of one network of elements.
+
+The elements of all pieces end where any of them has a contact. Where a contact is open its place is anywhere between
+its neighbours: it moves evenly from where it last was closed to where it is next, so that states may be interpolated.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.contact.side_gaps import Stage, carry
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
+from cfmkit.elastica.mechanics.element_tables import smooth_marks
+from cfmkit.elastica.mechanics.march import equations
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from cfmkit.arrays import FloatArray
+
+FEWEST_APART = 0.02  # of the way between two neighbours, by which an open contact stays away from both
+SAME_POINT = 1e-3  # motion by which a joined state may be corrected
+
+
+class StatesOfPiece(NamedTuple):
+    """States of one piece: all unknowns (n, size) and drives (n,)."""
+
+    mesh: Discretisation
+    z: FloatArray
+    drive: FloatArray
+
+
+class _Slot(NamedTuple):
+    """A contact of the network, and the smooth part of its beam that it is on."""
+
+    number: int
+    part: int
+
+
+def join_pieces(
+    pieces: Sequence[StatesOfPiece], remesh: Callable[[tuple[FlankPlace, ...]], Discretisation]
+) -> tuple[Discretisation, FloatArray]:
+    """Return one network of elements for all pieces, and the states on it, (n, size)."""
+    beams = list(pieces[0].mesh.fits.network.beams)
+    network = pieces[0].mesh.fits.network
+    own = [[_slot(piece.mesh, one) for one in piece.mesh.contacts if one.slide >= 0] for piece in pieces]
+    slots: list[_Slot] = []
+    for beam in beams:
+        common: list[_Slot] = []
+        for sequence in own:
+            mine = [slot for slot in sequence if network.contacts[slot.number].beam == beam]  # type: ignore[union-attr]
+            common = _common(common, mine)
+        slots += common
+    places = _places(pieces, own, slots)
+    if not len(slots):
+        return pieces[0].mesh, np.concatenate([piece.z for piece in pieces])
+    mesh = remesh(tuple(FlankPlace(slot.number, place) for slot, place in zip(slots, places[0].tolist(), strict=True)))
+    states, count = np.zeros((len(places), mesh.size)), 0
+    sides = [one for one in mesh.contacts if one.slide >= 0]
+    for piece, sequence in zip(pieces, own, strict=True):
+        used = _embed(sequence, slots)
+        before = [one for one in piece.mesh.contacts if one.slide >= 0]
+        for z, drive in zip(piece.z, piece.drive.tolist(), strict=True):
+            found = carry(piece.mesh, z, Stage(np.array([drive])), mesh, places[count])
+            for one, slot in zip(before, used, strict=True):
+                found[sides[slot].unknown] = max(float(z[one.unknown]), 0.0)
+            states[count] = found
+            count += 1
+    return mesh, _corrected(mesh, states, np.concatenate([piece.drive for piece in pieces]))
+
+
+def _corrected(mesh: Discretisation, states: FloatArray, drives: FloatArray) -> FloatArray:
+    """Return states as equilibria of the elements that they are on now."""
+    guess = states[:, mesh.free]
+    solved = equations(mesh).solve_each(guess, drives)
+    motions = mesh.free < mesh.n_motions
+    near = solved.converged & (np.abs(solved.free - guess)[:, motions].max(axis=1, initial=0.0) < SAME_POINT)
+    found = states.copy()
+    found[:, mesh.free] = np.where(near[:, None], solved.free, guess)
+    return found
+
+
+def _slot(mesh: Discretisation, one: Any) -> _Slot:
+    name = one.item.beam
+    marks = smooth_marks(mesh.fits.network.beams[name], mesh.fits[name])
+    return _Slot(one.number, int(np.searchsorted(marks, mesh.elements.cuts[one.element, 1])))
+
+
+def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
+    """Return the shortest sequence that has both sequences in it."""
+    best: dict[tuple[int, int], list[_Slot]] = {}
+    for i in range(len(first), -1, -1):
+        for j in range(len(second), -1, -1):
+            if i == len(first) or j == len(second):
+                best[i, j] = first[i:] + second[j:]
+            elif first[i] == second[j]:
+                best[i, j] = [first[i], *best[i + 1, j + 1]]
+            else:
+                ways = [first[i], *best[i + 1, j]], [second[j], *best[i, j + 1]]
+                best[i, j] = min(ways, key=lambda way: (len(way), [slot.part for slot in way]))
+    return best[0, 0]
+
+
+def _embed(sequence: list[_Slot], slots: list[_Slot]) -> list[int]:
+    """Return which slots a sequence of contacts has."""
+    found, at = list[int](), 0
+    for slot in sequence:
+        at = slots.index(slot, at)
+        found.append(at)
+        at += 1
+    return found
+
+
+def _places(pieces: Sequence[StatesOfPiece], own: list[list[_Slot]], slots: list[_Slot]) -> FloatArray:
+    """Return the place of every slot in every state, (n, slots)."""
+    total = sum(len(piece.drive) for piece in pieces)
+    known = np.full((total, len(slots)), np.nan)
+    count = 0
+    for piece, sequence in zip(pieces, own, strict=True):
+        rows = slice(count, count + len(piece.drive))
+        for one, slot in zip(
+            (one for one in piece.mesh.contacts if one.slide >= 0), _embed(sequence, slots), strict=True
+        ):
+            known[rows, slot] = piece.z[:, one.slide]
+        count += len(piece.drive)
+    found = known.copy()
+    for slot in range(len(slots)):
+        at = np.flatnonzero(np.isfinite(known[:, slot]))
+        found[:, slot] = np.interp(np.arange(total), at, known[at, slot])
+    network, fits = pieces[0].mesh.fits.network, pieces[0].mesh.fits
+    for beam in network.beams:
+        mine = [k for k, slot in enumerate(slots) if network.contacts[slot.number].beam == beam]  # type: ignore[union-attr]
+        if mine:
+            marks = smooth_marks(network.beams[beam], fits[beam])
+            for row in range(total):
+                found[row, mine] = _between(known[row, mine], found[row, mine], [slots[k].part for k in mine], marks)
+    return found
+
+
+def _between(known: FloatArray, wanted: FloatArray, parts: list[int], marks: list[float]) -> FloatArray:
+    """Return places of slots along a beam in ascending order: known ones as they are, others near wanted places."""
+    found, k = wanted.copy(), 0
+    while k < len(known):
+        if np.isfinite(known[k]):
+            k += 1
+            continue
+        end = k
+        while end < len(known) and not np.isfinite(known[end]) and parts[end] == parts[k]:
+            end += 1
+        low, high = marks[parts[k] - 1], marks[parts[k]]
+        low = max([low, *found[:k].tolist()])
+        high = min([high, *(value for value in known[end:].tolist() if np.isfinite(value))])
+        ends = np.concatenate([[low], found[k:end], [high]])
+        if not (np.diff(ends) > FEWEST_APART * (high - low)).all():
+            found[k:end] = low + (high - low) * np.arange(1, end - k + 1) / (end - k + 1)
+        k = end
+    return found

@@ -1,0 +1,327 @@
+"""Places along the sides of beams in many states: how near they are to obstacles, and states on other elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
+from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.section import Taper
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.problem import NetworkProblem
+    from cfmkit.elastica.model.contact import BeamOnObstacle
+
+N_ALONG = 33  # places of an element at which the gap of its side is measured
+NEAR = 1e-3  # share of a mean beam length within which the least gap is found exactly
+N_ROUNDS, LEVEL = 20, 1e-13  # of the search for the place of a least gap, and the slope there
+BESIDE_CONTACT = 1e-7  # mean beam lengths by which a side may lie in an obstacle beside a contact: rounding
+
+
+class SideStates(NamedTuple):
+    """States at k places of m elements in n states, (n, m, k) each unless said otherwise; dimensionless."""
+
+    place: Any  # (n, m, k, 2)
+    turn: Any  # rotation from rest
+    angle: Any  # of the tangent
+    ahead: Any  # arc length to the end of the element
+    parameter: Any
+
+
+class Stage(NamedTuple):
+    """Where on the way n states are: the drive (n,), and the share of what is constant, (n, 1, 1) or 1."""
+
+    drive: FloatArray
+    share: Any = 1.0
+
+    @classmethod
+    def of(cls, problem: NetworkProblem, ways: FloatArray) -> Stage:
+        """Return the stage at places of the way of a problem, (n,)."""
+        return cls(np.zeros(len(ways)), ways[:, None, None]) if problem.ramp else cls(ways)
+
+    def take(self, some: Any) -> Stage:
+        """Return the stage of some of the states."""
+        return Stage(self.drive[some], self.share if np.isscalar(self.share) else self.share[some])
+
+
+def side_states(mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> SideStates:
+    """Return the states at fractions (k,) of elements (m,) in n states (n, size); contacts stand at their places."""
+    moved = mesh.with_places(z)
+    whole, rule, at = moved.elements, basis(mesh.degree), _matrices(mesh.degree, tuple(fractions.tolist()))
+    fields = energy.fields(moved, z, *stage)
+    rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
+    speed = np.broadcast_to(whole.weight, (len(z), *whole.weight.shape[-2:]))[:, elements] / rule.weights
+    angle = np.broadcast_to(whole.angle, (len(z), *whole.angle.shape[-2:]))[:, elements]
+    start = poses(mesh.attachments, z, whole.ends[elements, 0]).place[:, :, None]
+    slope = np.stack([fields.slope_x[:, elements], fields.slope_y[:, elements]], axis=-1) * speed[..., None]
+    turn = rotation @ at.values.T
+    cuts = whole.cuts if whole.moved_cuts is None else whole.moved_cuts
+    cuts = np.broadcast_to(cuts, (len(z), *cuts.shape[-2:]))[:, elements]
+    length = np.broadcast_to(whole.length, (len(z), whole.length.shape[-1]))[:, elements]
+    return SideStates(
+        start + np.einsum("kq,nmqd->nmkd", at.integrals, slope),
+        turn,
+        angle @ at.interpolation.T + turn,
+        length[..., None] - speed @ at.integrals.T,
+        cuts[..., :1] + (cuts[..., 1:] - cuts[..., :1]) * fractions,
+    )
+
+
+class _AtFractions(NamedTuple):
+    values: FloatArray
+    integrals: FloatArray
+    interpolation: FloatArray
+
+
+@lru_cache(maxsize=64)
+def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
+    rule, ends = basis(degree), np.array(fractions)
+    return _AtFractions(
+        shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
+    )
+
+
+class LeastGap(NamedTuple):
+    """The least gap of the side of a beam."""
+
+    gap: float  # mean beam lengths
+    parameter: float
+
+
+@dataclass(frozen=True, eq=False)
+class SideGaps:
+    """Gaps of the side of one beam to one obstacle, away from where it touches already."""
+
+    mesh: Discretisation
+    item: BeamOnObstacle
+    touched: tuple[int, ...]  # elements that end where a node or the side touches this obstacle
+
+    @cached_property
+    def elements(self) -> Any:
+        """Elements of the beam, (m,)."""
+        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == self.item.beam])
+
+    @cached_property
+    def fractions(self) -> FloatArray:
+        """Places of an element at which gaps are measured."""
+        return 0.5 * (1 - np.cos(np.pi * np.arange(N_ALONG) / (N_ALONG - 1)))
+
+    @cached_property
+    def slack(self) -> FloatArray:
+        """By how much each element may lie in the obstacle, (m,)."""
+        return np.where(np.isin(self.elements, self.touched), BESIDE_CONTACT, 0.0)
+
+    def half_thickness(self, parameter: Any, element: int) -> Any:
+        """Return half the thickness at parameters of an element, in mean beam lengths."""
+        mesh, name = self.mesh, self.item.beam
+        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
+        section = mesh.fits.network.beams[name].section
+        along = fitted.arc(np.clip(parameter, 0.0, 1.0)), float(np.real(fitted.arc(inside)))
+        return 0.5 * (np.real(section.thickness_at(*along)) + 0.0 * parameter) / mesh.scales.length
+
+    def _taper(self, parameter: Any, element: int) -> Any:
+        """Return the slope of half the thickness along the unloaded beam."""
+        mesh, name = self.mesh, self.item.beam
+        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
+        if not isinstance(mesh.fits.network.beams[name].section.thickness, Taper):
+            return np.zeros(np.shape(parameter))
+        sides = [self.half_thickness(parameter + step, element) for step in (PLACE_STEP, -PLACE_STEP)]
+        return (sides[0] - sides[1]) / (2 * PLACE_STEP) / (fitted.speed(parameter, inside) / mesh.scales.length)
+
+    def measure(self, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> tuple[Any, Any, SideStates]:
+        """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
+        seen = side_states(self.mesh, z, stage, elements, fractions)
+        found = self.item.outline.distance(seen.place * self.mesh.scales.length)
+        half = np.stack(
+            [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
+        )
+        slope = found.normal[..., 0] * np.cos(seen.angle) + found.normal[..., 1] * np.sin(seen.angle)
+        taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
+        slope = slope - np.stack(taper, axis=1)
+        return found.value / self.mesh.scales.length - half, slope, seen
+
+    def least(self, z: FloatArray, stage: Stage) -> FloatArray:
+        """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
+
+        It is exact where it is below `NEAR`, and above it otherwise.
+        """
+        gap, rows, _ = self._dips(z, stage)
+        found = (gap + self.slack[:, None]).min(axis=(1, 2))
+        for state, row, value in zip(rows.state, rows.row, self._refine(z, stage, rows)[0], strict=True):
+            found[state] = min(found[state], value + self.slack[row])
+        return np.asarray(found)
+
+    def find_least(self, z: FloatArray, stage: Stage) -> LeastGap:
+        """Return the least gap of one state (size,) exactly: where the side is parallel to the obstacle."""
+        gap, rows, seen = self._dips(z[None], stage)
+        slack = self.slack[:, None]
+        row, place = np.unravel_index(int((gap[0] + slack).argmin()), gap[0].shape)
+        best, least = (
+            float((gap[0] + slack).min()),
+            LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place])),
+        )
+        for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
+            if value + self.slack[number] <= best:
+                own = self._measure_at(z[None], stage, int(self.elements[number]), np.array([fraction]))
+                best, least = value + float(self.slack[number]), LeastGap(value, float(own.parameter[0]))
+        return least
+
+    def _dips(self, z: FloatArray, stage: Stage) -> tuple[Any, _Dips, SideStates]:
+        """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
+        gap, slope, seen = self.measure(z, stage, self.elements, self.fractions)
+        step = -np.diff(seen.ahead, axis=-1)
+        low, high = slope[..., :-1] * step, slope[..., 1:] * step
+        dips = (low < 0) & (high > 0)
+        share = np.where(dips, (gap[..., 1:] - high - gap[..., :-1]) / np.where(dips, low - high, 1.0), 0.0)
+        bound = gap[..., :-1] + share * low  # where the tangents at both places meet
+        near = np.nonzero(dips & (bound < NEAR))
+        state, row, place = near
+        return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
+
+    def _refine(self, z: FloatArray, stage: Stage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
+        """Return the least gaps of dips and their places on their elements, where the slope is zero (Illinois)."""
+        a, b = self.fractions[dips.place], self.fractions[dips.place + 1]
+        low, high = dips.low.copy(), dips.high.copy()
+        value, best = np.full(len(a), np.inf), 0.5 * (a + b)
+        for row in np.unique(dips.row).tolist():
+            own = np.flatnonzero(dips.row == row)
+            for _ in range(N_ROUNDS):
+                middle = b[own] - high[own] * (b[own] - a[own]) / (high[own] - low[own])
+                states = dips.state[own]
+                seen = self._measure_at(z[states], stage.take(states), int(self.elements[row]), middle)
+                value[own], best[own] = seen.gap, middle
+                if np.abs(seen.slope).max() < LEVEL:
+                    break
+                below = seen.slope < 0
+                high[own] = np.where(below, 0.5 * high[own], seen.slope)
+                low[own] = np.where(below, seen.slope, 0.5 * low[own])
+                a[own], b[own] = np.where(below, middle, a[own]), np.where(below, b[own], middle)
+        return value, best
+
+    def _measure_at(self, z: FloatArray, stage: Stage, element: int, fraction: FloatArray) -> _Beside:
+        """Return gap, slope and parameter at one place of an element in each of n states."""
+        moved = self.mesh.with_places(z)
+        e, rule, count = moved.elements, basis(self.mesh.degree), len(z)
+        fields = energy.fields(moved, z, *stage)
+        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / rule.weights
+        upto, through = integrals(rule.places, fraction), interpolation(rule.places, fraction)
+        start = poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0]
+        x = start[:, 0] + (fields.slope_x[:, element] * speed * upto).sum(axis=1)
+        y = start[:, 1] + (fields.slope_y[:, element] * speed * upto).sum(axis=1)
+        rotation = z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)]
+        turn = (rotation * shape_functions(self.mesh.degree, fraction)[0]).sum(axis=1)
+        rest = np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element]
+        angle = (rest * through).sum(axis=1) + turn
+        cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
+        cuts = np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element]
+        parameter = cuts[:, 0] + (cuts[:, 1] - cuts[:, 0]) * fraction
+        length = self.mesh.scales.length
+        found = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
+        slope = found.normal[:, 0] * np.cos(angle) + found.normal[:, 1] * np.sin(angle)
+        slope = slope - self._taper(parameter, element)
+        return _Beside(found.value / length - self.half_thickness(parameter, element), slope, parameter)
+
+
+class _Dips(NamedTuple):
+    """Between a place of an element and the next the gap has a least value."""
+
+    state: Any
+    row: Any  # of the element
+    place: Any
+    low: FloatArray  # slopes of the gap at both
+    high: FloatArray
+
+
+class _Beside(NamedTuple):
+    """Gap of a side in n states."""
+
+    gap: FloatArray
+    slope: FloatArray
+    parameter: FloatArray
+
+
+def carry(
+    old: Discretisation, z: FloatArray, stage: Stage, new: Discretisation, places: FloatArray | None = None
+) -> FloatArray:
+    """Return a state (size,) of a network on other elements of the same degree: fields are evaluated anew.
+
+    Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (k,) are those of the
+    contacts of sides of the new elements, if they are not those that these were made for.
+    """
+    found = np.zeros(new.size, z.dtype)
+    for name, place in new.nodes.items():
+        found[new.attachments.unknowns[place]] = z[old.attachments.unknowns[old.nodes[name]]]
+    moved = old.with_places(z).elements
+    cuts = moved.cuts if moved.moved_cuts is None else moved.moved_cuts
+    fresh = new.elements.cuts
+    if places is not None and new.moving is not None:
+        fresh = fresh.copy()
+        fresh[new.moving.elements] = new.moving.fixed + new.moving.shares @ places
+    rule, columns = basis(new.degree), energy.rotation_columns(new.degree)
+    bubbles = np.linalg.pinv(rule.values[:, 2:])
+    for beam in new.fits:
+        before = np.array([k for k, name in enumerate(old.elements.beam) if name == beam])
+        after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
+        for k, side in ((0, 0), (-1, 1)):
+            ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
+            found[new.attachments.unknowns[ends[1]]] = z[old.attachments.unknowns[ends[0]]]
+        if len(before) == len(after) and np.array_equal(cuts[before], fresh[after]):
+            own = new.elements.unknowns[after]
+            found[own[:, 8:]] = z[old.elements.unknowns[before, 8:]]
+            for k in after[:-1].tolist():
+                other = old.attachments.unknowns[old.elements.ends[before[0] + k - after[0], 1]]
+                here = new.attachments.unknowns[new.elements.ends[k, 1]]
+                found[here] = z[other]
+                found[here[:2]] += _origin(old, int(old.elements.ends[before[0] + k - after[0], 1])) - _origin(
+                    new, int(new.elements.ends[k, 1])
+                )
+            continue
+        for k in after.tolist():
+            left, right = fresh[k]
+            at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
+            place, turn, force = _sample(old, z, stage, before, cuts, at)
+            end = int(new.elements.ends[k, 1])
+            if k != after[-1]:
+                x, y, body, _ = new.attachments.unknowns[end]
+                found[[x, y]], found[body] = place[-1] - _origin(new, end), turn[-1]
+            own = new.elements.unknowns[k]
+            rest = turn[:-2] - turn[-2] * rule.values[:, 0] - turn[-1] * rule.values[:, 1]
+            found[own[columns[2:]]] = bubbles @ rest
+            found[own[-2:]] = force[-1]
+    number_of = {one.number: one.unknown for one in old.contacts if one.slide < 0}
+    for one in new.contacts:
+        if one.slide < 0:
+            found[one.unknown] = z[number_of[one.number]]
+        else:
+            found[one.slide] = fresh[one.element, 1]
+    return found
+
+
+def _origin(mesh: Discretisation, place: int) -> FloatArray:
+    return np.asarray(mesh.attachments.origin[place] + mesh.attachments.arm[place])
+
+
+def _sample(
+    mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, cuts: FloatArray, at: FloatArray
+) -> tuple[Any, Any, Any]:
+    """Return place, rotation and section force of a beam at parameters, (m, 2), (m,), (m, 2)."""
+    place, turn, force = np.empty((len(at), 2)), np.empty(len(at)), np.empty((len(at), 2))
+    ends = cuts[elements, 1]
+    home = np.minimum(np.searchsorted(ends, at, side="left"), len(elements) - 1)
+    for k in np.unique(home).tolist():
+        number, own = int(elements[k]), home == k
+        left, right = cuts[number]
+        fractions = np.clip((at[own] - left) / (right - left), 0.0, 1.0)
+        seen = side_states(mesh, z[None], stage, np.array([number]), fractions)
+        place[own], turn[own] = seen.place[0, 0], seen.turn[0, 0]
+        load = energy.line_load(mesh, *stage)[0, number]
+        force[own] = z[mesh.elements.unknowns[number, -2:]] + load * seen.ahead[0, 0][:, None]
+    return place, turn, force
