@@ -177,6 +177,16 @@ class PieceOfPath:
         found[len(mesh.contacts) :] = self.sides.values(z, Stage.of(self.whole, drives))
         return found
 
+    def row_value(self, at: PathEquilibrium, number: int) -> float:
+        """Return one row of `values` at an equilibrium."""
+        mesh, drives = self.whole.mesh, np.array([at.drive])
+        z = self.whole.values(at.x, at.drive)[None]
+        if number >= len(mesh.contacts):
+            condition = self.sides.all[number - len(mesh.contacts)]
+            return float(self.sides.value(condition, z, Stage.of(self.whole, drives))[0])
+        contact = mesh.contacts[number]
+        return float(z[0, contact.unknown] if number in self.closed else gaps(mesh, contact, z)[0])
+
     def roundings(self, values: FloatArray) -> FloatArray:
         """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
         closed = np.isin(np.arange(len(values)), list(self.closed))
@@ -426,8 +436,7 @@ class StepBetween:
             at = self.solve(share)
             if at is None:
                 raise ArithmeticError
-            whole = part.grow(at)
-            return float(part.values(whole.x[None], np.array([whole.drive]))[number, 0])
+            return part.row_value(part.grow(at), number)
 
         try:
             known = self.values[number]

@@ -97,6 +97,8 @@ def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: Si
                 if -BESIDE <= step.share_of(back) <= 1 + BESIDE:
                     return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
                                          condition.number, condition, beyond)  # fmt: skip
+        elif _pads_at(piece, condition, least.parameter):  # it is the node that begins to touch
+            return None
         closer = step.bisect(row)
         if closer is None:
             return None
@@ -113,17 +115,22 @@ def _new_side(piece: PieceOfPath, beyond: PieceOfPath, number: int, parameter: f
 
 def _onto_node(piece: PieceOfPath, condition: SideCondition) -> PieceOfPath | None:
     """Return the piece in which the node at the end of a beam touches instead of its side; None if none may."""
+    pads = _pads_at(piece, condition, 1.0 if condition.last else 0.0)
+    if not pads or condition.mark not in (0.0, 1.0):
+        return None
+    return piece.with_flanks(_without(piece, condition.number), (piece.closed - {condition.number}) | {pads[0]})
+
+
+def _pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[int]:
+    """Return the numbers of the pads on the same obstacle of the node at the end of a beam that is near."""
     mesh = piece.whole.mesh
     beam = mesh.fits.network.beams[condition.item.beam]
-    node = beam.end if condition.last else beam.start
-    pads = [
+    node = beam.end if end > 0.5 else beam.start
+    return [
         k
         for k, one in enumerate(mesh.contacts)
         if isinstance(one.item, NodeOnObstacle) and one.item.name == condition.item.name and one.item.node == node
     ]
-    if not pads or condition.mark not in (0.0, 1.0):
-        return None
-    return piece.with_flanks(_without(piece, condition.number), (piece.closed - {condition.number}) | {pads[0]})
 
 
 def _without(piece: PieceOfPath, *numbers: int) -> list[FlankPlace]:
@@ -173,7 +180,7 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
     drives, values = list[float](), list[float]()
     for _ in range(N_SECANTS):
         whole = piece.grow(at)
-        value = float(piece.values(whole.x[None], np.array([whole.drive]))[row, 0])
+        value = piece.row_value(whole, row)
         drives.append(at.drive)
         values.append(value)
         if abs(value) < EXACT:
@@ -196,9 +203,9 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
 def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
     """Return how a row of `PieceOfPath.values` changes with the drive at an equilibrium."""
     step = RATE_STEP / max(1.0, float(np.abs(at.rate).max(initial=0.0)))
-    x = np.array([at.x + step * at.rate, at.x - step * at.rate])
-    ahead, behind = piece.values(x, np.array([at.drive + step, at.drive - step]))[row]
-    return float((ahead - behind) / (2 * step))
+    sides = [at._replace(x=at.x + way * at.rate, drive=at.drive + way) for way in (step, -step)]
+    ahead, behind = (piece.row_value(side, row) for side in sides)
+    return (ahead - behind) / (2 * step)
 
 
 def enter_side_change(

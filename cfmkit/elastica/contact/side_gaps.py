@@ -7,7 +7,9 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import legendre
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
 from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
@@ -87,6 +89,27 @@ def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
     return _AtFractions(
         shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
     )
+
+
+@lru_cache(maxsize=64)
+def _to_series(degree: int) -> FloatArray:
+    """Return the matrix from values at the Gauss points to Legendre coefficients."""
+    places = basis(degree).places
+    return read_only(np.linalg.inv(legendre.legvander(2 * places - 1, len(places) - 1)))
+
+
+def _rows_at(degree: int, places: FloatArray) -> _AtFractions:
+    """Return the matrices at any places, (n, ...): shapes, integrals from values at Gauss points, interpolation."""
+    series = _to_series(degree)
+    x, count = 2 * places - 1, len(series)
+    polynomials = legendre.legvander(x, count)
+    order = np.arange(1, count)
+    primitives = np.concatenate([x[:, None] + 1, (polynomials[:, 2:] - polynomials[:, :-2]) / (2 * order + 1)], axis=1)
+    shapes = np.empty((len(x), degree + 1))
+    shapes[:, 0], shapes[:, 1] = (1 - x) / 2, (1 + x) / 2
+    order = np.arange(2, degree + 1)
+    shapes[:, 2:] = (polynomials[:, 2 : degree + 1] - polynomials[:, : degree - 1]) / np.sqrt(4 * order - 2)
+    return _AtFractions(shapes, primitives @ series / 2, polynomials[:, :count] @ series)
 
 
 class LeastGap(NamedTuple):
@@ -212,12 +235,12 @@ class SideGaps:
         e, rule, count = moved.elements, basis(self.mesh.degree), len(z)
         fields = energy.fields(moved, z, *stage)
         speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / rule.weights
-        upto, through = integrals(rule.places, fraction), interpolation(rule.places, fraction)
+        values, upto, through = _rows_at(self.mesh.degree, fraction)
         start = poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0]
         x = start[:, 0] + (fields.slope_x[:, element] * speed * upto).sum(axis=1)
         y = start[:, 1] + (fields.slope_y[:, element] * speed * upto).sum(axis=1)
         rotation = z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)]
-        turn = (rotation * shape_functions(self.mesh.degree, fraction)[0]).sum(axis=1)
+        turn = (rotation * values).sum(axis=1)
         rest = np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element]
         angle = (rest * through).sum(axis=1) + turn
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
