@@ -144,11 +144,15 @@ class Discretisation:
         return {name: value for name, value in self.__dict__.items() if name != "known"}
 
     @property
+    def axial(self) -> FloatArray:
+        """1/EA of the elements, (e, q); with contacts at places of several states those of the first."""
+        return np.asarray(self.elements.axial.reshape(-1, *self.elements.axial.shape[-2:])[0])
+
+    @property
     def floor(self) -> FloatArray:
         """1/EA of the elements of beams that do not stretch, (e,): what is left of their floors."""
         stretches = {name: beam.section.axial for name, beam in self.fits.network.beams.items()}
-        axial = self.elements.axial.reshape(-1, *self.elements.axial.shape[-2:])[0, :, 0]  # floors do not move
-        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, axial))
+        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, self.axial[:, 0]))
 
     @property
     def cuts(self) -> dict[str, list[float]]:

@@ -184,4 +184,4 @@ def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
         return False
     elements = np.flatnonzero(mesh.floored)
     force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
-    return bool((force * mesh.elements.axial[elements].max(axis=1) > FLOOR_STRAIN).any())
+    return bool((force * mesh.axial[elements].max(axis=1) > FLOOR_STRAIN).any())

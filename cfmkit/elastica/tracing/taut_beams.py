@@ -47,7 +47,7 @@ def _tautness(path: Path) -> FloatArray:
 
 def drop_locked_points(path: Path) -> Path:
     """Return a path that ends early up to where a beam that does not stretch is pulled straight: there forces soar."""
-    rigid = ~path.mesh.elements.axial.any(axis=1)
+    rigid = ~path.mesh.axial.any(axis=1)
     if path.status is PathStatus.COMPLETE or not len(path) or not rigid.any():
         return path
     locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
