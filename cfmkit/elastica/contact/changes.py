@@ -261,7 +261,16 @@ class PieceOfPath:
             if at is None:
                 return None
             return self.find_change_at_end(first, self.grow(at), rounding)
-        found = [self._locate(step, int(number)) for number in np.flatnonzero(dips.any(axis=1))]
+        rows, others = np.flatnonzero(dips.any(axis=1)).tolist(), list[int]()
+        touching = [row for row in rows if self._is_beside_change(row, rows)]
+        found = [self._locate(step, number) for number in rows if number not in touching]
+        changes = [change for _, change in found if isinstance(change, ContactChange)]
+        # a contact that parts, or moves, brings the side beside it into the obstacle: nothing else touches by that
+        for row in touching:
+            there = [self.row_value(change.at, row) for change in changes if change.piece is None]
+            if not changes or min(there, default=0.0) < -rounding[row]:
+                others.append(row)
+        found += [self._locate(step, number) for number in others]
         known = [change for _, change in found if isinstance(change, ContactChange)]
         if not known:
             stops = [change for _, change in found if change is not None]
@@ -274,6 +283,14 @@ class PieceOfPath:
             return step.share_of(change.at if change.piece is None else change.piece.carry(change.at, self))
 
         return min(known, key=share)
+
+    def _is_beside_change(self, row: int, rows: list[int]) -> bool:
+        """Return True if a row is a side that touches where another of its contacts changes, too."""
+        count = len(self.whole.mesh.contacts)
+        if row < count or self.sides.all[row - count].kind != "touch":
+            return False
+        item = self.sides.all[row - count].item
+        return any(other >= count and other != row and self.sides.all[other - count].item is item for other in rows)
 
     def find_change_at_end(
         self, first: PathEquilibrium, last: PathEquilibrium, rounding: FloatArray

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
 NEAR = 1e-3  # share of a mean beam length within which the least gap is found exactly
-N_ROUNDS, LEVEL = 20, 1e-13  # of the search for the place of a least gap, and the slope there
+N_ROUNDS, LEVEL = 20, 1e-9  # of the search for the place of a least gap, and the slope there: its square is the error
+ROUNDING = 1e-13
 BESIDE_CONTACT = 1e-7  # mean beam lengths by which a side may lie in an obstacle beside a contact: rounding
 
 
@@ -205,7 +206,9 @@ class SideGaps:
         dips = (low < 0) & (high > 0)
         share = np.where(dips, (gap[..., 1:] - high - gap[..., :-1]) / np.where(dips, low - high, 1.0), 0.0)
         bound = gap[..., :-1] + share * low  # where the tangents at both places meet
-        near = np.nonzero(dips & (bound < NEAR))
+        allowed = gap + self.slack[:, None]
+        lower = bound + self.slack[:, None] < np.minimum(allowed.min(axis=(1, 2)), NEAR)[:, None, None] - ROUNDING
+        near = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
         state, row, place = near
         return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
 
