@@ -82,7 +82,9 @@ class PieceOfPath:
         """Places at which sides touch."""
         cuts = self.whole.mesh.elements.cuts
         return tuple(
-            FlankPlace(one.number, float(cuts[one.element, 1])) for one in self.whole.mesh.contacts if one.slide >= 0
+            FlankPlace(one.number, float(cuts[one.element, 1]), one.laid)
+            for one in self.whole.mesh.contacts
+            if one.slide >= 0
         )
 
     def with_flanks(self, flanks: Sequence[FlankPlace], closed: frozenset[int]) -> PieceOfPath:
@@ -133,16 +135,17 @@ class PieceOfPath:
 
     # -- unknowns ------------------------------------------------------------------------------------------------------
     @cached_property
-    def _kept(self) -> Any:
+    def kept(self) -> Any:
+        """Which free unknowns of the whole are those of the own problem."""
         return np.isin(self.whole.mesh.free, self.own.mesh.free)
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium without the forces of open contacts."""
-        return at._replace(x=at.x[self._kept], rate=at.rate[self._kept])
+        return at._replace(x=at.x[self.kept], rate=at.rate[self.kept])
 
     def _spread(self, values: Any) -> Any:
-        found = np.zeros((len(self._kept), *np.shape(values)[1:]))
-        found[self._kept] = values
+        found = np.zeros((len(self.kept), *np.shape(values)[1:]))
+        found[self.kept] = values
         return found
 
     def grow(self, at: PathEquilibrium) -> PathEquilibrium:
@@ -198,7 +201,7 @@ class PieceOfPath:
 
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
-        whole, kept, n_samples = self.whole, self._kept, FEWEST_SAMPLES + 1
+        whole, kept, n_samples = self.whole, self.kept, FEWEST_SAMPLES + 1
         x, rate = (self._spread(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
         drive = np.array([at.drive for at in states])
         width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
@@ -312,9 +315,9 @@ class PieceOfPath:
         guess, drive = step.at(share)
         kind: Literal["begins", "ends"] = "ends" if number in self.closed else "begins"
         both = self.with_closed(self.closed | {number})
-        x = guess[both._kept]
+        x = guess[both.kept]
         border = np.zeros(len(x) + 1)
-        border[int(both._kept[: self._slot(number)].sum())] = 1.0
+        border[int(both.kept[: self._slot(number)].sum())] = 1.0
         state = both.own.equations.solve(x, drive, border, 0.0)
         if state is not None and np.isfinite(state.rate).all():
             free = both._spread(state.free)
@@ -414,8 +417,8 @@ class StepBetween:
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.at(share)
-        at = correct(self.part.own, x[self.part._kept], drive)
-        if at is None or largest_motion(self.part.own, at.x - x[self.part._kept]) > MAX_MISS * self.moved + 1e-9:
+        at = correct(self.part.own, x[self.part.kept], drive)
+        if at is None or largest_motion(self.part.own, at.x - x[self.part.kept]) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
 

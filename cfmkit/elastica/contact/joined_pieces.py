@@ -66,6 +66,7 @@ def join_pieces(
             found = carry(piece.mesh, z, Stage(np.array([drive])), mesh, places[count])
             for one, slot in zip(before, used, strict=True):
                 found[sides[slot].unknown] = max(float(z[one.unknown]), 0.0)
+                found[sides[slot].flag] = one.laid
             states[count] = found
             count += 1
     return mesh, _corrected(mesh, states, np.concatenate([piece.drive for piece in pieces]))

@@ -11,19 +11,30 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
-from cfmkit.elastica.contact.side_conditions import NEW_PLACE
+from cfmkit.elastica.contact.side_conditions import NEW_PLACE, ROUNDINGS
 from cfmkit.elastica.contact.side_gaps import Stage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
+from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import NodeOnObstacle
+from cfmkit.elastica.model.section import Taper
+from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.contact import BeamOnObstacle
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 BESIDE = 0.05  # of a step, by which a located change may lie beside it
 N_SECANTS, EXACT = 12, 1e-13
 RATE_STEP = 1e-6  # motion by which rates of conditions are differentiated
+FROM_ROOT, BESIDE_ROOT = 1e-3, 1e-2  # of a beam from a clamped end on the obstacle: what lies there first; a point
+NO_TENSION = 1e-9  # share of a force along an obstacle that is none
+STRAIGHT = 1e-9  # turn of an unloaded beam that is none [rad]
+LIES = "{names} begins to lie on it along a length at {{place}}: {why}"
 REACHES = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
 PINCHES = "two contacts of beam {beam!r} meet at {{place}}"
 NO_WAY = "no equilibrium was found behind the change of the contact of {names} at {{place}}"
@@ -40,12 +51,18 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
         return None
     if condition.kind == "pinch":
         return PathStop(WhyStopped.LOST, at.drive, PINCHES.format(beam=condition.item.beam))
-    contact = condition.number if condition.kind != "tangent" else _side_number(piece, condition)
-    number = contact if condition.kind == "tangent" else piece.whole.mesh.contacts[condition.number].number
+    number = _side_number(piece, condition)
+    if condition.kind in ("wraps", "pulls"):
+        number = condition.number if condition.kind == "wraps" else number
+        kind_of_lie: Literal["spreads", "closes"] = "spreads" if condition.kind == "wraps" else "closes"
+        return ContactChange(kind_of_lie, condition.number, at, unstable, unstable, number, condition)
     if condition.kind in ("tangent", "spreads"):
         kind: Literal["moves", "spreads"] = "moves" if condition.kind == "tangent" else "spreads"
         return ContactChange(kind, condition.number, at, unstable, unstable, number, condition)
-    if condition.kind == "end":
+    if condition.kind == "end" and condition.mark in (0.0, 1.0) and condition.last in piece.sides.roots(condition.item):
+        beyond = piece.with_flanks(_without(piece, condition.number), piece.closed - {condition.number})
+        begin, wanted = piece.carry(at, beyond), ("wraps", condition.last)
+    elif condition.kind == "end":
         beyond = _onto_node(piece, condition)
         if beyond is None:
             return PathStop(WhyStopped.LOST, at.drive, REACHES.format(
@@ -57,7 +74,7 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     exact = _zero_of(beyond, begin, _find(beyond, condition, wanted))
     if exact is None:
         return None
-    kind_of: Literal["moves", "closes"] = "moves" if condition.kind == "end" else "closes"
+    kind_of: Literal["moves", "closes"] = "moves" if wanted[0] == "tangent" else "closes"
     return ContactChange(kind_of, condition.number, exact, unstable, unstable, number, condition, beyond)
 
 
@@ -83,6 +100,12 @@ def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: Si
     for _ in range(2):
         stage = Stage.of(piece.whole, np.array([guess.drive]))
         least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
+        between = _contact_around(piece, condition, least.parameter)
+        if between is not None:
+            at = step.bisect(row)
+            return None if at is None else ContactChange(
+                "spreads", between, at, step.first.unstable, step.first.unstable, condition.number,
+                condition._replace(kind="lies", number=between))  # fmt: skip
         if 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
             flanks = [*piece.flanks, FlankPlace(condition.number, least.parameter)]
             beyond = piece.with_flanks(flanks, piece.closed)
@@ -134,13 +157,81 @@ def _pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[i
 
 
 def _without(piece: PieceOfPath, *numbers: int) -> list[FlankPlace]:
-    """Return the places at which sides touch but for some contacts."""
+    """Return the places at which sides touch but for some contacts, and what lay on an obstacle beside these."""
     mesh = piece.whole.mesh
     return [
-        FlankPlace(one.number, float(mesh.elements.cuts[one.element, 1]))
+        FlankPlace(one.number, float(mesh.elements.cuts[one.element, 1]), 0 if k + one.laid in numbers else one.laid)
         for k, one in enumerate(mesh.contacts)
         if one.slide >= 0 and k not in numbers
     ]
+
+
+def _relaid(piece: PieceOfPath, number: int, laid: int) -> PieceOfPath:
+    """Return the piece in which the side beside a contact lies on its obstacle, or does not."""
+    mesh = piece.whole.mesh
+    return piece.with_flanks([
+        FlankPlace(one.number, float(mesh.elements.cuts[one.element, 1]), laid if k == number else one.laid)
+        for k, one in enumerate(mesh.contacts)
+        if one.slide >= 0
+    ], piece.closed)  # fmt: skip
+
+
+def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: float) -> int | None:
+    """Return the contact at an end of a free part between two contacts of a side, or one and a clamped end on the obstacle.
+
+    None if the part may touch at a point: a straight beam at a straight wall.
+    """
+    mesh, item = piece.whole.mesh, condition.item
+    sides = [(k, one) for k, one in enumerate(mesh.contacts) if one.slide >= 0 and one.item.beam == item.beam]  # type: ignore[union-attr]
+    before = [k for k, one in sides if mesh.elements.cuts[one.element, 1] < parameter]
+    after = [k for k, one in sides if mesh.elements.cuts[one.element, 1] > parameter]
+    roots = piece.sides.roots(item)
+    if not _may_lie(piece, item, parameter):
+        return None
+    if before and after:
+        pair = before[-1], after[0]
+        return pair[0] if all(mesh.contacts[k].item is item for k in pair) else None
+    if after and not before and False in roots and mesh.contacts[after[0]].item is item:
+        return after[0]
+    if before and not after and True in roots and mesh.contacts[before[-1]].item is item:
+        return before[-1]
+    return None
+
+
+def _may_lie(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> bool:
+    """Return True if a side takes on another curvature where it lies on an obstacle."""
+    return bool(len(item.outline.radius)) or abs(_unloaded_bend(piece, item, parameter)) > STRAIGHT
+
+
+def _unloaded_bend(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> float:
+    """Return the curvature of an unloaded beam by its parameter [rad]."""
+    fitted = piece.whole.mesh.fits[item.beam]
+    sides = [float(np.real(fitted.angle(parameter + step, parameter))) for step in (PLACE_STEP, -PLACE_STEP)]
+    return (sides[0] - sides[1]) / (2 * PLACE_STEP)
+
+
+def _lies(piece: PieceOfPath, item: BeamOnObstacle, place: Any, force: Any, angle: float) -> bool:
+    """Return True if a side that spreads lies on the obstacle; else it touches at points, with a free part between.
+
+    Where nothing pulls along a round obstacle it is tried: with what lies there the tension grows, or is none.
+    """
+    mesh = piece.whole.mesh
+    bulge = float(item.outline.distance(np.asarray(place) * mesh.scales.length).curvature)
+    if bulge:
+        tension = float(np.array([np.cos(angle), np.sin(angle)]) @ force)
+        return bool(np.sign(bulge) * tension > -NO_TENSION * float(np.hypot(*force)))
+    return True
+
+
+def _cannot_lie(piece: PieceOfPath, item: BeamOnObstacle) -> str:
+    """Return why a beam cannot lie on an obstacle along a length; empty if it can."""
+    beam = piece.whole.mesh.fits.network.beams[item.beam]
+    shape, section = beam.shape, beam.section
+    if section.shear:
+        return "with shear deformation that is not modelled: leave it out of the beam"
+    if isinstance(section.thickness, Taper) or not isinstance(shape, Polynomial) or len(shape.coefficients) > 2:
+        return "that is modelled for beams of one thickness and curvature only"
+    return ""
 
 
 def _joined(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath:
@@ -168,7 +259,7 @@ def _find(beyond: PieceOfPath, condition: SideCondition, wanted: tuple[str, bool
     kind, last = wanted
     return len(beyond.whole.mesh.contacts) + next(
         k for k, one in enumerate(beyond.sides.all)
-        if one.kind == kind and one.item is condition.item and (kind != "tangent" or one.last == last)
+        if one.kind == kind and one.item is condition.item and (kind not in ("tangent", "wraps") or one.last == last)
     )  # fmt: skip
 
 
@@ -213,6 +304,12 @@ def enter_side_change(
 ) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
     """Return the piece behind a change of a side, its start, the sense of the drive there, and whether it has turned."""
     condition = change.condition
+    if condition is not None and condition.kind in ("wraps", "spreads", "lies"):
+        why = _cannot_lie(piece, condition.item)
+        curved = condition.kind == "wraps" or _may_lie(piece, condition.item, 0.5)
+        if why and curved:
+            names = f"beam {condition.item.beam!r} on {condition.item.name!r}"
+            return PathStop(WhyStopped.LOST, change.at.drive, LIES.format(names=names, why=why))
     lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
                     if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
     if condition is None:  # a contact of a side ends
@@ -237,10 +334,14 @@ def enter_side_change(
         if condition.kind == "touch":
             grows = beyond.grows_along(whole, change.number)
         else:
-            wanted = ("tangent", condition.last) if condition.kind == "end" else ("spreads", False)
+            wanted = ("spreads", False)
+            if condition.kind == "end":
+                rooted = condition.last in beyond.sides.roots(condition.item)
+                wanted = ("wraps" if rooted else "tangent", condition.last)
             grows = row_rate(beyond, whole, _find(beyond, condition, wanted))
     else:
-        part = _into_beam(piece, change) if condition.kind == "tangent" else _apart(piece, change)
+        ways = {"tangent": _into_beam, "spreads": _apart, "wraps": _from_root}
+        part = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
         if part is None:
             return lost
         beyond, whole, grows = part
@@ -265,23 +366,109 @@ def _into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None:
     return beyond, beyond.grow(at), float(at.rate[slide]) * (-1.0 if condition.last else 1.0)
 
 
-def _apart(piece: PieceOfPath, change: ContactChange) -> Entered | None:
+def _apart(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
     """Return the piece in which a contact has parted into two, and how the way between them grows."""
     mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
-    middle = float(z[mesh.contacts[change.number].slide])
-    both = [FlankPlace(change.contact, middle + side * NEW_PLACE) for side in (-1.0, 1.0)]
+    own = mesh.contacts[change.number]
+    item: Any = own.item
+    middle = float(z[own.slide])
+    x, y, turn, _ = mesh.attachments.unknowns[own.place]
+    angle = float(np.real(mesh.fits[item.beam].angle(middle, middle))) + float(z[turn])
+    force = 0.5 * sum(z[mesh.elements.unknowns[own.element + k, -2:]] for k in (0, 1))
+    place = mesh.attachments.origin[own.place] + z[[x, y]]
+    lies = _may_lie(piece, item, middle) and _lies(piece, item, place, force, angle)
+    lies = lies and not free
+    both = [FlankPlace(change.contact, middle + side * NEW_PLACE, int(lies and side < 0)) for side in (-1.0, 1.0)]
     beyond = piece.with_flanks([*_without(piece, change.number), *both], piece.closed)
     first, last = (_new_side(piece, beyond, change.contact, one.parameter) for one in both)
     begin = _with_force(piece, change.at, beyond, change.number)
-    own = beyond.whole.mesh
+    new = beyond.whole.mesh
     full = beyond.whole.values(begin.x, begin.drive)
-    force = float(z[mesh.contacts[change.number].unknown])
     for number, one in zip((first, last), both, strict=True):
-        full[own.contacts[number].slide], full[own.contacts[number].unknown] = one.parameter, 0.5 * force
-    begin = begin._replace(x=full[own.free])
+        full[new.contacts[number].slide] = one.parameter
+        full[new.contacts[number].unknown] = 0.5 * float(z[own.unknown])
+    if lies:
+        _guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
+    begin = begin._replace(x=full[new.free])
     low, high = (beyond.slot_in_own(number, slide=True) for number in (first, last))
     at = _at_level(beyond, begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
+    if lies and (at is None or not _presses(beyond, at)):
+        return _apart(piece, change, free=True)
     return None if at is None else (beyond, beyond.grow(at), float(at.rate[high] - at.rate[low]))
+
+
+def _guess_laid(mesh: Discretisation, z: FloatArray, element: int, tension: float) -> None:
+    """Put what is known of an element that lies on an obstacle into a state."""
+    own = mesh.elements.unknowns[element]
+    z[own[8:-2]] = 0.0
+    z[own[-2]], z[own[-1]] = tension, 0.0
+
+
+def _from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
+    """Return the piece in which a side has lain down from a clamped end on, or touches beside it, and how that grows."""
+    condition: Any = change.condition
+    mesh, z, item = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive), condition.item
+    own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+    element, end = (own[-1], 1) if condition.last else (own[0], 0)
+    angle = float(np.real(mesh.fits[item.beam].angle(float(end), 0.5))) + float(
+        z[mesh.elements.unknowns[element, 3 + 4 * end]]
+    )
+    force = z[mesh.elements.unknowns[element, -2:]]
+    place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, end])]).place[0]
+    lies = _lies(piece, item, place, force, angle) and not free
+    first = FROM_ROOT if lies else BESIDE_ROOT
+    parameter, laid = (1 - first, 1) if condition.last else (first, -1)
+    beyond = piece.with_flanks(
+        [*piece.flanks, FlankPlace(change.contact, parameter, laid if lies else 0)], piece.closed
+    )
+    number = _new_side(piece, beyond, change.contact, parameter)
+    begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
+    full = beyond.whole.values(begin.x, begin.drive)
+    if lies:
+        at = new.contacts[number].element + (laid > 0)
+        _guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
+    slide = beyond.slot_in_own(number, slide=True)
+    found = _at_level(beyond, begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
+    if lies and (found is None or not _presses(beyond, found)):
+        return _from_root(piece, change, free=True)
+    if found is None:
+        return None
+    return beyond, beyond.grow(found), float(found.rate[slide]) * (-1.0 if condition.last else 1.0)
+
+
+def _presses(piece: PieceOfPath, at: PathEquilibrium) -> bool:
+    """Return True if everything that lies on an obstacle presses on it."""
+    whole, count = piece.grow(at), len(piece.whole.mesh.contacts)
+    rows = [count + k for k, one in enumerate(piece.sides.all) if one.kind == "pulls"]
+    return all(piece.row_value(whole, row) > -ROUNDINGS["pulls"] for row in rows)
+
+
+def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | None:
+    """Return the piece in which a free part lies on an obstacle, or one that lay there is free; the drive goes on."""
+    condition: Any = change.condition
+    mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
+    contact = mesh.contacts[change.number]
+    item: Any = contact.item
+    sides = [k for k, one in enumerate(mesh.contacts) if one.slide >= 0 and one.item.beam == item.beam]  # type: ignore[union-attr]
+    if condition.kind == "lies":
+        laid = -1 if change.number == sides[0] and False in piece.sides.roots(item) else 1
+        laid = laid if laid < 0 or change.number == sides[-1] or change.number + 1 in sides else -1
+    else:
+        laid = contact.laid
+    element = contact.element + (laid > 0)
+    beyond = _relaid(piece, change.number, laid if condition.kind == "lies" else 0)
+    begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
+    full = beyond.whole.values(begin.x, begin.drive)
+    own = mesh.elements.unknowns[element]
+    inside = float(mesh.elements.cuts[element].mean())
+    angle = float(np.real(mesh.fits[item.beam].angle(inside, inside))) + 0.5 * float(z[own[3]] + z[own[7]])
+    along = np.array([np.cos(angle), np.sin(angle)])
+    if condition.kind == "lies":
+        _guess_laid(new, full, element, float(z[own[-2:]] @ along))
+    else:
+        full[new.elements.unknowns[element, -2:]] = z[own[-2]] * along
+    at = beyond.own.solve(full[new.free][beyond.kept], change.at.drive)
+    return None if at is None else (beyond, beyond.grow(at), sense)
 
 
 def _at_level(piece: PieceOfPath, begin: PathEquilibrium, row: dict[int, float], level: float) -> Any:

@@ -3,7 +3,9 @@
 touch: the least gap of a side to an obstacle, away from where it touches. tangent: a pad at the end of a beam touches
 as long as the beam runs away from the obstacle; then the contact moves into the beam. end: the way of a contact to the
 end of its beam. spreads: the curvature of the gap at a contact; then it parts into two, between which the side lies on
-the obstacle. closes: the way between two of these.
+the obstacle. closes: the way between two of these. wraps: the curvature of the gap at a clamped end that lies on
+the obstacle; then the side lies down from there. pulls: the tension of what lies on a round obstacle, which presses it
+on; a side that is pushed along it leaves it.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.beam_fits import beam_end_at
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle
 
 if TYPE_CHECKING:
@@ -28,15 +31,17 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
+ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
 NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins
-ROUNDINGS = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0}
+ROUNDINGS = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
+             "wraps": 1e-9, "pulls": 1e-9}  # fmt: skip
 """By how much each kind of condition may be negative."""
 
 
 class SideCondition(NamedTuple):
     """A condition, and what it is of."""
 
-    kind: Literal["touch", "tangent", "end", "closes", "spreads", "pinch"]
+    kind: Literal["touch", "tangent", "end", "closes", "spreads", "pinch", "wraps", "pulls", "lies"]
     number: int  # touch: in `Network.contacts`; else that of the contact in the arrays, of two the first
     item: BeamOnObstacle
     last: bool = False  # tangent, end: the last end of the beam
@@ -63,6 +68,10 @@ class SideConditions:
                 continue
             yield SideCondition("touch", number, item)
             beam = mesh.fits.network.beams[item.beam]
+            own = [one for _, one in sides if one.item.beam == item.beam]  # type: ignore[union-attr]
+            for last in self.roots(item):
+                if not own or own[-1 if last else 0].item is not item:
+                    yield SideCondition("wraps", number, item, last)
             for k in sorted(self.closed):
                 pad = mesh.contacts[k].item
                 if isinstance(pad, NodeOnObstacle) and pad.name == item.name and not np.isfinite(item.stiffness):
@@ -81,12 +90,39 @@ class SideConditions:
                 yield SideCondition("end", k, item, False, low)
             if not any(high > mesh.elements.cuts[other.element, 1] for other in after):
                 yield SideCondition("end", k, item, True, high)
-            if not any(other.item is item for other in before[-1:] + after[:1]):
+            if one.laid and len(item.outline.radius):
+                yield SideCondition("pulls", k, item)
+            if not one.laid and not any(other.item is item for other in before[-1:] + after[:1]):
                 yield SideCondition("spreads", k, item)
         for (k, one), (_, other) in itertools.pairwise(sides):
             if one.item.beam == other.item.beam:  # type: ignore[union-attr]
                 kind: Literal["closes", "pinch"] = "closes" if one.item is other.item else "pinch"
                 yield SideCondition(kind, k, one.item)  # type: ignore[arg-type]
+
+    def roots(self, item: BeamOnObstacle) -> tuple[bool, ...]:
+        """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
+        if item not in self._roots:
+            self._roots[item] = tuple(last for last in (False, True) if self._lies_at(item, last))
+        return self._roots[item]
+
+    @cached_property
+    def _roots(self) -> dict[BeamOnObstacle, tuple[bool, ...]]:
+        return {}
+
+    def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
+        mesh, network = self.mesh, self.mesh.fits.network
+        beam, fitted = network.beams[item.beam], mesh.fits[item.beam]
+        name, joint = (beam.end, beam.end_joint) if last else (beam.start, beam.start_joint)
+        support = network.nodes[name].support
+        if network.moved(name) or joint != "rigid" or not (support.along and support.across and support.rotation):
+            return False
+        marks = smooth_marks(beam, fitted)
+        inside = 0.5 * (marks[-2] + marks[-1] if last else marks[0] + marks[1])
+        angle = float(np.real(fitted.angle(float(last), inside)))
+        found = item.outline.distance(np.real(np.array(beam_end_at(network, item.beam, int(last)))))
+        half = 0.5 * float(np.real(beam.section.thickness_at(float(last), inside)))
+        slope = float(found.normal[0] * np.cos(angle) + found.normal[1] * np.sin(angle))
+        return abs(float(found.value) - half) < ON_OBSTACLE * mesh.scales.length and abs(slope) < ON_OBSTACLE
 
     def gaps_of(self, item: BeamOnObstacle) -> SideGaps:
         """Return the gaps of a side, with what touches already."""
@@ -101,7 +137,9 @@ class SideConditions:
                     touched += [one.element, one.element + 1]
                 elif isinstance(one.item, NodeOnObstacle) and number in self.closed:
                     touched += [own[0]] * (one.item.node == beam.start) + [own[-1]] * (one.item.node == beam.end)
-            self._gaps[item] = SideGaps(mesh, item, tuple(touched))
+            touched += [own[-1] if last else own[0] for last in self.roots(item)]
+            laid = [one.element + (one.laid > 0) for one in mesh.contacts if one.laid and one.item is item]
+            self._gaps[item] = SideGaps(mesh, item, tuple(touched), tuple(laid))
         return self._gaps[item]
 
     @cached_property
@@ -121,7 +159,11 @@ class SideConditions:
         """Return the values of a condition in n states, (n,)."""
         if one.kind == "touch":
             return self.gaps_of(one.item).least(z, stage)
+        if one.kind == "wraps":
+            return self._curvature_at_root(one, z)
         contact = self.mesh.contacts[one.number]
+        if one.kind == "pulls":
+            return self._pull(contact, z)
         if one.kind == "tangent":
             return self._run_away(contact, one, z)
         if one.kind == "spreads":
@@ -130,6 +172,35 @@ class SideConditions:
             following = self.mesh.contacts[one.number + 1]
             return np.asarray(z[:, following.slide] - z[:, contact.slide] - NEW_PLACE)
         return np.asarray((one.mark - z[:, contact.slide]) * (1.0 if one.last else -1.0) - 0.5 * NEW_PLACE)
+
+    def _pull(self, contact: ContactAt, z: FloatArray) -> FloatArray:
+        """Return the tension along a round obstacle, positive if it presses the side on."""
+        mesh = self.mesh
+        element = contact.element + (contact.laid > 0)
+        x, y, _, _ = mesh.attachments.unknowns[contact.place]
+        place = mesh.attachments.origin[contact.place] + z[:, [x, y]]
+        bulge = contact.item.outline.distance(place * mesh.scales.length).curvature  # type: ignore[union-attr]
+        return np.asarray(np.sign(bulge) * z[:, mesh.elements.unknowns[element, -2]])
+
+    def _curvature_at_root(self, one: SideCondition, z: FloatArray) -> FloatArray:
+        """Return the curvature of the gap at an end that lies on the obstacle."""
+        mesh, item = self.mesh, one.item
+        own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+        element, side = (own[-1], 1) if one.last else (own[0], 0)
+        moved, fitted = mesh.with_places(z).elements, mesh.fits[item.beam]
+        inside, at = float(mesh.elements.cuts[element].mean()), np.array([float(side)])
+        slopes = shape_functions(mesh.degree, at)[1][0]
+        columns = [3, 7, *range(8, mesh.degree + 7)]
+        length = np.reshape(moved.length, (-1, len(moved.beam)))[:, element]
+        bend = z[:, moved.unknowns[element, columns]] @ slopes / length
+        speed = float(np.real(fitted.speed(at, inside) + np.zeros(1))[0]) / mesh.scales.length
+        sides = [float(np.real(fitted.angle(at + step, inside) + np.zeros(1))[0]) for step in (PLACE_STEP, -PLACE_STEP)]
+        bend = bend + (sides[0] - sides[1]) / (2 * PLACE_STEP) / speed
+        place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, side])]).place[:, 0]
+        found = item.outline.distance(place * mesh.scales.length)
+        angle = 0.5 * sum(sides) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
+        rises = found.normal[:, 1] * np.cos(angle) - found.normal[:, 0] * np.sin(angle)
+        return np.asarray(bend * rises + found.curvature * mesh.scales.length * rises**2)
 
     def _run_away(self, pad: ContactAt, one: SideCondition, z: FloatArray) -> FloatArray:
         """Return how much the side of a beam runs away from the obstacle from a pad at its end."""

@@ -127,6 +127,7 @@ class SideGaps:
     mesh: Discretisation
     item: BeamOnObstacle
     touched: tuple[int, ...]  # elements that end where a node or the side touches this obstacle
+    laid: tuple[int, ...] = ()  # elements that lie on it
 
     @cached_property
     def elements(self) -> Any:
@@ -141,7 +142,8 @@ class SideGaps:
     @cached_property
     def slack(self) -> FloatArray:
         """By how much each element may lie in the obstacle, (m,)."""
-        return np.where(np.isin(self.elements, self.touched), BESIDE_CONTACT, 0.0)
+        beside = np.where(np.isin(self.elements, self.touched), BESIDE_CONTACT, 0.0)
+        return np.where(np.isin(self.elements, self.laid), 1.0, beside)
 
     def half_thickness(self, parameter: Any, element: int) -> Any:
         """Return half the thickness at parameters of an element, in mean beam lengths."""
@@ -327,7 +329,7 @@ def carry(
         if one.slide < 0:
             found[one.unknown] = z[number_of[one.number]]
         else:
-            found[one.slide] = fresh[one.element, 1]
+            found[one.slide], found[one.flag] = fresh[one.element, 1], one.laid
     return found
 
 

@@ -23,6 +23,7 @@ from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, moved_tables
 from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.mechanics.poses import poses
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,6 +34,14 @@ if TYPE_CHECKING:
 SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations
 NEUTRAL = 1e-6  # stiffness of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones do
 SMALLEST_FORCE = 1e-12  # of a contact that begins, in the curvature of its gap over its force
+
+
+class LaidPart(NamedTuple):
+    """An element that lies on an obstacle: which, where it does, and the curvature that it takes on."""
+
+    element: int
+    contact: ContactAt  # at one of its ends
+    curvature: float
 
 
 class SideAt(NamedTuple):
@@ -46,6 +55,8 @@ class SideAt(NamedTuple):
     by_place: tuple[float, float]  # of gap and tangency at held x, y and rotation
     unknowns: Any  # (3,)
     curvature: float  # of the gap along the beam
+    rises: float  # normal . across, 1 or -1 where it is tangent
+    bulge: float  # curvature of the obstacle there
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +108,90 @@ class SlidingEquations(NumpyEquations):
         self.plain.refill(self.mesh.moving.elements, tables)
         return True
 
+    def laid_parts(self, z: FloatArray) -> list[LaidPart]:
+        """Return the elements that lie on obstacles; the elements stand at their places."""
+        found = []
+        for contact in self._sides:
+            side = contact.laid if contact.closed is not None else int(np.rint(z[contact.flag]))
+            if not side:
+                continue
+            seen = self.side_at(contact, z)
+            # of the line on which the middle of the beam lies once the gap is closed
+            bulge = seen.bulge / (1 - seen.bulge * seen.gap) if seen.bulge else 0.0
+            found.append(LaidPart(contact.element + (side > 0), contact, -float(np.sign(seen.rises)) * bulge))
+        return found
+
+    def _lay(self, parts: list[LaidPart]) -> None:
+        """Take the energy of elements that lie on obstacles out of the equations without contacts."""
+        e = self.plain.mesh.elements
+        for part in parts:
+            rows = np.array([part.element])
+            names = [name for name in (*_TABLES, "length") if getattr(e, name) is not None]
+            tables = {name: getattr(e, name)[rows] for name in names}
+            for name in ("weight", "ahead", "length"):
+                tables[name] = 0.0 * tables[name]
+            self.plain.refill(rows, tables)
+
+    def _without_tension(self, z: FloatArray, parts: list[LaidPart]) -> FloatArray:
+        """Return unknowns in which nothing pulls along an obstacle."""
+        if not parts:
+            return z
+        found = z.copy()
+        for part in parts:
+            found[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
+        return found
+
+    def _laid_rows(self, part: LaidPart, z: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
+        """Return unknowns, residual and its derivatives (9, 9) of an element that lies on an obstacle.
+
+        They are x, y and rotation of both ends, the tension, and a force that is none; the places are held.
+        """
+        mesh = self.mesh
+        own = mesh.elements.unknowns[part.element]
+        item: Any = part.contact.item
+        fitted, section = mesh.fits[item.beam], mesh.fits.network.beams[item.beam].section
+        cuts = mesh.elements.cuts[part.element] if mesh.moving is None else self._cuts_of(part.element, z)
+        inside = float(mesh.elements.cuts[part.element].mean())
+        scale = mesh.scales
+        speed = float(np.real(fitted.speed(np.array([inside]), inside) + np.zeros(1))[0]) / scale.length
+        rest = np.real(fitted.angle(cuts, inside)) + 0.0 * cuts
+        bend = float(rest[1] - rest[0]) / ((cuts[1] - cuts[0]) * speed)
+        rigidity = float(np.real(section.rigidities(np.array([inside]), inside)[0][0])) / (
+            scale.force * scale.length**2
+        )
+        axial = float(self.mesh.axial[part.element, 0])
+        moment, length = rigidity * (part.curvature - bend), float(cuts[1] - cuts[0]) * speed
+        unknowns = np.array([own[0], own[1], own[3], own[4], own[5], own[7], own[-2], own[-1]])
+        angle = rest + z[own[[3, 7]]]
+        along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        tension, idle = z[own[-2]], z[own[-1]]
+        ends = mesh.elements.ends[part.element]
+        if part.curvature:
+            reach = (angle[1] - angle[0]) / part.curvature
+        else:
+            place = [poses(mesh.attachments, z, [int(end)]).place[0] for end in ends]
+            reach = along[0] @ (place[1] - place[0])
+        residual, slopes = np.zeros(8), np.zeros((8, 8))
+        residual[0:2], residual[3:5] = -tension * along[0], tension * along[1]
+        residual[2], residual[5] = -moment, moment
+        residual[6], residual[7] = reach - length * (1 + axial * tension), idle
+        slopes[0:2, 6], slopes[3:5, 6] = -along[0], along[1]
+        slopes[0:2, 2], slopes[3:5, 5] = -tension * across[0], tension * across[1]
+        if part.curvature:
+            slopes[6, 5], slopes[6, 2] = 1 / part.curvature, -1 / part.curvature
+        else:
+            slopes[6, 3:5], slopes[6, 0:2] = along[0], -along[0]
+            slopes[6, 2] = across[0] @ (place[1] - place[0])
+        slopes[6, 6], slopes[7, 7] = -length * axial, 1.0
+        return unknowns, residual, slopes
+
+    def _cuts_of(self, element: int, z: FloatArray) -> FloatArray:
+        """Return where an element begins and ends."""
+        moving: Any = self.mesh.moving
+        row = int(np.flatnonzero(np.asarray(moving.elements) == element)[0])
+        return np.asarray(moving.fixed[row] + moving.shares[row] @ z[moving.places])
+
     def side_at(self, contact: ContactAt, z: FloatArray) -> SideAt:
         """Return the side of a beam at a contact; the elements stand at their places."""
         mesh, item = self.mesh, contact.item
@@ -118,6 +213,7 @@ class SlidingEquations(NumpyEquations):
         return SideAt(
             float(found.value) / length - radius, float(normal @ along) - taper, np.append(normal, 0.0),
             np.append(bulge @ along, rises), hessian, (-taper * slope[2], rises * slope[1]), [x, y, turn], curvature,
+            rises, float(found.curvature) * length,
         )  # fmt: skip
 
     def _beam_at(self, contact: ContactAt, parameter: float) -> tuple[tuple[float, float, float], float, float, float]:
@@ -135,12 +231,13 @@ class SlidingEquations(NumpyEquations):
 
     def _curvature(self, contact: ContactAt, z: FloatArray, unloaded: float) -> float:
         """Return the curvature of the loaded beam at a contact: the mean of both elements that meet there."""
-        e, total = self.plain.mesh.elements, 0.0
+        e, found = self.plain.mesh.elements, list[float]()
         columns = [3, 7, *range(8, self.mesh.degree + 7)]
         for number, end in ((contact.element, 1.0), (contact.element + 1, 0.0)):
-            slopes = shape_functions(self.mesh.degree, np.array([end]))[1][0]
-            total += float(slopes @ z[e.unknowns[number, columns]]) / float(e.length[number])
-        return unloaded + 0.5 * total
+            if e.length[number]:  # else it lies on the obstacle
+                slopes = shape_functions(self.mesh.degree, np.array([end]))[1][0]
+                found.append(float(slopes @ z[e.unknowns[number, columns]]) / float(e.length[number]))
+        return unloaded + sum(found) / max(len(found), 1)
 
     # -- equations -----------------------------------------------------------------------------------------------------
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
@@ -152,15 +249,21 @@ class SlidingEquations(NumpyEquations):
         places = z[[one.slide for one in sides]]
         if not self.move_to(places):
             return LinearEquations(np.full(n, np.nan), np.eye(n), np.zeros(n))
-        at = plain.linearise(free[:count], way)
+        laid = self.laid_parts(z)
+        self._lay(laid)
+        bare = self._without_tension(z, laid)[mesh.free][:count]
+        at = plain.linearise(bare, way)
         residual, change, tangent = np.zeros(n), np.zeros(n), np.zeros((n, n))
         residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
+        for part in laid:
+            self._lay_rows(part, z, residual, tangent)
         rows: list[tuple[Any, FloatArray, float]] = []  # of the symmetric matrix: unknowns, row, pivot
         self._add_nodes(z, moved, residual, change, tangent, rows)
         for number, contact in enumerate(sides):
-            force, place = slots[contact.unknown], slots[contact.slide]
-            if force < 0:
-                continue
+            force, place, flag = slots[contact.unknown], slots[contact.slide], slots[contact.flag]
+            tangent[flag, flag] = 1.0
+            if contact.closed is not None:
+                residual[flag] = z[contact.flag] - contact.laid
             if not self.is_pressing(contact, z):
                 residual[force], tangent[force, force], tangent[place, place] = -free[force], -1.0, 1.0
                 continue
@@ -173,11 +276,28 @@ class SlidingEquations(NumpyEquations):
             tangent[force, own] -= side.gap_row
             tangent[place, own] += side.tangency_row
             tangent[force, place], tangent[place, place] = -side.by_place[0], side.by_place[1]
-            tangent[:count, place] += self._by_place(free[:count], way, places, number)
+            tangent[:count, place] += self._by_place(bare, way, z, number, laid)
             rows.append((own, -side.gap_row, 0.0))
-            rows.append((own, side.tangency_row, -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)))
+            bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
+            stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
+            rows.append((own, side.tangency_row, stiffness))
         self.move_to(places)
-        return LinearEquations(residual, tangent, change, self._frozen(tangent, rows))
+        return LinearEquations(residual, tangent, change, self._frozen(tangent, rows, laid, z), len(laid))
+
+    def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
+        """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
+        own = self.mesh.elements.unknowns[part.element]
+        inner = self.slots[own[8:]]
+        residual[inner] = z[own[8:]]
+        tangent[inner], tangent[:, inner] = 0.0, 0.0
+        tangent[inner, inner] = 1.0
+        unknowns, rows, slopes = self._laid_rows(part, z)
+        slots = self.slots[unknowns]
+        held = slots < 0
+        residual[slots[6]] = tangent[slots[6], slots[6]] = 0.0
+        residual[slots[7]] = tangent[slots[7], slots[7]] = 0.0
+        residual[slots[~held]] += rows[~held]
+        tangent[np.ix_(slots[~held], slots[~held])] += slopes[np.ix_(~held, ~held)]
 
     def is_pressing(self, contact: ContactAt, z: FloatArray) -> bool:
         """Return True if the side of a beam counts as touching: as it was set, or where it has a force."""
@@ -206,22 +326,44 @@ class SlidingEquations(NumpyEquations):
             change[pushed] += term.hessian[own] @ moved[term.unknowns]
             rows.append((pushed[pushed != slot], term.hessian[-1, :-1][own[:-1]], float(term.hessian[-1, -1])))
 
-    def _by_place(self, free: FloatArray, way: float, places: FloatArray, number: int) -> FloatArray:
+    def _by_place(self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]) -> FloatArray:
         """Return the change of the residuals without contacts with one of the places."""
-        sides = []
+        sides, unknown = [], self._sides[number].slide
         for step in (PLACE_STEP, -PLACE_STEP):
-            beside = places.copy()
-            beside[number] += step
-            if not self.move_to(beside):
+            beside = z.copy()
+            beside[unknown] += step
+            if not self.move_to(beside[[one.slide for one in self._sides]]):
                 return np.full(len(free), np.nan)
-            sides.append(self.plain.linearise(free, way).residual)
+            self._lay(laid)
+            residual = np.array(self.plain.linearise(free, way).residual)
+            for part in laid:
+                unknowns, rows, _ = self._laid_rows(part, beside)
+                slots = self.slots[unknowns]
+                residual[slots[6:]] = 0.0
+                residual[slots[slots >= 0]] += rows[slots >= 0]
+            sides.append(residual)
         return np.asarray((sides[0] - sides[1]) / (2 * PLACE_STEP))
 
-    def _frozen(self, tangent: FloatArray, rows: list[tuple[Any, FloatArray, float]]) -> FloatArray:
-        """Return the symmetric matrix of motions, section forces and conditions with all places held."""
+    def _frozen(
+        self, tangent: FloatArray, rows: list[tuple[Any, FloatArray, float]], laid: list[LaidPart], z: FloatArray
+    ) -> FloatArray:
+        """Return the symmetric matrix of motions, section forces and conditions with all places held.
+
+        Of an element that lies on an obstacle there is its length, a constraint.
+        """
         count = self.plain.n
         whole = np.zeros((count + len(rows), count + len(rows)))
         whole[:count, :count] = tangent[:count, :count]
+        for part in laid:
+            unknowns, _, slopes = self._laid_rows(part, z)
+            slots = self.slots[unknowns]
+            some = slots >= 0
+            whole[np.ix_(slots[some], slots[some])] -= slopes[np.ix_(some, some)]
+            pulled = np.where(np.arange(8) < 6, slopes[:, 6], 0.0)
+            whole[slots[6], slots[some]] += pulled[some]
+            whole[slots[some], slots[6]] += pulled[some]
+            whole[slots[6], slots[6]] += slopes[6, 6]
+            whole[slots[7], slots[7]] = 1.0
         motions = np.flatnonzero(self.plain.mesh.free < self.mesh.n_motions)
         whole[motions, motions] += NEUTRAL
         for number, (own, row, pivot) in enumerate(rows, start=count):
@@ -237,7 +379,7 @@ class SlidingEquations(NumpyEquations):
         factors, pivots, _ = lapack.dsytrf(at.frozen, lower=1)
         single = pivots > 0
         negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
-        forces = int((self.plain.mesh.free >= self.mesh.n_motions).sum())
+        forces = int((self.plain.mesh.free >= self.mesh.n_motions).sum()) - at.laid
         return negative - forces - (len(at.frozen) - self.plain.n)
 
     # -- gradients -----------------------------------------------------------------------------------------------------
@@ -262,7 +404,13 @@ class SlidingEquations(NumpyEquations):
     def evaluate_gradient(self, z: FloatArray, drive: float, share: float = 1.0) -> FloatArray:
         """Return the gradient of one state by all unknowns; that by places is zero."""
         self.move_to(z[[one.slide for one in self._sides]])
-        total = np.array(self.plain.evaluate(z, drive, share)[0])
+        laid = self.laid_parts(z)
+        self._lay(laid)
+        total = np.array(self.plain.evaluate(self._without_tension(z, laid), drive, share)[0])
+        for part in laid:
+            unknowns, rows, _ = self._laid_rows(part, z)
+            total[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
+            np.add.at(total, unknowns, rows)
         for contact in self.mesh.contacts:
             if not z[contact.unknown]:
                 continue

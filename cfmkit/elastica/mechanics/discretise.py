@@ -72,6 +72,7 @@ class BeamElements(NamedTuple):
     rest: Any = None  # (e, q) curvature at rest by u; with curl and hindrance those of wide strips, None without any
     curl: Any = None  # (e, q) th^4/K^2 by u
     hindrance: Any = None  # (e, q) nu^2/(1 - nu^2), 0 unless it is wide
+    laid: Any = None  # (..., e) which lie on an obstacle: their first force is the tension; None: none may
     moved_cuts: Any = None  # (..., e, 2) cuts with contacts at their places; None where no cut moves
 
 
@@ -102,6 +103,8 @@ class ContactAt(NamedTuple):
     closed: bool | None = None  # None: as force and gap say
     slide: int = -1  # unknown that is the parameter of the beam's shape at which it touches; -1: a node touches
     element: int = -1  # that ends there
+    laid: int = 0  # -1 or 1: the element before or behind it lies on the obstacle
+    flag: int = -1  # unknown that says the same of a state
 
 
 class FlankPlace(NamedTuple):
@@ -109,6 +112,7 @@ class FlankPlace(NamedTuple):
 
     number: int  # of the contact in `Network.contacts`
     parameter: float  # of the beam's shape
+    laid: int = 0  # -1 or 1: the side before or behind it, to the next contact or the end, lies on the obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,10 +244,7 @@ class _ArrayBuilder:
         touched: dict[str, list[float]] = {}
         for flank in flanks:
             touched.setdefault(self.network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
-        laws = {
-            name: find_moving_cuts(beams[name], self.fits[name], self.pieces, self.tension.get(name, 0.0), places)
-            for name, places in touched.items()
-        }
+        laws = {name: find_moving_cuts(beams[name], self.fits[name], places) for name, places in touched.items()}
         cuts = given_cuts or {
             name: laws[name].at(touched[name]) if name in laws else self._cuts(name, beam)
             for name, beam in beams.items()
@@ -275,7 +276,8 @@ class _ArrayBuilder:
         acting = [*springs, *loads, *(Attached(one.item, (one.place,)) for one in contacts)]
         free, base, rate = self._constraints(size, elements, attachments, acting)
         if contacts:
-            more = [one.unknown for one in contacts] + [one.slide for one in contacts if one.slide >= 0]
+            sides = [one for one in contacts if one.slide >= 0]
+            more = [one.unknown for one in contacts] + [one.slide for one in sides] + [one.flag for one in sides]
             size += len(more)
             free = np.append(free, more)
             base, rate = (np.append(values, np.zeros(len(more))) for values in (base, rate))
@@ -295,9 +297,13 @@ class _ArrayBuilder:
             own = [number for number, name in enumerate(elements.beam) if name == item.beam]
             element = min(own, key=lambda number: abs(elements.cuts[number, 1] - flank.parameter))
             place = int(elements.ends[element, 1])
+            count = len(flanks)
             found.append(
-                ContactAt(item, place, first + k, flank.number, slide=first + len(flanks) + k, element=element)
-            )
+                ContactAt(
+                    item, place, first + k, flank.number, None, first + count + k, element, flank.laid,
+                    first + 2 * count + k,
+                )
+            )  # fmt: skip
         return tuple(found)
 
     # -- bodies and attachments ------------------------------------------------------------------------------------

@@ -53,22 +53,21 @@ class CutLaw(NamedTuple):
         return (self.fixed + self.shares @ np.array(places)).tolist()  # type: ignore[no-any-return]
 
 
-def find_moving_cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float, places: Sequence[float]) -> CutLaw:
-    """Return the cuts of a beam with contacts: between two marks, or contacts, even pieces that move with their ends.
+def find_moving_cuts(beam: Beam, fitted: Fit, places: Sequence[float]) -> CutLaw:
+    """Return the cuts of a beam with contacts: where it is not smooth, which contacts do not pass, and at contacts.
 
-    Marks are where the beam is not smooth; a contact does not pass one.
+    There are more, which move with these, only where the unloaded beam turns far: what lies on an obstacle is one.
     """
     whole = np.eye(len(places))
     ends = [(mark, np.array([mark]), np.zeros((1, len(places)))) for mark in smooth_marks(beam, fitted)]
     ends += [(place, np.zeros(1), whole[k : k + 1]) for k, place in enumerate(places)]
     ends.sort(key=lambda end: end[0])
-    count = pieces if turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
+    count = 1 if turns_little(beam) else int(np.ceil(fitted.turn / MAX_TURN))
+    even = [k / count for k in range(1, count + 1)]
     fixed, shares = [ends[0][1]], [ends[0][2]]
-    for (left, *low), (right, *high) in itertools.pairwise(ends):
-        even = [k / count for k in range(count)] + [1.0]
-        inner = _refine_ends(even, tautness * (right - left)) if tautness * (right - left) > TAUT else even
+    for (_, *low), (_, *high) in itertools.pairwise(ends):
         for own, (start, end) in zip((fixed, shares), zip(low, high, strict=True), strict=True):
-            own.extend(start + share * (end - start) for share in inner[1:])
+            own.extend(start + share * (end - start) for share in even)
     return CutLaw(np.concatenate(fixed), np.concatenate(shares))
 
 

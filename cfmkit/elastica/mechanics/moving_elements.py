@@ -52,6 +52,12 @@ def move_elements(mesh: Discretisation, z: Any) -> BeamElements:
         whole = np.broadcast_to(first, (*z.shape[:-1], *first.shape)).copy()
         whole[(..., moving.elements, *(slice(None),) * (rank - 1))] = values
         changed[name] = whole
+    laid = np.zeros((*z.shape[:-1], len(e.beam)), bool)
+    for contact in mesh.contacts:
+        if contact.slide >= 0:
+            for side in (-1, 1):
+                laid[..., contact.element + (side > 0)] |= np.rint(z[..., contact.flag]) == side
+    changed["laid"] = laid if laid.any() else None
     return e._replace(**changed)
 
 

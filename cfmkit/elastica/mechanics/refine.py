@@ -29,7 +29,9 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     ahead = forces_end - _first_behind_forces(mesh)
     size = mesh.size + ahead
     contacts = tuple(
-        one._replace(unknown=one.unknown + ahead, slide=one.slide + ahead if one.slide >= 0 else -1)
+        one._replace(unknown=one.unknown + ahead, slide=one.slide + ahead, flag=one.flag + ahead)
+        if one.slide >= 0
+        else one._replace(unknown=one.unknown + ahead)
         for one in mesh.contacts
     )
     moving = mesh.moving

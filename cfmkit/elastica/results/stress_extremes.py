@@ -125,7 +125,7 @@ def _on_elements(net: Network, at: Equilibria, elements: list[int], signs: Float
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
     found = forces_of_elements(net, at, elements, fractions)
-    arcs = found.place.reshape(1, len(elements), len(fractions))
+    arcs = found.place.reshape(-1, len(elements), len(fractions))
     return _tops(sections_of_width(np.repeat(widths, len(fractions)), found), arcs, signs, to_series)
 
 

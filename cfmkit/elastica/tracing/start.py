@@ -76,7 +76,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
                 continue
             if isinstance(item, Remeshed):
                 touching = item.problem.mesh
-                flanks = tuple(FlankPlace(one.number, float(touching.elements.cuts[one.element, 1]))
+                flanks = tuple(FlankPlace(one.number, float(touching.elements.cuts[one.element, 1]), one.laid)
                                for one in touching.contacts if one.slide >= 0)  # fmt: skip
                 continue
             if isinstance(item, PathEvent):
