@@ -144,8 +144,13 @@ def test_a_rotation_that_is_stopped_has_a_moment():
             "obstacles.o", "'fillet', the radius of its corners, is missing",
         ),
         (
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam]}}\n",
-            "obstacles.o", "beams",
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [baem]}}\n",
+            "obstacles.o", "baem",
+        ),
+        (
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam], "
+            "stiffness: 1 N/mm}}\n",
+            "obstacles.o", "rigid",
         ),
         ("  obstacles: {o: {kind: lin, through: [0 mm, -50 mm], direction: 0 deg}}\n", "obstacles.o", "line"),
         (

@@ -121,15 +121,21 @@ def _follow(
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
         # where a contact moves or parts its first place is a little further on: what is requested until there
-        for number in () if walk.done or turned else walk.targets_up_to(at.drive):
-            reached = part.own.solve(part.shrink(at).x, float(walk.targets[number]))
-            if reached is not None and number == walk.number:
-                yield Point(part.grow(reached), number, walk.branch)
-                walk = replace(walk, number=number + 1)
+        while not walk.done and _lies_between(float(walk.targets[walk.number]), place, at.drive):
+            reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
+            if reached is None:
+                break
+            yield Point(part.grow(reached), walk.number, walk.branch)
+            walk = replace(walk, number=walk.number + 1)
         if walk.done:
             yield PathStop(WhyStopped.COMPLETE, place)
             return
         items, previous = _go_on(part, walk, at, sense), at
+
+
+def _lies_between(target: float, first: float, last: float) -> bool:
+    """Return True if a requested value lies between two that differ."""
+    return first != last and min(first, last) <= target <= max(first, last)
 
 
 def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:

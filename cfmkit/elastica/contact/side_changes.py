@@ -177,9 +177,10 @@ def _relaid(piece: PieceOfPath, number: int, laid: int) -> PieceOfPath:
 
 
 def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: float) -> int | None:
-    """Return the contact at an end of a free part between two contacts of a side, or one and a clamped end on the obstacle.
+    """Return the contact at an end of a free part of a side between two contacts.
 
-    None if the part may touch at a point: a straight beam at a straight wall.
+    One of these may be a clamped end on the obstacle. None if the part may touch at a point: a straight beam at a
+    straight wall.
     """
     mesh, item = piece.whole.mesh, condition.item
     sides = [(k, one) for k, one in enumerate(mesh.contacts) if one.slide >= 0 and one.item.beam == item.beam]  # type: ignore[union-attr]
@@ -302,7 +303,7 @@ def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
 def enter_side_change(
     piece: PieceOfPath, change: ContactChange, sense: float
 ) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
-    """Return the piece behind a change of a side, its start, the sense of the drive there, and whether it has turned."""
+    """Return the piece behind a change of a side, its start, the sense of the drive, and whether it has turned."""
     condition = change.condition
     if condition is not None and condition.kind in ("wraps", "spreads", "lies"):
         why = _cannot_lie(piece, condition.item)
@@ -353,7 +354,7 @@ Entered = tuple[PieceOfPath, "PathEquilibrium", float]
 
 
 def _into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None:
-    """Return the piece in which the side of a beam touches instead of the node at its end, and how the way there grows."""
+    """Return the piece in which a side touches instead of the node at its end, and how the way from there grows."""
     condition: Any = change.condition
     place = 1 - NEW_PLACE if condition.last else NEW_PLACE
     beyond = piece.with_flanks([*piece.flanks, FlankPlace(change.contact, place)], piece.closed - {change.number})
@@ -405,7 +406,7 @@ def _guess_laid(mesh: Discretisation, z: FloatArray, element: int, tension: floa
 
 
 def _from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
-    """Return the piece in which a side has lain down from a clamped end on, or touches beside it, and how that grows."""
+    """Return the piece in which a side lies from a clamped end on, or touches beside it, and how that grows."""
     condition: Any = change.condition
     mesh, z, item = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive), condition.item
     own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]

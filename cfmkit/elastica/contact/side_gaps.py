@@ -276,6 +276,11 @@ class _Beside(NamedTuple):
     parameter: FloatArray
 
 
+def least_side_gaps(mesh: Discretisation, item: BeamOnObstacle, z: FloatArray, drive: FloatArray) -> FloatArray:
+    """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
+    return SideGaps(mesh, item, ()).least(z, Stage(drive))
+
+
 def carry(
     old: Discretisation, z: FloatArray, stage: Stage, new: Discretisation, places: FloatArray | None = None
 ) -> FloatArray:

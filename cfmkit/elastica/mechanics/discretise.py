@@ -489,23 +489,3 @@ def _used(size: int, elements: BeamElements, attachments: Attachments, acting: l
             used[unknowns[2]] |= has_arm
             used[unknowns[3]] |= isinstance(item, PointLoad) and (item.follows or item.moment != 0)
     return used
-
-
-def without_floor(mesh: Discretisation, elements: Any) -> Discretisation:
-    """Return the same arrays with elements that do not stretch at all."""
-    axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
-    axial[elements], floored[elements] = 0.0, False
-    stiff = replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)
-    stiff.known.update((key, made.stiffen(stiff)) for key, made in mesh.known.items())
-    return stiff
-
-
-def discretise_alike(
-    template: Discretisation, network: Network, drive: Drive, cuts: Mapping[str, list[float]] | None = None
-) -> Discretisation:
-    """Return the arrays of another network of the same make-up: degree, floors and units of the template's.
-
-    It has the template's `cuts` if they are given: where they differ by complex steps only.
-    """
-    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=cuts)
-    return without_floor(found, np.flatnonzero(found.floored & ~template.floored))

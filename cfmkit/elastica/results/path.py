@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
+from cfmkit.elastica.contact.side_gaps import least_side_gaps
 from cfmkit.elastica.contact.terms import gaps, press
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
@@ -17,6 +18,7 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.results import beam_states, stress_extremes
@@ -190,9 +192,35 @@ class EquilibriumPath(ShortRepr):
         own = [contact.unknown for contact in mesh.contacts if contact.number == number]
         return read_only(self.at.z[:, own].sum(axis=1) * unit)
 
+    def contact_places(self, number: int) -> FloatArray:
+        """Return between which places the side of a beam touches at every point, (n, 2) [share of its length].
+
+        They are the same where it touches at one place, and not a number where it is apart.
+        """
+        mesh, item = self.mesh, self.network.contacts[number]
+        own = [one for one in mesh.contacts if one.number == number]
+        found = np.full((len(self), 2, max(len(own), 1)), np.nan)
+        for k, one in enumerate(own):
+            side = np.rint(self.at.z[:, one.flag])
+            here = np.reshape(mesh.fits[item.beam].arc(self.at.z[:, one.slide]), (-1,))  # type: ignore[union-attr]
+            closed = self.at.z[:, one.unknown] > 0
+            first, last = own[:1] == [one], own[-1:] == [one]
+            found[:, 0, k] = np.where(closed, np.where((side < 0) & first, 0.0, here), np.nan)
+            found[:, 1, k] = np.where(closed, np.where((side > 0) & last, 1.0, here), np.nan)
+        low = np.where(np.isnan(found[:, 0]), np.inf, found[:, 0]).min(axis=1)
+        high = np.where(np.isnan(found[:, 1]), -np.inf, found[:, 1]).max(axis=1)
+        apart = ~np.isfinite(low)
+        return read_only(np.where(apart[:, None], np.nan, np.stack([low, high], axis=1)))
+
     def contact_gap(self, number: int) -> FloatArray:
-        """Return the gap of a contact at every point, (n,) [m or rad]; negative by what an elastic one yields."""
-        mesh, contact = self.mesh, self.mesh.contacts[number]
+        """Return the gap of a contact at every point, (n,) [m or rad]; negative by what an elastic one yields.
+
+        Of the side of a beam it is the least, wherever along the beam that is.
+        """
+        item = self.network.contacts[number]
+        if isinstance(item, BeamOnObstacle):
+            return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
+        mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length
         return read_only(gaps(mesh, contact, self.at.z) * unit)
 
@@ -399,7 +427,8 @@ def strain_energy(at: Equilibria) -> Any:
             [term(at.mesh, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
         )
     for contact in at.mesh.contacts:
-        total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
+        if contact.slide < 0:
+            total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
     return total
 
 

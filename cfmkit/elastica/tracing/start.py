@@ -9,8 +9,9 @@ import numpy as np
 
 from cfmkit.elastica.contact.changes import ContactChange
 from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
-from cfmkit.elastica.mechanics.discretise import FlankPlace, without_floor
+from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.mechanics.similar_arrays import without_floor
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
