@@ -50,6 +50,7 @@ LARGEST_FORCE = (
 N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners
 PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
+ROUNDING_OF_GAP = 1e-9  # mean beam lengths: a clamped end that lies on an obstacle stays there
 NEAR_GAP = 0.01  # share of the thinnest beam's thickness below which a gap that stays open is reported
 OUT_OF_REACH = 10.0  # largest motions of a pad from an obstacle, from which on it is reported
 MOST_NAMED = 6
@@ -75,8 +76,8 @@ def refuse_sides_in_obstacles(assembly: Assembly) -> None:
         if depth > OVERLAP * mesh.scales.length:
             place = float(np.ravel(mesh.fits[contact.beam].arc(least.parameter))[0])
             raise InputError(
-                f"mechanism.obstacles.{contact.name}: beam {contact.beam!r} lies {format_short(depth, 'length')} inside "
-                f"it at {place:.0%} of its length before any load"
+                f"mechanism.obstacles.{contact.name}: beam {contact.beam!r} lies {format_short(depth, 'length')} in"
+                f"side it at {place:.0%} of its length before any load"
             )
 
 
@@ -292,7 +293,7 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
         else:
             moved = float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
         least = float(gap.min())
-        if 0 < least < NEAR_GAP * thin:
+        if ROUNDING_OF_GAP * path.mesh.scales.length < least < NEAR_GAP * thin:
             where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
             yield "near_contact", f"{where}: tolerances of that size decide whether they touch"
         elif not isinstance(contact, Stop) and least > OUT_OF_REACH * moved:
