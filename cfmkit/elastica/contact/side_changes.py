@@ -63,10 +63,11 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
         beyond = piece.with_flanks(_without(piece, condition.number), piece.closed - {condition.number})
         begin, wanted = piece.carry(at, beyond), ("wraps", condition.last)
     elif condition.kind == "end":
-        beyond = _onto_node(piece, condition)
-        if beyond is None:
+        onto = _onto_node(piece, condition)
+        if onto is None:
             return PathStop(WhyStopped.LOST, at.drive, REACHES.format(
                 names=piece.say(condition.number), mark=_mark(piece, condition)))  # fmt: skip
+        beyond = onto
         begin, wanted = _with_force(piece, at, beyond, condition.number), ("tangent", condition.last)
     else:
         beyond = _joined(piece, condition, at)

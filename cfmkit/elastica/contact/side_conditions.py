@@ -79,21 +79,21 @@ class SideConditions:
                         if pad.node == node and not np.isfinite(pad.stiffness):
                             yield SideCondition("tangent", k, item, last)
         for k, one in sides:
-            item: Any = one.item
-            marks = smooth_marks(mesh.fits.network.beams[item.beam], mesh.fits[item.beam])
+            side: Any = one.item
+            marks = smooth_marks(mesh.fits.network.beams[side.beam], mesh.fits[side.beam])
             place = float(mesh.elements.cuts[one.element, 1])
             low, high = max(m for m in marks if m < place), min(m for m in marks if m > place)
-            before, after = ([other for _, other in sides if other.item.beam == item.beam  # type: ignore[union-attr]
+            before, after = ([other for _, other in sides if other.item.beam == side.beam  # type: ignore[union-attr]
                               and (other.element > one.element) == above and other is not one]
                              for above in (False, True))  # fmt: skip
             if not any(low < mesh.elements.cuts[other.element, 1] for other in before):
-                yield SideCondition("end", k, item, False, low)
+                yield SideCondition("end", k, side, False, low)
             if not any(high > mesh.elements.cuts[other.element, 1] for other in after):
-                yield SideCondition("end", k, item, True, high)
-            if one.laid and len(item.outline.radius):
-                yield SideCondition("pulls", k, item)
-            if not one.laid and not any(other.item is item for other in before[-1:] + after[:1]):
-                yield SideCondition("spreads", k, item)
+                yield SideCondition("end", k, side, True, high)
+            if one.laid and len(side.outline.radius):
+                yield SideCondition("pulls", k, side)
+            if not one.laid and not any(other.item is side for other in before[-1:] + after[:1]):
+                yield SideCondition("spreads", k, side)
         for (k, one), (_, other) in itertools.pairwise(sides):
             if one.item.beam == other.item.beam:  # type: ignore[union-attr]
                 kind: Literal["closes", "pinch"] = "closes" if one.item is other.item else "pinch"

@@ -81,11 +81,12 @@ class SlidingEquations(NumpyEquations):
     def of(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
         e = mesh.elements
+        names = [name for name in (*_TABLES, "length") if getattr(e, name) is not None]
         if e.weight.ndim > 2:  # of several states: those of the first
-            first = {name: getattr(e, name)[0] for name in (*_TABLES, "length") if getattr(e, name) is not None}
+            first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
             e = e._replace(**first, moved_cuts=None)
-        own = e._replace(**{name: np.array(getattr(e, name)) for name in (*_TABLES, "length")
-                            if getattr(e, name) is not None})  # fmt: skip
+        copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
+        own = e._replace(**copies)
         whole = replace(mesh, elements=own)
         return cls(whole, ramp, plain=make(replace(without_contacts(whole), moving=None), ramp))
 
