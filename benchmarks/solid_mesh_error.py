@@ -260,7 +260,7 @@ def part_target() -> float:
 
 
 def main() -> None:
-    """Print the table, and write it where that is wished."""
+    """Print the table, and write it where that is required."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", action="store_true", help="into docs/solid.md")
     parser.add_argument("--references", action="store_true", help="compute the references again")

@@ -30,7 +30,7 @@ from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Metric, Row, Study
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
-from cfmkit.studies.varied_axes import axes, wish
+from cfmkit.studies.varied_axes import axes, parse_variation
 
 ROOT = Path(__file__).parents[1]
 SPEC = cfmkit.load(ROOT / "configs" / "cam.yaml").replace({"requirements": ()})
@@ -62,7 +62,7 @@ class TenMilliseconds(Study):
 
 
 def work(kind: type[Study], count: int, metrics: int) -> Work:
-    plan = grid(axes(SPEC, [wish(f"mechanism.profile.friction=0:0.002:{count}")]))
+    plan = grid(axes(SPEC, [parse_variation(f"mechanism.profile.friction=0:0.002:{count}")]))
     return Work(kind(SPEC, plan.paths, tuple(Metric(f"m{k}", "force") for k in range(metrics))), plan)
 
 

@@ -47,12 +47,12 @@ def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return processor time of a sweep [s], its rows, and whether blocks were used."""
     import cfmkit
     from cfmkit.studies import engine, sweep_request_and_files
-    from cfmkit.studies.varied_axes import wish
+    from cfmkit.studies.varied_axes import parse_variation
 
     file, *vary = SWEEPS[name]
     module = sweep_request_and_files
     request = getattr(module, "SweepRequest", None) or module.Request  # as older checkouts call it
-    work = module.prepare(cfmkit.load(configs / file), request(vary=tuple(wish(one) for one in vary)))
+    work = module.prepare(cfmkit.load(configs / file), request(vary=tuple(parse_variation(one) for one in vary)))
     if singly:
         engine.vectorised = lambda *_: False
     start = time.process_time()

@@ -297,7 +297,7 @@ def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
         Processes.
     **block
         As in the specification's block `sensitivity`, whose values they replace: `method`, `parameters`,
-        `samples`, `metrics`, `on_failure`, `seed`, ...
+        `samples`, `metrics`, `seed`, ...
 
     Raises
     ------
@@ -323,42 +323,42 @@ def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
 
 
 def suggest(
-    wish: str | os.PathLike[str] | None = None,
+    request: str | os.PathLike[str] | None = None,
     *,
     seed: int = 0,
     jobs: int = 1,
     time_budget: str | float | None = 180.0,
     **keys: Any,
 ) -> Suggestions:
-    """Return mechanisms of every family that do what is wished, the best first, and those not judged in full.
+    """Return mechanisms of every family that do what is required, the best first, and those not judged in full.
 
     Parameters
     ----------
-    wish : path-like, optional
-        A YAML file with a block `wish`.
+    request : path-like, optional
+        A YAML file with a block `suggest`.
     seed : int
-        Of everything random.
+        Random seed.
     jobs : int
         Processes; 1: only this one, in which a long job cannot be stopped when the time budget ends.
     time_budget : str or float, optional
         A text with its unit (``"20 s"``, ``"2 min"``), or a number [s]; None: no limit.
     **keys
-        Keys of the wish, which replace those of the file: texts with units (``force="20 N"``), numbers for shares,
-        lists (``room=["80 mm", "60 mm", "6 mm"]``).
+        Keys of the request, which replace those of the file: texts with units (``force="20 N"``), numbers for shares,
+        lists (``envelope=["80 mm", "60 mm", "6 mm"]``).
 
     Raises
     ------
     cfmkit.errors.SpecError
-        If the wish contradicts itself, or is malformed.
+        If the request contradicts itself, or is malformed.
 
     Examples
     --------
     >>> import cfmkit
-    >>> found = cfmkit.suggest(force="10 kN", travel="10 mm", room=["20 mm", "20 mm", "1 mm"], material="pla")
+    >>> found = cfmkit.suggest(force="10 kN", travel="10 mm", envelope=["20 mm", "20 mm", "1 mm"], material="pla")
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    from cfmkit.runs.read_wish import wish_of
+    from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as searched
@@ -366,9 +366,10 @@ def suggest(
     def written(value: Any) -> str:
         return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
-    block = wish_of(None if wish is None else os.fspath(wish), {key: written(value) for key, value in keys.items()})
+    name = None if request is None else os.fspath(request)
+    block = read_request(name, {key: written(value) for key, value in keys.items()})
     executor = serial if jobs == 1 else Pool(jobs)
-    return searched(block.wish(), Run(seed, time_budget=read_time(time_budget), executor=executor), block.prefer)
+    return searched(block.request(), Run(seed, time_budget=read_time(time_budget), executor=executor), block.prefer)
 
 
 def export(

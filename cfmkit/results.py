@@ -1,4 +1,4 @@
-"""What an analysis or a design gives back: values, never half-finished objects.
+"""Outcome of an analysis or a design: values, never half-finished objects.
 
 A `Status` says how far the solver came; its value is the sentence the user
 reads. Whether the mechanism is any good is not a status: that is what the
@@ -60,7 +60,7 @@ def round_off(parts: FloatArray) -> float:
 class Status(Enum):
     """End of a solve."""
 
-    COMPLETE = "solved over everything that was requested"
+    COMPLETE = "solved over the full travel"
     PARTIAL = "solved in part: the curve ends early, or some points failed"
     INFEASIBLE = "no design meets the targets within the stated limits"
     NO_EQUILIBRIUM = "no equilibrium: the mechanism cannot exist as described, or it is not supported"

@@ -3,6 +3,8 @@
     python tools/house.py                    # a table, and every knot with the imports that tie it
     python tools/house.py --json             # the same for a program
     python tools/house.py --at-most-knots 3  # exit code 1 where there are more
+    python tools/house.py --names            # names and sentences that break a rule; exit code 1 where there are more
+                                             # than tools/names.json allows
 
 A knot is a strongly connected set of modules in the graph of *all* imports: those at the top of a file, inside
 functions and for types alone. A string that is exactly the dotted name of a module (``"cfmkit.families.cam.model"``,
@@ -185,13 +187,110 @@ def table(figures: dict[str, object]) -> str:
     return "\n".join(lines)
 
 
+PREPOSITIONS = {
+    "about", "above", "across", "after", "against", "along", "around", "as", "at", "before", "behind", "below",
+    "beside", "between", "beyond", "by", "down", "during", "for", "from", "in", "inside", "into", "of", "off", "on",
+    "onto", "out", "outside", "over", "past", "through", "to", "toward", "towards", "under", "until", "up", "upon",
+    "via", "with", "within", "without",
+}  # fmt: skip
+IRREGULAR_PARTICIPLES = {
+    "begun", "bent", "borne", "bought", "broken", "built", "chosen", "cut", "done", "drawn", "driven", "fallen",
+    "felt", "found", "given", "gone", "grown", "heard", "held", "kept", "known", "laid", "left", "lost", "made",
+    "meant", "met", "put", "read", "said", "seen", "set", "shown", "sold", "spent", "split", "spoilt", "stuck",
+    "sunk", "taken", "thought", "thrown", "told", "torn", "turned", "understood", "wound", "written",
+}  # fmt: skip
+PRONOUNS = {
+    "each", "found", "given", "here", "known", "near", "one", "other", "own", "there", "way",
+}  # fmt: skip
+FORBIDDEN_BEGINNINGS = ("What ", "How ", "Where ", "Tell ", "Say ")
+CONVERSIONS = {
+    "as_", "by_", "from_", "in_", "of_", "to_", "with_",
+}  # fmt: skip
+"""First words that are prepositions in the usual names of constructors and conversions: ``from_yaml``, ``to_csv``."""
+
+
+def is_participle(word: str) -> bool:
+    """Return True if a word by itself is a participle: ``judged``, ``held``."""
+    return word in IRREGULAR_PARTICIPLES or (len(word) > 4 and word.endswith("ed") and not word.endswith("eed"))
+
+
+def is_property(node: ast.FunctionDef) -> bool:
+    """Return True if a function is a property, which a noun or an adjective names."""
+    names = {getattr(one, "id", getattr(one, "attr", "")) for one in node.decorator_list}
+    return not names.isdisjoint({"property", "cached_property", "setter"})
+
+
+def rule_of_function(node: ast.FunctionDef) -> str | None:
+    """Return the rule that the name of a function breaks; None if it breaks none."""
+    words = node.name.strip("_").split("_")
+    if is_property(node) or node.name.startswith("__"):
+        return None
+    if len(words) == 1 and is_participle(words[0]):
+        return "functions named by a participle"
+    begins = f"{words[0]}_"
+    if words[0] in PREPOSITIONS and not (begins in CONVERSIONS and len(words) > 1):
+        return "functions named by a preposition"
+    return None
+
+
+def broken_rules(trees: dict[str, ast.Module]) -> tuple[Counter[str], dict[str, list[str]]]:
+    """Return how often each rule for names and sentences is broken, and the public functions that break one."""
+    counts: Counter[str] = Counter()
+    public: dict[str, list[str]] = defaultdict(list)
+    for module, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                counts["functions"] += 1
+                if rule := rule_of_function(node):
+                    counts[rule] += 1
+                    if not node.name.startswith("_"):
+                        counts["public functions that break a rule"] += 1
+                        public[rule].append(f"{module}.{node.name}")
+            if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module):
+                text = ast.get_docstring(node) or ""
+                counts["docstrings that begin with What, How, Where or Tell"] += text.startswith(FORBIDDEN_BEGINNINGS)
+                counts["sections 'Attributes'"] += "\nAttributes\n---" in text
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in PRONOUNS:
+                counts["variables that are pronouns"] += 1
+            if isinstance(node, ast.arg) and node.arg in PRONOUNS:
+                counts["variables that are pronouns"] += 1
+        for node in tree.body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            for name in (
+                one.id for target in targets for one in ast.walk(target or ast.Pass()) if isinstance(one, ast.Name)
+            ):
+                if name.isupper() and "_" not in name.strip("_"):
+                    counts["constants of one word"] += 1
+    return counts, public
+
+
+def names_report(package: Path, *, as_json: bool) -> int:
+    """Print how often each rule is broken, and what is allowed; return 1 where it is more than that."""
+    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules(package).items()}
+    counts, public = broken_rules(trees)
+    allowed = json.loads(ALLOWED.read_text(encoding="utf-8")) if ALLOWED.exists() else {}
+    if as_json:
+        print(json.dumps({"counts": counts, "public": public}, indent=1))
+    else:
+        for name, count in counts.items():
+            print(f"{name:52}{count:>7}" + (f"   allowed {allowed[name]}" if name in allowed else ""))
+    return int(any(counts[name] > most for name, most in allowed.items()))
+
+
+ALLOWED = Path(__file__).with_name("names.json")
+"""How often each rule may be broken: as often as on the day the file was written, and never more."""
+
+
 def main() -> int:
-    """Print the figures; return 1 where there are more knots than allowed."""
+    """Print the figures; return 1 where there are more knots, or more names against the rules, than allowed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("package", nargs="?", type=Path, default=ROOT / "cfmkit", help="folder of the package")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--at-most-knots", type=int, metavar="N", help="exit code 1 where there are more")
+    parser.add_argument("--names", action="store_true", help="count names and sentences that break a rule")
     options = parser.parse_args()
+    if options.names:
+        return names_report(options.package, as_json=options.json)
     figures = survey(options.package)
     print(json.dumps(figures, indent=1) if options.json else table(figures))
     return int(options.at_most_knots is not None and len(figures["knots"]) > options.at_most_knots)

@@ -58,7 +58,7 @@ def go_on(fresh: bool) -> str:
 
 
 def told(error: BaseException, terminal: Terminal) -> Document:
-    """Tell the user what went wrong, with its traceback if that is wanted; return the answer with its exit code."""
+    """Report an error to the user, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
     answer = answer_to(error)
@@ -67,7 +67,7 @@ def told(error: BaseException, terminal: Terminal) -> Document:
 
 
 def fail(error: BaseException, terminal: Terminal) -> ExitCode:
-    """Tell the user what ended the command; return the exit code."""
+    """Report what ended the command; return the exit code."""
     answer = told(error, terminal)
     if terminal.json:
         # What could not be written may be this very output.
@@ -118,6 +118,7 @@ _PARSER_WORDS = (
     (r"Value error, ", ""),
     (r"Input should be a valid integer, unable to parse string as an integer", "a whole number is needed"),
     (r"'[^']*' is not a valid integer", "a whole number is needed"),  # typer 0.26
+    (r"No such option: --room\b.*", "No such option: --room, it is --envelope now"),
 )
 """Patterns of what the library says that checks the types of options, and what to say instead."""
 

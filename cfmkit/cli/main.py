@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 TEXT = (
     "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut.\n\n"
-    "No spec yet? `cfmkit suggest --force '20 N' --travel '5 mm' --room 120x80x15mm --material pom` finds "
+    "No spec yet? `cfmkit suggest --force '20 N' --travel '5 mm' --envelope 120x80x15mm --material pom` finds "
     "mechanisms that meet these requirements.\n\n"
     "A spec is a YAML file that describes one mechanism. `cfmkit new cam` writes one to start from, `cfmkit examples` "
     "lists ready ones, `cfmkit show` explains families, keys, metrics and units."
@@ -105,28 +105,28 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
     if call is None:
         streams.put("")
         return ExitCode.OK
-    wishes = replace(
+    output = replace(
         terminal,
         json=call.options.json,
         quiet=getattr(call.options, "quiet", False),
         verbose=call.options.verbose,
     )
-    if wishes.verbose:
+    if output.verbose:
         _tell_more()
     Stopped.began = False
     try:
         with _locks_of(call.options):
-            answer = call.run(call.options, wishes)
+            answer = call.run(call.options, output)
     except Stopped as stop:
         if hasattr(call.options, "fresh") and not Stopped.began:
             stop.nothing_begun()
         raise
-    hidden = wishes.json or wishes.quiet
-    wishes.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
-    if wishes.json:
-        wishes.show_json(envelope(answer))
-    elif not wishes.quiet:
-        wishes.show_page(answer)
+    hidden = output.json or output.quiet
+    output.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
+    if output.json:
+        output.show_json(envelope(answer))
+    elif not output.quiet:
+        output.show_page(answer)
     return answer.exit_code
 
 
@@ -150,7 +150,7 @@ def _tell_more() -> None:
 
 
 def _failed(error: BaseException, terminal: Terminal) -> ExitCode:
-    """Tell of an error; a signal may arrive while that is done."""
+    """Report an error; a signal may arrive while that is done."""
     try:
         return fail(error, terminal)
     except Stopped as stop:

@@ -105,7 +105,7 @@ WithReport = Annotated[bool, flag("--report", text="Write report.html, too: ever
 
 @dataclass(frozen=True, kw_only=True)
 class Common:
-    """What every verb takes."""
+    """Options of every verb."""
 
     json: Annotated[bool, flag("--json", text="Print one JSON document instead of text, also on failure.")] = False
     verbose: Annotated[int, option("-v", "--verbose", count=True, text="Print more; -vv: tracebacks, too.")] = 0
@@ -129,7 +129,7 @@ class Changing(Common):
 
     @property
     def changes(self) -> tuple[str, ...]:
-        """What ``--set`` says, in order."""
+        """Changes by ``--set``, in order."""
         return tuple(self.set or ())
 
 
@@ -157,7 +157,7 @@ class FigureChoice(Common):
 
     @property
     def form(self) -> FigureForm:
-        """How figures are to be written.
+        """Form of the figures.
 
         Raises
         ------
@@ -270,7 +270,7 @@ class Measuring(Common):
 
     @property
     def flips(self) -> tuple[str, ...]:
-        """What ``--flip`` names."""
+        """Columns that ``--flip`` names."""
         return tuple(word.strip() for word in self.flip.split(",")) if self.flip else ()
 
 

@@ -1,4 +1,4 @@
-"""What the user wants to see, and the streams it goes to: results to standard output, all else to standard error."""
+"""Options of output, and its streams: results to standard output, all else to standard error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NARROWEST, WIDEST = 40, 100
 
 @dataclass(frozen=True)
 class Terminal:
-    """What is known about the user's wishes for output."""
+    """Options of output of a command line."""
 
     arguments: tuple[str, ...] = ()  # the command line, without the program's name
     # json, quiet: whether results are a JSON document, or not shown
@@ -36,7 +36,7 @@ class Terminal:
 
     @classmethod
     def guess(cls, arguments: Sequence[str]) -> Terminal:
-        """Return what a command line that may be malformed seems to wish."""
+        """Return what a command line that may be malformed seems to request."""
         given = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
         flags = "".join(item[1:] for item in given if item.startswith("-") and item[1:].strip("vq") == "")
         verbose = flags.count("v") + given.count("--verbose")
@@ -108,7 +108,7 @@ class ProgressLines:
         self._most = 0.0
 
     def report(self, fraction: float, text: str) -> None:
-        """Tell how far a run is, by the share that is done, if the last line is old enough."""
+        """Report the share of a run that is done, if the last line is old enough."""
         now, self._most = time.monotonic(), max(self._most, fraction)
         if now - self._reported >= LINE_EVERY and 0.0 < self._most < 1.0:
             self._reported = now

@@ -1,4 +1,4 @@
-"""How far a study is, on standard error: a bar for whoever watches, else a line now and then.
+"""Progress of a study on standard error: a bar for whoever watches, else a line now and then.
 
 The first Ctrl-C asks the study to finish what runs and to write what there is; the
 second ends it at once.
@@ -115,7 +115,7 @@ class StudyProgress:
         return recent if now - since >= RECENT else max(recent, mean)
 
     def interrupt(self, number: int, _frame: FrameType | None) -> None:
-        """Take Ctrl-C: the first time as a wish to stop soon, the second time at once."""
+        """Take Ctrl-C: the first time as a request to stop soon, the second time at once."""
         if self.stopped:
             signal.signal(number, signal.SIG_DFL)
             raise Stopped(number)

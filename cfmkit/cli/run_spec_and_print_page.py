@@ -1,4 +1,4 @@
-"""What `design`, `analyze` and `calibrate` share: options in, the document of a run out."""
+"""Common part of `design`, `analyze` and `calibrate`: options in, the document of a run out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from cfmkit.documents.document import BAD, Document, Note, Written
 from cfmkit.documents.run_document import RunCommand, complaints_of, data_of, document_of
 from cfmkit.errors import UsageError
-from cfmkit.runs.run import Request, carry_out
+from cfmkit.runs.run import RunTask, carry_out
 from cfmkit.runs.specfile import STDIN
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ NO_MOTION = (
 def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = False) -> Document:
     """Run a verb over the spec that the options name and write the folder."""
     out = folder_of(options, verb.name)
-    wanted = Request(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
+    wanted = RunTask(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
     wanted = replace(wanted, page=page, form=options.form, animate=getattr(options, "animate", None))
     if wanted.animate == "mp4":
         from cfmkit.plots.animation import require_ffmpeg

@@ -1,4 +1,4 @@
-"""What the verbs that evaluate many points have in common: a folder, a journal, an executor."""
+"""Common part of the verbs that evaluate many points: a folder, a journal, an executor."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Desk:
-    """Where a study works: its folder, its journal, and its progress monitor."""
+    """Workplace of a study: its folder, its journal, and its progress monitor."""
 
     folder: RunFolder
     journal: Journal
@@ -35,7 +35,7 @@ class Desk:
 
 @dataclass(frozen=True)
 class Made:
-    """What a study was made from, for its manifest."""
+    """Origin of a study, for its manifest."""
 
     # command, source: the verb, and the specification as it was named
     command: str

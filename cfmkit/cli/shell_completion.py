@@ -1,4 +1,4 @@
-"""What typer completes in a shell besides verbs, options and files: names of families, topics, and keys."""
+"""Completion in a shell of more than verbs, options and files: names of families, topics, and keys."""
 
 from __future__ import annotations
 

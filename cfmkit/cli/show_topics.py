@@ -1,4 +1,4 @@
-"""What `cfmkit show` can explain: topics and families as pages, and everything else by its name.
+"""Subjects of `cfmkit show`: topics and families as pages, and everything else by its name.
 
 A page is the answer of the command: records for ``--json``, and the same as tables for people.
 """

@@ -60,6 +60,8 @@ class GridColumn(NamedTuple):
 
     head: str = ""
     wraps: bool = True
+    # which columns short pages leave out where all do not fit, the largest number first; those with 0 stay
+    rank: int = 0
 
 
 class CellGrid(NamedTuple):
@@ -235,7 +237,7 @@ class WarningEntry(NamedTuple):
 
 @dataclass(frozen=True)
 class Document:
-    """What one command found."""
+    """Outcome of one command."""
 
     # more of the JSON document than the envelope has; values for its keys replace them
     data: Mapping[str, Any] = attribute(default_factory=dict)

@@ -61,7 +61,7 @@ LITTLE_MARGIN = 1.05
 
 @dataclass(frozen=True)
 class RunCommand:
-    """How a run was started, so that a remedy can be written as the command that applies it."""
+    """Command that started a run, so that a remedy can be written as the command that applies it."""
 
     verb: str
     source: str  # the specification; ``-`` is standard input

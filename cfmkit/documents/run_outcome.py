@@ -1,4 +1,4 @@
-"""What a run found out, as one value: `report_on` gathers metrics, requirements and warnings of a result."""
+"""Outcome of a run, as one value: `report_on` gathers metrics, requirements and warnings of a result."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SEVERITY = (
 
 @dataclass(frozen=True)
 class Supplement:
-    """What a verb adds to the report on a result."""
+    """Additions of a verb to the report on a result."""
 
     data: Mapping[str, Any] = field(default_factory=dict)  # more keys of metrics.json
     files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)  # more files: what makes the content of each
@@ -76,7 +76,7 @@ class Report:
 
     @property
     def status(self) -> Status:
-        """How the run ended: as the result did, but partial where something else that was asked is missing."""
+        """Status of the run: that of the result, but partial where something else that was asked is missing."""
         solved = self.result.status is Status.COMPLETE
         return Status.PARTIAL if solved and self.supplement.shortfall else self.result.status
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -19,15 +20,15 @@ from cfmkit.documents.document import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.errors import ExitCode
 
-HEADS = ("", "variant", "mean", "ripple", "size", "safety", "parts", "model")
-"""Of the table; "hysteresis" follows where a proposal has some, and "yield" where one is required."""
+NOT_JUDGED = "open"
+"""Of a value that no model here has, or of which the material says nothing; a note says the reason."""
 
-VARIANT = 1
-"""The column whose cells may be cut; a number is never."""
+RANKS = {"parts": 4, "variant": 3, "hysteresis": 2, "life": 1}
+"""Columns that narrow pages leave out, the largest first."""
 
 
 def document_of(record: Mapping[str, Any], code: ExitCode, files: Written | None = None) -> Document:
@@ -50,7 +51,7 @@ def document_of(record: Mapping[str, Any], code: ExitCode, files: Written | None
         title="suggest",
         summary=head,
         tables=tuple(_tables(record)),
-        notes=(*notes, *_remarks(found), *(_incomplete(found, files) if files else ())),
+        notes=(*notes, *_remarks(found), *_unmet(record["near_misses"]), *(_incomplete(found, files) if files else ())),
         warnings=tuple(WarningEntry(one["name"], one["message"], one["message"]) for one in record["warnings"]),
         files=files,
         next=_next(found, files) if files else "",
@@ -65,24 +66,21 @@ def _next(found: Sequence[Mapping[str, Any]], files: Written) -> str:
 
 
 def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
-    more = _shares(record)
-    heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
-    proposals, unjudged = record["proposals"], record["unjudged"]
-    for heading, listed, first in (
-        ("proposals", proposals, 1),
-        ("not judged in full", unjudged, len(proposals) + 1),
+    columns = _columns(record)
+    heads = (GridColumn("", False), *(GridColumn(head, head == "variant", RANKS.get(head, 0)) for head in columns))
+    listed = (*record["proposals"], *record["unjudged"])
+    order = f"proposals by {', '.join(record['order'])}" + ("; not judged in full last" if record["unjudged"] else "")
+    numbered = [Span(f"{k} {one['family']}", link=_page_of(one)) for k, one in enumerate(listed, 1)]
+    near = record["near_misses"]
+    for heading, names, rows in (
+        (order, numbered, listed),
+        ("alternatives: one unmet requirement", [one["family"] for one in near], near),
     ):
-        rows = tuple(
-            (*_row(number, one, record), *(_share(one[name]) for name in more))
-            for number, one in enumerate(listed, first)
-        )
         if rows:
-            yield PageTable(heading, heads, rows)
+            cells = ((name, *(cell(one) for cell in columns.values())) for name, one in zip(names, rows, strict=True))
+            yield PageTable(heading, heads, tuple(cells))
     pair = (GridColumn("", False), GridColumn())
-    near = tuple((one["family"], f"{one['variant']}: {one['misses'][0]}") for one in record["near_misses"])
-    if near:
-        yield PageTable("near misses: one unmet requirement", pair, near)
-    named = {one["family"] for one in (*proposals, *unjudged)}
+    named = {one["family"] for one in listed}
     silent = tuple(_silent(one) for one in record["families"] if one["family"] not in named)
     if silent:
         yield PageTable("no proposals from these families", pair, silent)
@@ -96,6 +94,12 @@ def _remarks(found: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
             texts[text].append(number)
     for text, numbers in texts.items():
         yield Note(f"no. {_numbers(numbers)}", text, whole=True)
+
+
+def _unmet(near: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
+    """Yield what each alternative misses."""
+    for one in near:
+        yield Note("unmet", f"{one['family']} {one['variant']}: {one['misses'][0]}", whole=True)
 
 
 def _numbers(numbers: Sequence[int]) -> str:
@@ -126,32 +130,45 @@ def _incomplete(found: Sequence[Mapping[str, Any]], files: Written) -> Iterator[
         yield Note("note", text, whole=True)
 
 
-def _shares(record: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the shares that follow the other columns of the table."""
-    lossy = any(one["hysteresis"] is not None for one in (*record["proposals"], *record["unjudged"]))
-    return (*(("hysteresis",) if lossy else ()), *(("yield",) if "yield" in record["wish"] else ()))
-
-
 def _silent(one: Mapping[str, Any]) -> tuple[str, str]:
     """Return why a family has no proposal, and the nearest request that it could meet."""
-    nearest = ", ".join(f"{key} {value}" for key, value in one["nearest"].items())
-    return one["family"], (one["reason"] or "no mechanism fits") + (f"; nearest: {nearest}" if nearest else "")
+    nearest = ", or with ".join(f"{key} {value}" for key, value in one["nearest"].items())
+    return one["family"], (one["reason"] or "no mechanism fits") + (f"; feasible with {nearest}" if nearest else "")
 
 
-def _row(number: int, one: Mapping[str, Any], record: Mapping[str, Any]) -> tuple[str | Span, ...]:
-    unit = "N*mm" if "torque" in record["wish"] else "N"
-    sides = [one["across"], one["along"], one["depth"]]
-    return (
-        Span(f"{number} {one['family']}", link=quote(f"{one['folder']}/report.html")),
-        one["variant"],
-        f"{one['mean']:.4g} {unit}",
-        "-" if one["ripple"] is None else f"{100 * one['ripple']:.2g} %",
-        " x ".join(f"{side:.3g}" for side in sides if side is not None) + " mm",
-        "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
-        str(one["parts"]),
-        one["model"],
-    )
+def _columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]], str]]:
+    """Return the columns of the table, each with the text of its cell; those that no proposal fills are left out."""
+    block, listed = record["suggest"], (*record["proposals"], *record["unjudged"], *record["near_misses"])
+    kind, unit = ("torque", "N*mm") if "torque" in block else ("force", "N")
+    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        "variant": lambda one: str(one["variant"]),
+        kind: lambda one: _cell(one["mean"], lambda value: f"{value:.4g} {unit}"),
+        "ripple": lambda one: _cell(one["ripple"], lambda value: f"{100 * value:.2g} %"),
+        "size": _size,
+        "safety": lambda one: _cell(one["safety_factor"], lambda value: f"{value:.3g}"),
+    }
+    for name, key in (("hysteresis", "hysteresis"), ("yield", "yield"), ("life", "cycles")):
+        if key in block or any(one[name] is not None for one in listed):
+            shown = (lambda value: f"{value:.2g}") if name == "life" else (lambda value: f"{100 * value:.3g} %")
+            columns[name] = partial(_value, name, shown)
+    return columns | {
+        "parts": lambda one: "-" if one["parts"] is None else str(one["parts"]),
+        "verdict": lambda one: str(one["verdict"]),
+    }
 
 
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.3g} %"
+def _value(name: str, shown: Callable[[float], str], one: Mapping[str, Any]) -> str:
+    return _cell(one[name], shown)
+
+
+def _cell(value: float | None, shown: Callable[[float], str]) -> str:
+    return NOT_JUDGED if value is None else shown(value)
+
+
+def _size(one: Mapping[str, Any]) -> str:
+    sides = [one[side] for side in ("across", "along", "depth") if one[side] is not None]
+    return "x".join(f"{side:.3g}" for side in sides) + " mm"
+
+
+def _page_of(one: Mapping[str, Any]) -> str:
+    return quote(f"{one['folder']}/report.html")

@@ -226,8 +226,28 @@ def _wide(lines: Iterable[Sequence[Span]]) -> int:
     return max([0, *(sum(len(one.text) for one in spans) for spans in lines)])
 
 
+def _without_ranked_columns(table: PageTable, width: int) -> PageTable:
+    """Return a table without the columns of the highest ranks, as many as it takes to fit a page."""
+    while any(column.rank for column in table.columns):
+        texts = [
+            [column.head for column in table.columns],
+            *([str(getattr(c, "text", c)) for c in r] for r in table.rows),
+        ]
+        wide = [max(len(row[at]) for row in texts) for at in range(len(table.columns))]
+        least = (min(w, LEAST_COLUMNS) if column.wraps else w for w, column in zip(wide, table.columns, strict=True))
+        if sum(least) + INDENT + 2 * (len(wide) - 1) <= width:
+            break
+        at = max(range(len(wide)), key=lambda k: table.columns[k].rank)
+        table = table._replace(
+            columns=(*table.columns[:at], *table.columns[at + 1 :]),
+            rows=tuple((*row[:at], *row[at + 1 :]) for row in table.rows),
+        )
+    return table
+
+
 def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     """Return a table as lines: as many rows as a short page has of it, each as wide as the page."""
+    table = _without_ranked_columns(table, width)
     rows = table.rows if table.most is None else table.rows[: table.most]
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
     heads = [column.head for column in table.columns]

@@ -256,7 +256,7 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
             found.append(
                 Finding(
                     "weakly_identified",
-                    f"{item.path} is known only to within ± {100 * half[k] / item.size:.0f} % of its size",
+                    f"{item.path} cannot be determined from this recording (± {100 * half[k] / item.size:.0f} %)",
                 )
             )
         for other in range(k):
@@ -285,8 +285,8 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
     return [
         Finding(
             "lack_of_fit",
-            f"the residual swings by {swing} (rms) along the travel, beside a noise of {noise}: what was "
-            f"fitted does not describe the measurement, and the intervals hold only where it does; {cure}",
+            f"systematic residual {swing} (rms) along the travel, noise {noise}: what was fitted does not describe "
+            f"the measurement, and the intervals hold only where it does; {cure}",
         )
     ]
 

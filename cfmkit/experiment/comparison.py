@@ -68,7 +68,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Zeros:
-    """What the sensors show where they should show nothing."""
+    """Readings of the sensors where they should read zero."""
 
     # effort, motion: without load, and at the mechanism's zero [N, m] or [N m, rad]
     effort: float = 0.0

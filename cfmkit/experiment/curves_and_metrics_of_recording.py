@@ -1,4 +1,4 @@
-"""What a recording says about a mechanism: raw and filtered curves, metrics, repeatability.
+"""Evaluation of a recording: raw and filtered curves, metrics, repeatability.
 
 A recording becomes one curve per cycle. Within a branch the samples stand in the order of
 the motion, so that the flicker of an encoder makes no folds; they are filtered before, in

@@ -1,4 +1,4 @@
-"""What the user must know of a recording, by name, and the sentences that say it."""
+"""Findings about a recording, and their sentences."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ class LowPass:
 
     @property
     def sentence(self) -> str:
-        """What the filter is, for reports."""
+        """Description of the filter, for reports."""
         at = "-3 dB both passes together" if self.corrected else "-3 dB each pass"
         return (
             f"Butterworth of order {self.order} per pass, back and forth, cut-off {self.reported} ({at}), each branch"

@@ -17,7 +17,7 @@ from cfmkit.experiment.calibration import CANNOT, UNKNOWN, table
 from cfmkit.experiment.coverage import hole_finding
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
-from cfmkit.metrics import metrics_json, split_name
+from cfmkit.metrics import flat_metrics, metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
 from cfmkit.results import Status
@@ -55,7 +55,7 @@ class MeasureReport(ShortRepr):
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What the user must know of recording and window."""
+        """Findings about recording and window."""
         return (*self.source.warnings, *self.numbers.warnings)
 
     @property
@@ -65,7 +65,7 @@ class MeasureReport(ShortRepr):
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """What metrics.json says: the contract's keys for the raw curve, the filtered one, and what was decided."""
+        """Content of metrics.json: the contract's keys for the raw curve, the filtered one, and what was decided."""
         source, low_pass = self.source, self.source.low_pass
         return {
             "status": self.status.key,
@@ -115,7 +115,7 @@ def _tagged(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
     """Return the metrics of all specimens, each with its specimen in brackets."""
     found = {}
     for group, data in each.items():
-        for name, value in data[key].items():
+        for name, value in flat_metrics(data[key]).items():
             metric, branch = split_name(name)
             found[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
     return found

@@ -40,7 +40,7 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class Decisions:
-    """What was found out about a file, for the user to check."""
+    """Decisions of the reader about a file, for the user to check."""
 
     # encoding, separator, decimal: in words
     encoding: str

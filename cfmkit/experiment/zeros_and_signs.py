@@ -1,4 +1,4 @@
-"""What is known to be wrong with the zeros and signs of a recording, taken out before anything is read off it."""
+"""Corrections of zeros and signs of a recording, made before anything is read off it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is engraved on parts: the name of the specification and the thickness of the sheet, one text for each part.
+"""Texts engraved on parts: the name of the specification and the thickness of the sheet, one text for each part.
 
 It stands on the largest piece that is held, or else on one that is driven, since nothing there bends.
 """

@@ -164,7 +164,7 @@ def swept(lines: Sequence[FloatArray], half: float, shapes: Sequence[FloatArray]
 def outside(
     places: Sequence[tuple[float, float]], frame: Sequence[FloatArray], pads: Sequence[FloatArray]
 ) -> list[bool]:
-    """Tell which places [m] do not lie in a frame; what is also in a pad does not count as in the frame."""
+    """Return which places [m] do not lie in a frame; what is also in a pad does not count as in the frame."""
     from shapely import Point, Polygon, union_all
 
     own = union_all([Polygon(one) for one in frame]).difference(union_all([Polygon(one) for one in pads]))

@@ -1,4 +1,4 @@
-"""Where a drawn part is one piece although its mechanism has the places apart: strips that cross, touch, lie together.
+"""Check for a drawn part that is one piece where its mechanism is not: strips that cross, touch, lie together.
 
 The outline is the union of all strips and blocks. At a node they are meant to be one piece; elsewhere they are joined
 unasked, and the part is stiffer than its beams. Two places are apart if the way from one to the other, along strips and

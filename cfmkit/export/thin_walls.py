@@ -1,4 +1,4 @@
-"""Where a part is thinner than its process can make: beams, frames, and what is left between a hole and an edge.
+"""Check for parts thinner than their process can make: beams, frames, and what is left between a hole and an edge.
 
 From places all along the edges a ray runs into the material until it meets an edge that faces back: that is how thick
 the part is there. Tips of corners are thin as well, but no walls, and are left out.

@@ -1,4 +1,4 @@
-"""What a family of mechanisms must offer: a frozen record of functions, not a base class."""
+"""Interface of a family of mechanisms: a frozen record of functions, not a base class."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ SHARED = {
 
 
 @dataclass(frozen=True)
-class Room:
+class BoundingBox:
     """The box that a mechanism stays in over all of its travel, with everything that is drawn of it."""
 
     # across, along: in the plane, across and along the direction of travel [m]
@@ -142,7 +142,7 @@ class Room:
     drawn: tuple[float, float]  # width and height of the box along x and y of the drawings [m]
 
     @classmethod
-    def around(cls, part: PosedPart) -> Room:
+    def around(cls, part: PosedPart) -> BoundingBox:
         """Return the box around a mechanism over its motion, along its travel and along x and y."""
         from cfmkit.export.posed_part import box
 
@@ -227,7 +227,7 @@ class Family:
     elastic_parts: str | None = None
     # ``"module:function"`` with ``function(spec) -> (DrivenNetwork, ...)``: the same parts as beams, for decks
     elastic_networks: str | None = None
-    # ``"module:function"``, ``propose(wish, run) -> FamilyOffer``: what it could do with a wish, by scaling laws
+    # ``"module:function"``, ``propose(request, run) -> FamilyOffer``: what it could do with a request, by scaling laws
     propose: str | None = None
     # ``"module:function"`` with ``part_over_motion(result) -> PosedPart``: where the material of a solved mechanism is
     # in its poses; its box follows. None where that is not known
@@ -280,10 +280,10 @@ class Family:
             return result
         return sized(result, self.envelope(result))
 
-    def envelope(self, result: Result) -> Room | None:
+    def envelope(self, result: Result) -> BoundingBox | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
         part = function_named(self.part)(result) if self.part else None
-        return None if part is None else Room.around(part)
+        return None if part is None else BoundingBox.around(part)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
@@ -297,7 +297,7 @@ class Family:
         return found
 
 
-def sized(result: Result, space: Room | None) -> Result:
+def sized(result: Result, space: BoundingBox | None) -> Result:
     """Return a result with the sizes of its box among its values; without a value where the box is not known."""
     sides = (None, None, None) if space is None else space.sides
     reason = (space.assumed if space else "") or "the box is not known"

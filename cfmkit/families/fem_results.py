@@ -1,4 +1,4 @@
-"""What every family gives of a part that is solved as a solid: scalar results, and the stress in each fillet.
+"""Results of a part that is solved as a solid: scalar results, and the stress in each fillet.
 
 Scalar results are errors of the mesh and the stress concentration; `fillets.csv` has a row for each fillet.
 """

@@ -1,4 +1,4 @@
-"""How families word their findings: by name, with numbers as users read them."""
+"""Wording of findings: by name, with numbers as users read them."""
 
 from __future__ import annotations
 

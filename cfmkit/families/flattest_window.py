@@ -1,4 +1,4 @@
-"""Where on a curve the force is flattest over a given length."""
+"""Flattest window of a given length on a curve."""
 
 from __future__ import annotations
 

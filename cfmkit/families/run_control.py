@@ -1,4 +1,4 @@
-"""How a function of a family is to be run: seed, progress, time, who does independent jobs, what is kept."""
+"""Settings of a run of a family's function: seed, progress, time, who does independent jobs, what is kept."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Rising:
     """Passes on the largest fraction so far, with the newest text."""
 
     def __init__(self, told: Callable[[float, str], None]) -> None:
-        """Tell `told`, from 0 on."""
+        """Begin a progress report to `told`, from 0 on."""
         self._told = told
         self._most = 0.0
 
@@ -109,7 +109,7 @@ class Run:
     Attributes
     ----------
     seed : int
-        Of everything random.
+        Random seed.
     progress : callable
         Is told a fraction in [0, 1], which never falls, and a short text.
     time_budget : float, optional

@@ -17,7 +17,7 @@ from cfmkit.metrics import evaluate
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.families.wishes import Wish
+    from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
@@ -32,12 +32,12 @@ PER_SQUARE = 0.007
 whose stiffening was computed; the real one ends at 1/(1 - nu^2) - 1."""
 
 
-def is_too_wide(wish: Wish, width: float, thickness: float, strain: float) -> bool:
-    """Return True if leaves of a width and a thickness [m] probably stiffen by more than the band of a wish.
+def is_too_wide(request: Request, width: float, thickness: float, strain: float) -> bool:
+    """Return True if leaves of a width and a thickness [m] probably stiffen by more than the band of a request.
 
     `strain`: the largest bending strain. An estimate, by which candidates are put in order; `stiffening` decides.
     """
-    return PER_SQUARE * 2.0 * (width / thickness) ** 2 * strain > wish.high / wish.low - 1.0
+    return PER_SQUARE * 2.0 * (width / thickness) ** 2 * strain > request.high / request.low - 1.0
 
 
 def stiffening(spec: Spec, model: Callable[[Any, Run], Result]) -> float:
@@ -50,11 +50,11 @@ def stiffening(spec: Spec, model: Callable[[Any, Run], Result]) -> float:
     return 0.0 if not narrow or not wide else max(wide / narrow - 1.0, 0.0)
 
 
-def aim_below_stiffening(spec: Spec, wish: Wish, model: Callable[[Any, Run], Result]) -> Wish:
-    """Return a wish whose force is in the band without and with the stiffening of a part, or as near as can be."""
+def aim_below_stiffening(spec: Spec, request: Request, model: Callable[[Any, Run], Result]) -> Request:
+    """Return a request whose force is in the band without and with the stiffening of a part, or as near as can be."""
     share = stiffening(spec, model)
-    lowest, highest = WITHIN * wish.low, wish.high / (WITHIN * (1.0 + share))
-    return replace(wish, target=max(min(wish.target / (1.0 + 0.5 * share), highest), lowest))
+    lowest, highest = WITHIN * request.low, request.high / (WITHIN * (1.0 + share))
+    return replace(request, target=max(min(request.target / (1.0 + 0.5 * share), highest), lowest))
 
 
 def _mean(result: Result) -> float | None:

@@ -31,7 +31,7 @@ from cfmkit.metrics.metric_values import (
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.metrics_json import as_json, metrics_json, search_json
+from cfmkit.metrics.metrics_json import as_json, flat_metrics, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
@@ -51,6 +51,7 @@ __all__ = [
     "definition_of",
     "definitions",
     "evaluate",
+    "flat_metrics",
     "frame_of",
     "gaps",
     "known_metrics",

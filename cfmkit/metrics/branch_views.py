@@ -1,4 +1,4 @@
-"""What a metric looks at: one branch in its frame of reference.
+"""Operand of a metric: one branch in its frame of reference.
 
 Everything that several metrics need is computed once, when it is first needed.
 """

@@ -1,4 +1,4 @@
-"""What a material does in use: cycles to failure, and the modulus that is left after a hold.
+"""Material in use: cycles to failure, and the modulus that is left after a hold.
 
 Fatigue: the window is one cycle, from the least stress in it to the largest and back, both taken at one place and with
 one sign. Goodman's line turns amplitude s_a and mean s_m into the fully reversed amplitude s_a / (1 - s_m / s_u)
@@ -24,7 +24,7 @@ from cfmkit.metrics.branches_cut_to_window import Undefined
 
 FIRST = 1e-9
 """In place of a first point at 0, which log t does not have [s]: so early that most of the fall to the next point is
-over long before that one, where the force is hardly more than at it, which errs on the safe side."""
+over long before that one, where the force is hardly more than at it, which is conservative."""
 
 
 @dataclass(frozen=True)

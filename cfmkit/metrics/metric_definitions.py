@@ -297,7 +297,7 @@ def words(name: str) -> str:
 
 
 def unknown_metric(name: str, known: Iterable[str]) -> str:
-    """Say that there is no such metric, and which one could be meant."""
+    """Return an error that there is no such metric, and which one could be meant."""
     names = list(dict.fromkeys(known))
     other = {"force": "torque", "torque": "force"}.get(name.split("_")[0])
     swapped = f"{other}_{name.partition('_')[2]}" if other else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from cfmkit.metrics.metric_definitions import split_name
 from cfmkit.specs.units import border_unit, to_border
 
 if TYPE_CHECKING:
@@ -37,8 +38,51 @@ def finite_border(value: float, dimension: str) -> float | None:
 
 
 def metrics_json(quantities: Mapping[str, Quantity]) -> dict[str, dict[str, Any]]:
-    """Return the block ``metrics`` of metrics.json."""
-    return {name: as_json(quantity) for name, quantity in quantities.items()}
+    """Return the block ``metrics`` of metrics.json: the worst of all branches, under it those that differ.
+
+    Examples
+    --------
+    >>> from cfmkit.results import Quantity
+    >>> values = {"force_max": 2.0, "force_max[load]": 2.0, "force_max[unload]": 1.0}
+    >>> metrics_json({name: Quantity(value, "force", "largest") for name, value in values.items()})["force_max"]
+    {'value': 2.0, 'unit': 'N', 'definition': 'largest', 'branches': {'load': {'value': 2.0}, 'unload': {'value': 1.0}}}
+    """
+    found: dict[str, dict[str, Any]] = {}
+    branches: dict[str, dict[str, dict[str, Any]]] = {}
+    for name, quantity in quantities.items():
+        metric, branch = split_name(name)
+        if branch is None or metric not in quantities:
+            found[name] = as_json(quantity)
+        else:
+            shown = as_json(quantity)
+            branches.setdefault(metric, {})[branch] = {key: shown[key] for key in OF_BRANCH if key in shown}
+    for metric, each in branches.items():
+        plain = {key: found[metric][key] for key in OF_BRANCH if key in found[metric]}
+        if any(one != plain for one in each.values()):
+            found[metric]["branches"] = each
+    return found
+
+
+OF_BRANCH = ("value", "reason")
+"""Keys of a metric that may differ between branches."""
+
+
+def flat_metrics(block: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the block ``metrics`` of metrics.json with one entry for each metric and branch.
+
+    Examples
+    --------
+    >>> found = flat_metrics({"force_max": {"value": 2.0, "unit": "N", "branches": {"unload": {"value": 1.0}}}})
+    >>> {name: one["value"] for name, one in found.items()}
+    {'force_max': 2.0, 'force_max[unload]': 1.0}
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for name, entry in block.items():
+        plain = {key: value for key, value in entry.items() if key != "branches"}
+        found[name] = plain
+        for branch, own in entry.get("branches", {}).items():
+            found[f"{name}[{branch}]"] = {key: value for key, value in plain.items() if key not in OF_BRANCH} | own
+    return found
 
 
 def search_json(found: Mapping[str, Searched]) -> dict[str, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Where a condition ends between a place where it holds and one where it does not, for many ends at once."""
+"""End of a condition between a place where it holds and one where it does not, for many ends at once."""
 
 from __future__ import annotations
 

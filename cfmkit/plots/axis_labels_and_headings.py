@@ -1,4 +1,4 @@
-"""What is written on a picture: axis labels with units, ticks, headings that fit."""
+"""Text on a picture: axis labels with units, ticks, headings that fit."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def value_text(value: float, dimension: str) -> str:
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands above a picture: whose it is, what it shows, and what is wrong."""
+    """Heading of a picture: whose it is, what it shows, and what is wrong."""
 
     name: str
     subject: str

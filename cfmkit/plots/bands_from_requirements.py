@@ -29,7 +29,7 @@ Bounds = tuple[float | None, float | None]
 
 @dataclass(frozen=True)
 class Band:
-    """Where a force or torque must be, in SI."""
+    """Band in which a force or torque must be, in SI."""
 
     # low, high: bounds of the effort [N or N m]; None if there is none
     low: float | None

@@ -48,7 +48,7 @@ larger share."""
 
 @dataclass(frozen=True)
 class CurveLook:
-    """What `plot_curve` draws beside the lines."""
+    """Options of `plot_curve` beside the lines."""
 
     # bands, names, arrows: requirement bands, names beside the lines, arrows along the path
     bands: bool = True

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """What one curve has more than the finest one."""
+    """Difference of a curve to the finest one."""
 
     curve: int  # which of the curves it is
     name: str  # to write beside the line; empty for none

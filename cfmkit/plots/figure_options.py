@@ -1,4 +1,4 @@
-"""How figures are to be written: formats, width of print, headings, and a style file of one's own.
+"""Form of the figures: formats, width of print, headings, and a style file of one's own.
 
 A drawing says its sizes in millimetres of print (`cfmkit.plots.style.new_figure`, `axes_mm`). For another width it is
 drawn twice: once to hear which boxes it asks for, and once with the boxes stretched, while the room between them, which
@@ -25,7 +25,7 @@ NARROWEST, WIDEST = 0.06, 0.6
 
 @dataclass(frozen=True)
 class FigureForm:
-    """How figures are to be written."""
+    """Form of the figures."""
 
     formats: tuple[str, ...] = ("png",)  # one file for each
     width: float | None = None  # of the print [m]; default: each figure as it is drawn

@@ -1,4 +1,4 @@
-"""Where the axes of a figure come to lie when it is to be wider or narrower than it is drawn.
+"""Layout of the axes of a figure that is wider or narrower than drawn.
 
 A drawing asks for boxes in millimetres of print. It is listened to once; then boxes are stretched, all by one factor in
 both directions, so that what is to scale stays so, and the margins between them keep their size, as their labels do.
@@ -51,7 +51,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass
 class FigureLayout:
-    """What a drawing asks for, and what it gets: while `boxes` is empty it is only listened to."""
+    """Boxes that a drawing asks for, and those it gets: while `boxes` is empty it is only listened to."""
 
     size: tuple[float, float] = (0.0, 0.0)  # of the figure [mm]
     asked: list[Box] = dataclasses.field(default_factory=list)  # boxes of the axes, in the order of the drawing [mm]

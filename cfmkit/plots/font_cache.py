@@ -1,4 +1,4 @@
-"""Where matplotlib keeps its list of fonts: in its own folder, or in a private one where that cannot be written."""
+"""Folder of matplotlib's list of fonts: in its own folder, or in a private one where that cannot be written."""
 
 from __future__ import annotations
 

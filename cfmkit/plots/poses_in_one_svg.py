@@ -37,7 +37,7 @@ _LINK = "http://www.w3.org/1999/xlink"
 
 @dataclass(frozen=True)
 class Moving:
-    """What a family says about its mechanism in motion."""
+    """Mechanism in motion, as its family draws it."""
 
     motion: FloatArray  # (n,) displacement [m] or angle [rad] of each pose, as the curve has it
     box: tuple[float, float, float, float]  # left, bottom, right and top of what all poses need [m]

@@ -1,4 +1,4 @@
-"""What is nothing but rounding is not drawn: a value that does not vary is level, a force that is not there is zero."""
+"""Removal of rounding noise from drawings: a value that does not vary is level, a force that is not there is zero."""
 
 from __future__ import annotations
 

@@ -358,7 +358,7 @@ class MapPlaces:
 
     @property
     def positions(self) -> FloatArray:
-        """Where they stand on the axis."""
+        """Positions on the axis."""
         return np.log(self.values) if self.logarithmic else self.values
 
     def value(self, position: FloatArray) -> FloatArray:

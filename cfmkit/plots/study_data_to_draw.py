@@ -1,4 +1,4 @@
-"""What a study found, as its pictures need it: values in border units, no specification, no journal."""
+"""Outcome of a study, as its pictures need it: values in border units, no specification, no journal."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class DrawnScale:
 
     @property
     def label(self) -> str:
-        """What is written on the axis: the short name, with its unit."""
+        """Label of the axis: the short name, with its unit."""
         short = self.short or self.name.rpartition(".")[2]
         if self.dimension == PERCENT:
             return f"{short.replace('_', ' ')} [%]"
@@ -89,7 +89,7 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class StudyMarks:
-    """What a study found, as its pictures need it."""
+    """Outcome of a study, as its pictures need it."""
 
     # varied, metrics: parameters and the metrics to draw
     varied: tuple[DrawnScale, ...]

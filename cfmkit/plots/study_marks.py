@@ -1,4 +1,4 @@
-"""What the pictures of studies have in common: the best point, missed requirements, words on an axis."""
+"""Common part of the pictures of studies: the best point, missed requirements, words on an axis."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, li
 from cfmkit.metrics.compare import TOLERANCE
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.runs import batch_output_files
-from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
+from cfmkit.runs.run import FinishedRun, RunTask, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, gone
@@ -44,9 +44,9 @@ class BatchJob:
 
 @dataclass(frozen=True)
 class BatchWork:
-    """What a worker needs to do any job of a batch."""
+    """Everything a worker needs for any job of a batch."""
 
-    common: Request  # what holds for every specification; its folder is that of the batch
+    common: RunTask  # what holds for every specification; its folder is that of the batch
     verb: str | None  # ``design`` or ``analyze``; None: design what has a block `design`
     arguments: tuple[str, ...]  # the command line, for the manifests
     fresh: bool = False  # whether searches begin anew, too, where an earlier one was ended
@@ -178,10 +178,10 @@ class Unwatched:
     stopped: bool = False
 
     def total(self, points: int) -> None:
-        """Tell nobody."""
+        """Ignore it."""
 
     def done(self, points: int, failed: int, reused: bool) -> None:
-        """Tell nobody."""
+        """Ignore it."""
 
     def stopping(self) -> bool:
         """Never end."""
@@ -190,7 +190,7 @@ class Unwatched:
 
 @dataclass(frozen=True)
 class Crew:
-    """How a batch gets done: by what, until when, and who is told."""
+    """Execution of a batch: executor, deadline and progress callback."""
 
     executor: Executor
     fail_fast: bool
@@ -268,7 +268,7 @@ def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What became of a batch.
+    """Outcome of a batch.
 
     Attributes
     ----------
@@ -305,20 +305,20 @@ class BatchResult:
 
     @property
     def summary(self) -> Mapping[str, Any]:
-        """What metrics.json says."""
+        """Content of metrics.json."""
         found: Mapping[str, Any] = named(batch_output_files.data(self.entries, self.exit_code, self.compared))
         return found
 
     @property
     def table(self) -> Table:
-        """What results.csv says: one row per specification."""
+        """Content of results.csv: one row per specification."""
         from cfmkit.studies.batch_sources_and_outcomes import results_table
 
         return results_table(self.entries)
 
     @property
     def requirements(self) -> Table:
-        """What requirements.csv says: one row per requirement."""
+        """Content of requirements.csv: one row per requirement."""
         from cfmkit.studies.batch_sources_and_outcomes import requirements_table
 
         return requirements_table(self.entries)
@@ -364,7 +364,7 @@ def batch(
     fidelity : str, optional
         For all of them.
     seed : int
-        Of everything random.
+        Random seed.
     plots : bool
         Whether to draw.
     jobs : int, optional
@@ -425,7 +425,7 @@ def batch(
         addressed(change)
     named = _named(specs)
     files = sources(named, place)
-    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
+    common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)

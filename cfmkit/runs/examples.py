@@ -188,4 +188,4 @@ def _same(place: Path, source: Path) -> bool:
 def _refuse_taken(places: Iterable[Path]) -> None:
     for place in places:
         if place.exists() or place.is_symlink():
-            raise OutputError(f"cannot write {visible(str(place))}: a file of that name is in the way")
+            raise OutputError(f"cannot write {visible(str(place))}: the file exists")

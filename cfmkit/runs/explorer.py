@@ -65,7 +65,7 @@ class Slider:
 
     @property
     def label(self) -> str:
-        """What stands beside it: the key, or what a number of a list is."""
+        """Text beside it: the key, or what a number of a list is."""
         *_, group, key = ("", *self.path.split("."))
         if not key.isdecimal():
             return key.replace("_", " ")

@@ -61,7 +61,7 @@ REDIRECT = """<!DOCTYPE html>
 
 
 def ignored(_error: Exception) -> None:
-    """Tell nobody: the default for library use."""
+    """Ignore progress: the default for library use."""
 
 
 class ExplorerServer(ThreadingHTTPServer):
@@ -98,7 +98,7 @@ class ExplorerServer(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """Where the page is, with the token."""
+        """Address of the page, with the token."""
         return f"http://{HOST}:{self.server_port}/?token={self.token}"
 
     def write_redirect(self) -> Path:
@@ -176,7 +176,7 @@ class ExplorerServer(ThreadingHTTPServer):
             connection.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a page that was closed before it had its answer, and one line of a bug."""
+        """Ignore a page that was closed before it had its answer; report a bug in one line."""
         error = sys.exc_info()[1]
         if isinstance(error, Exception) and not isinstance(error, (ConnectionError, TimeoutError)):
             self.failed(error)
@@ -295,4 +295,4 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: standard error is for what goes wrong."""
+        """Ignore it: standard error is for what goes wrong."""

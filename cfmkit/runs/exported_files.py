@@ -1,4 +1,4 @@
-"""What `export` writes: the part in the requested formats, decks of its elastic parts, and its drawing on paper.
+"""Files of `export`: the part in the requested formats, decks of its elastic parts, and its drawing on paper.
 
 Nothing here touches a disk.
 """

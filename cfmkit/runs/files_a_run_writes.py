@@ -1,4 +1,4 @@
-"""What a run found out, as the files that it writes.
+"""Files of a run.
 
 `files` yields them, with curve, figures and geometry, by name below the output folder. Nothing here touches a disk, and
 nothing depends on the time: the same result gives the same bytes.

@@ -102,7 +102,7 @@ def measure_each(
 
 @dataclass(frozen=True)
 class MeasurementSettings:
-    """How recordings are measured; the fields are as for `measure`."""
+    """Settings of a measurement; the fields are as for `measure`."""
 
     window: str | tuple[float, float] | None = None
     filter: str = "default"

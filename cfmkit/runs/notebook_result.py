@@ -38,7 +38,7 @@ class AnalysisView(Result):
 
     @cached_property
     def requirements(self) -> tuple[Outcome, ...]:
-        """What became of each requirement of the specification."""
+        """Outcome of each requirement of the specification."""
         from cfmkit.metrics import check, values_of_family
 
         return Several(check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values)))

@@ -43,7 +43,7 @@ VERDICTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class PrintedRow:
-    """What a paper prints at one place."""
+    """Values that a paper prints at one place."""
 
     paper: str  # first author and year, as `cfmkit show references` has it
     family: str  # of the mechanism
@@ -257,7 +257,7 @@ def _reported(value: float, text: str) -> str:
 
 @dataclass(frozen=True)
 class _Scope:
-    """Where the names of a question have their values."""
+    """Values of the names in a question."""
 
     spec: str
     changes: tuple[str, ...] = ()
@@ -366,9 +366,9 @@ def _named(name: str, scope: _Scope) -> Any:
 def _varied(spec: Spec, path: str) -> tuple[float, ...]:
     """Return the values that a sweep gives to something."""
     from cfmkit.studies.plan import stepped
-    from cfmkit.studies.varied_axes import axes, wishes
+    from cfmkit.studies.varied_axes import axes, collect_variations
 
-    for axis in axes(spec, wishes(spec.sweep.vary)) if spec.sweep else ():
+    for axis in axes(spec, collect_variations(spec.sweep.vary)) if spec.sweep else ():
         if axis.leaf.path == path:
             return tuple(map(float, stepped(axis).values))
     raise ValueError(f"no sweep varies {path}")

@@ -56,7 +56,7 @@ def _as_it_is(_folder: RunFolder, run: Run) -> AbstractContextManager[Run]:
 
 @dataclass(frozen=True)
 class Verb:
-    """What distinguishes one computing verb from another.
+    """Differences between computing verbs.
 
     `compute` returns the report on a spec; `done` is the word for it, in the header; `inputs` is
     what the manifest says about other files than the spec; `running` makes of a run in the folder one
@@ -95,7 +95,7 @@ class FinishedRun:
 
 
 class RunRequest(Protocol):
-    """What says which specification is meant: its file, what replaces its values, and a fidelity."""
+    """Choice of a specification: its file, what replaces its values, and a fidelity."""
 
     @property
     def spec(self) -> str:
@@ -103,22 +103,22 @@ class RunRequest(Protocol):
 
     @property
     def changes(self) -> tuple[str, ...]:
-        """What ``--set`` says, in order."""
+        """Changes by ``--set``, in order."""
 
     @property
     def fidelity(self) -> str | None:
-        """What ``--fidelity`` says."""
+        """Fidelity by ``--fidelity``."""
 
 
 @dataclass(frozen=True)
-class Request:
-    """What a run is to do."""
+class RunTask:
+    """Task of a run."""
 
     spec: str  # the file; ``-`` is standard input
     out: str  # the output folder
     changes: tuple[str, ...] = ()  # what ``--set`` says
     fidelity: str | None = None  # what ``--fidelity`` says
-    seed: int = 0  # of everything random
+    seed: int = 0  # random seed
     plots: bool = True  # whether to draw
     of_many: bool = False  # whether it is one of many, and changes may be for others
     page: bool = False  # whether to write ``report.html``
@@ -127,7 +127,7 @@ class Request:
 
 
 def carry_out(
-    verb: Verb, wanted: Request, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
+    verb: Verb, wanted: RunTask, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
 ) -> FinishedRun:
     """Return what a run found, after writing its folder.
 
@@ -135,7 +135,7 @@ def carry_out(
     ----------
     verb : Verb
         What to compute.
-    wanted : Request
+    wanted : RunTask
         Of what, and where to.
     arguments : sequence of str
         The command line, for the manifest.

@@ -200,11 +200,11 @@ def _sweep_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with paths and values of the block `sweep`, each with its place in the file."""
     if spec.sweep is None:
         return
-    from cfmkit.studies.varied_axes import faults, wishes
+    from cfmkit.studies.varied_axes import collect_variations, faults
 
     drawn, joint = spec.sweep.combine in ("lhs", "sobol"), spec.sweep.combine == "zip"
-    for wish, message in faults(spec, wishes(spec.sweep.vary), drawn, joint):
-        yield document.problem(("sweep", "vary", wish.path), message)
+    for request, message in faults(spec, collect_variations(spec.sweep.vary), drawn, joint):
+        yield document.problem(("sweep", "vary", request.path), message)
 
 
 def _sensitivity_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:

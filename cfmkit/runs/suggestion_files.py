@@ -1,4 +1,4 @@
-"""What `suggest` writes for a wish: a folder for each proposal, table, figures, page, metrics.json; the exit code."""
+"""Output of `suggest`: a folder for each proposal, table, figures, page, metrics.json; the exit code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     from cfmkit.studies.suggest.search import Suggestions
-    from cfmkit.studies.suggest.spec import WishBlock
+    from cfmkit.studies.suggest.spec import SuggestBlock
 
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
@@ -45,7 +45,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Deadlines:
-    """What a run leaves out when it is late."""
+    """Deadlines of parts that a late run leaves out."""
 
     figures: Clock  # of the search and of proposals whose turn comes after it
     files: Clock  # of proposals, all but ``design.yaml``
@@ -65,7 +65,7 @@ def reported(proposal: Proposal) -> dict[str, Any]:
 def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
     """Return the same with the mean in N or N*mm."""
     mean = proposal.numbers.get("mean")
-    return reported(proposal) | {"mean": None if mean is None else float(to_border(mean, found.wish.kind))}
+    return reported(proposal) | {"mean": None if mean is None else float(to_border(mean, found.request.kind))}
 
 
 STATUSES = {
@@ -78,7 +78,7 @@ STATUSES = {
 
 
 def exit_code(found: Suggestions) -> ExitCode:
-    """Return 0 if a proposal does all that is wished, 70 if a bug ended all, 6 if not all was judged, else 4."""
+    """Return 0 if a proposal does all that is required, 70 if a bug ended all, 6 if not all was judged, else 4."""
     if found.proposals:
         return ExitCode.OK
     reasons = [one.offer.reason for one in found.answers if one.offer.reason]
@@ -94,13 +94,14 @@ def folder_name(number: int, proposal: Proposal) -> str:
     return f"{number}-{proposal.family}-" + "-".join(word for word in words.split("-") if word)
 
 
-def as_json(found: Suggestions, block: WishBlock) -> dict[str, Any]:
+def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
     """Return what metrics.json and ``--json`` say."""
     code = exit_code(found)
     return {
         "status": STATUSES[code],
         "message": message(found),
-        "wish": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+        "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+        "order": list(block.prefer),
         "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
         "unjudged": [
             _record(found, one, number) for number, one in enumerate(found.unjudged, len(found.proposals) + 1)
@@ -127,17 +128,17 @@ def message(found: Suggestions) -> str:
         late = "; the time budget ended the search before everything was tried" if found.late else ""
         count = len(found.proposals)
         more = f", {len(found.unjudged)} more not judged in full" if found.unjudged else ""
-        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the wish{more}{late}"
+        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the requirements{more}{late}"
     if exit_code(found) is ExitCode.BUG:
         return "bugs in cfmkit ended every candidate"
     if found.unjudged:
         count = len(found.unjudged)
         late = "; increase the time budget (--time-budget)" if found.late else ""
         were = "was" if count == 1 else "were"
-        return f"no mechanism is known to meet the wish, {count} {were} not judged in full{late}"
+        return f"no mechanism is known to meet the requirements, {count} {were} not judged in full{late}"
     if found.late:
-        return "the time budget ended the search before a mechanism met the wish; increase it (--time-budget)"
-    return "no mechanism meets the wish"
+        return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
+    return "no mechanism meets the requirements"
 
 
 def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
@@ -161,19 +162,21 @@ def _warnings(found: Suggestions) -> Iterator[dict[str, str]]:
 def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
     about = {"family": one.family, "variant": one.variant, **with_force(found, one)}
     place = {} if number is None else {"folder": folder_name(number, one)}
-    judged = {"model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings)}
+    judged = {
+        "verdict": one.verdict, "model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings),
+    }  # fmt: skip
     return about | place | judged | {"misses": list(one.missed), "notes": list(one.notes)}
 
 
 def files(
-    found: Suggestions, block: WishBlock, run: Run, plots: bool, deadlines: Deadlines, command: str | None = None
+    found: Suggestions, block: SuggestBlock, run: Run, plots: bool, deadlines: Deadlines, command: str | None = None
 ) -> Iterator[tuple[str, bytes]]:
     """Yield every file of the run as (name below the folder, content).
 
     Parameters
     ----------
-    found, block : Suggestions and WishBlock
-        What came of the wish, and what it said.
+    found, block : Suggestions and SuggestBlock
+        Proposals, and the block `suggest`.
     run : Run
         Its executor draws the proposals.
     plots : bool
@@ -208,8 +211,8 @@ def _pictures(found: Suggestions) -> dict[str, Figure]:
     from cfmkit.studies.suggest import pareto_and_scale_drawings
 
     return {
-        "pareto": pareto_and_scale_drawings.pareto(found.listed, found.wish),
-        "proposals": pareto_and_scale_drawings.to_one_scale(found.listed, found.wish),
+        "pareto": pareto_and_scale_drawings.pareto(found.listed, found.request),
+        "proposals": pareto_and_scale_drawings.to_one_scale(found.listed, found.request),
     }
 
 
@@ -264,27 +267,23 @@ def table(found: Suggestions) -> bytes:
 
     rows = [*enumerate(found.listed, 1), *((None, one) for one in found.near)]
     numbers = [with_force(found, one) for _, one in rows]
-    unit = "N" if found.wish.kind == "force" else "N*mm"
+    unit = "N" if found.request.kind == "force" else "N*mm"
     columns = [
         TableColumn("number", tuple(number for number, _ in rows)),
         TableColumn("family", tuple(one.family for _, one in rows)),
         TableColumn("variant", tuple(one.variant for _, one in rows)),
     ]
     for name, (dimension, border) in COLUMNS.items():
-        head = f"{found.wish.kind}_mean" if name == "mean" else name
+        head = f"{found.request.kind}_mean" if name == "mean" else name
         values = tuple(each.get(name) for each in numbers)
         columns.append(TableColumn(head, values, unit if name == "mean" else border if dimension != "count" else None))
-    columns.append(TableColumn("verdict", tuple(_verdict(one) for _, one in rows)))
+    columns.append(TableColumn("verdict", tuple(one.verdict for _, one in rows)))
     columns.append(TableColumn("model", tuple(one.model for _, one in rows)))
     columns.append(TableColumn("warnings", tuple("; ".join(one.warnings) for _, one in rows)))
     columns.append(TableColumn("unjudged", tuple("; ".join(one.open) for _, one in rows)))
     columns.append(TableColumn("misses", tuple("; ".join(one.missed) for _, one in rows)))
     columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, one) for n, one in rows)))
     return to_csv(Table(tuple(columns)))
-
-
-def _verdict(one: Proposal) -> str:
-    return "meets" if one.good else "open" if one.passes else "fails"
 
 
 def page(
@@ -308,7 +307,7 @@ def page(
     document = document_of(record, code)
     found = (*record["proposals"], *record["unjudged"])
     specs = [(f"Specification {one['folder']}", texts[one["folder"]]) for one in found]
-    return html.page(document, drawn, subject=_listed(record["wish"]), command=command, texts=specs)
+    return html.page(document, drawn, subject=_listed(record["suggest"]), command=command, texts=specs)
 
 
 def _listed(pairs: Mapping[str, Any]) -> str:
@@ -316,8 +315,8 @@ def _listed(pairs: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> _listed({"force": "10 N", "ripple": 0.03, "room": ["80 mm", "60 mm"], "adjustable": ["8 N", "12 N"]})
-    'force 10 N, ripple 3 %, room 80 mm x 60 mm, adjustable 8 N to 12 N'
+    >>> _listed({"force": "10 N", "ripple": 0.03, "envelope": ["80 mm", "60 mm"], "adjustable": ["8 N", "12 N"]})
+    'force 10 N, ripple 3 %, envelope 80 mm x 60 mm, adjustable 8 N to 12 N'
     >>> _listed({"material": [{"name": "pla"}, {"name": "pom"}], "prefer": ["size", "ripple"]})
     'material pla or pom, prefer size, ripple'
     """
@@ -327,7 +326,7 @@ def _listed(pairs: Mapping[str, Any]) -> str:
 SHARES = ("ripple", "hysteresis", "yield")
 """Numbers of a proposal that are shares."""
 
-JOINED = {"room": " x ", "material": " or ", "prefer": ", "}
+JOINED = {"envelope": " x ", "material": " or ", "prefer": ", "}
 """What stands between the values of a key that has several; else they are the two ends of a band."""
 
 

@@ -201,7 +201,7 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, near: floa
 
 
 def _leaving(ring: Ring, start: FloatArray, end: FloatArray, near: float) -> NDArray[np.bool_]:
-    """Tell at which vertices (n,) of a ring it is within `near` [m] of a seam, but not at one of its neighbours.
+    """Return at which vertices (n,) of a ring it is within `near` [m] of a seam, but not at one of its neighbours.
 
     A side of an element across such a place, where a fillet runs out on the face of a clamp, would be held at one end
     and in the middle: the spring of `vcfm_ding2022` with fillets of 1 mm was 1.9e-3 too soft or too stiff by chance.

@@ -171,7 +171,7 @@ class Part:
         return np.array(found, np.int64)
 
     def _beside_clamps(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Tell which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
+        """Return which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
         from scipy.spatial import cKDTree
 
         near, tree = np.zeros(len(grid.nodes), bool), cKDTree(grid.nodes)

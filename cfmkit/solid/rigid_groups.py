@@ -1,4 +1,4 @@
-"""What holds and drives a part: groups of nodes that move as one rigid piece each.
+"""Supports and drives of a part: groups of nodes that move as one rigid piece each.
 
 A group's three motions, two displacements and a turn about its centre, are a part that is driven times the travel,
 plus directions in which it is free. A clamp has neither; a guide is driven along and nothing else; a pin is free to
@@ -38,7 +38,7 @@ class Group:
 
 
 def within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDArray[np.bool_]:
-    """Tell which nodes (n, 2) [m] lie in polygons, or on lines of two points, or within `near` [m] of them."""
+    """Return which nodes (n, 2) [m] lie in polygons, or on lines of two points, or within `near` [m] of them."""
     from shapely import LineString, Polygon, distance, points, union_all
 
     covered = union_all([Polygon(one) if len(one) > 2 else LineString(one) for one in shapes])

@@ -59,7 +59,7 @@ class FilletArc:
         return np.asarray(self.center + np.array([[c, s], [-s, c]]) @ first)
 
     def covers(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Tell which points (n, 2) [m] are on it."""
+        """Return which points (n, 2) [m] are on it."""
         way, middle = points - self.center, self.middle - self.center
         off = np.abs(np.arctan2(middle[0] * way[:, 1] - middle[1] * way[:, 0], way @ middle))
         return np.asarray(

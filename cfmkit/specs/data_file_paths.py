@@ -42,7 +42,7 @@ class DataSource(str):
 
     @property
     def path(self) -> Path:
-        """Where the file is."""
+        """Path of the file."""
         return Path(self.folder) / str(self)
 
 

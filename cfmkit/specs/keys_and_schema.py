@@ -1,4 +1,4 @@
-"""What a specification may say, read off the models: a JSON schema, for editors, and a list of the keys.
+"""Keys of a specification, read off the models: a JSON schema, for editors, and a list of the keys.
 
 Defaults and bounds are as they are written in YAML: text with units.
 """

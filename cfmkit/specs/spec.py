@@ -60,7 +60,7 @@ class Requirement(Model):
 
 
 class Analysis(Model):
-    """What every family's `analysis` block has; families add their own keys."""
+    """Common part of every family's `analysis` block; families add their own keys."""
 
     points: int = Field(481, ge=5, le=1_000_000, description="points per branch of the curve")
     window: Ends | None = Field(
@@ -87,7 +87,7 @@ SweepValue = str | int | float | bool
 
 
 class SolidAnalysis(Model):
-    """How the part is solved as a planar solid."""
+    """Solution of the part as a planar solid."""
 
     removed_keys: ClassVar[dict[str, str]] = {
         "mesh": "write 'error', the error allowed in the force: the mesh is refined to it (default: 5e-4)"
@@ -103,7 +103,7 @@ class SolidAnalysis(Model):
 
 
 class Sweep(Model):
-    """What `cfmkit sweep` varies: the durable form of ``--vary``."""
+    """Block `sweep`: the durable form of ``--vary``."""
 
     vary: dict[str, str | tuple[SweepValue, ...]] = Field(
         description="dotted path: 'start:stop:n' with units, e.g. '8 mm:16 mm:5', or a list of values", min_length=1
@@ -128,7 +128,7 @@ class Sweep(Model):
 
 
 class Tolerance(Model):
-    """How far a value may be off its nominal one; a percentage is of the nominal value."""
+    """Deviation of a value from its nominal one; a percentage is of the nominal value."""
 
     normal: MetricValue | None = Field(None, description="standard deviation, e.g. '0.1 mm' or '2 %'")
     uniform: MetricValue | None = Field(
@@ -160,8 +160,11 @@ class Correlated(Model):
 
 
 class Sensitivity(Model):
-    """What `cfmkit sensitivity` varies, and how."""
+    """Block `sensitivity`."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "on_failure": "samples without a result are counted and reported; indices that need them are not stated"
+    }
     method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] = Field(
         "oat",
         description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances, or the "
@@ -176,11 +179,6 @@ class Sensitivity(Model):
     )
     seed: int | None = Field(None, ge=0, description="seed of all random numbers; `--seed` takes precedence")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
-    on_failure: Literal["fail", "resample", "bound"] = Field(
-        "fail",
-        description="for samples without a result: report no index (fail), draw their block again (resample) or report "
-        "intervals (bound)",
-    )
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
     costs: dict[str, Annotated[float, Field(gt=0)]] = Field(
         {},
@@ -190,7 +188,7 @@ class Sensitivity(Model):
 
 
 class DesignKeys(Model):
-    """What every family's `design` block may say about parts as they are made."""
+    """Common part of every family's `design` block: parts as they are made."""
 
     tolerances: dict[str, tuple[MetricValue, MetricValue] | Tolerance] | None = Field(
         None,
@@ -295,7 +293,7 @@ class Spec(Model):
 
     @property
     def motion(self) -> Literal["length", "angle"]:
-        """What the curves run over: displacements, or angles where a family says so."""
+        """Abscissa of the curves: displacements, or angles where a family says so."""
         return "length"
 
     @model_validator(mode="after")
@@ -338,7 +336,7 @@ class Spec(Model):
 
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
-        """What is cut from a sheet: each width out of the plane [m], by its key below `mechanism`."""
+        """Widths cut from a sheet: each out of the plane [m], by its key below `mechanism`."""
         return {}
 
     def windows(self) -> Iterator[tuple[tuple[str | int, ...], Ends]]:

@@ -1,4 +1,4 @@
-"""What mechanisms are made of: the library of named materials, and how a specification names or describes one."""
+"""Materials of mechanisms: the library of named materials, and how a specification names or describes one."""
 
 from cfmkit.stock.materials import MATERIALS, Material, UnknownMaterial, material
 

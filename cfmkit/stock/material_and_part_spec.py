@@ -1,4 +1,4 @@
-"""How every family's specification says what a part is made of, and how much of its strength may be used.
+"""Material and part in a specification, and the share of the strength that may be used.
 
 One grammar: a name from the library, a block of values, or a name with some of its values changed; and one for how
 a part is cut, and for plain pins and guides that rub.
@@ -36,7 +36,7 @@ _POISSON_RATIO = 0.3
 
 
 class Fatigue(Model):
-    """How many cycles a material lasts: S-N points or Basquin's line, with Goodman's line for the mean stress."""
+    """Fatigue of a material: S-N points or Basquin's line, with Goodman's line for the mean stress."""
 
     points: tuple[tuple[PositiveNumber, PositiveStress], ...] | None = Field(
         None, min_length=2, description="S-N points [[cycles, amplitude], ...], fully reversed, cycles increasing"
@@ -94,7 +94,7 @@ class Fatigue(Model):
 
 
 class Relaxation(Model):
-    """How the modulus falls while a strain is held: Prony terms, or the modulus at some times."""
+    """Relaxation of the modulus while a strain is held: Prony terms, or the modulus at some times."""
 
     terms: tuple[tuple[PositiveRatio, PositiveTime], ...] | None = Field(
         None, min_length=1, description="Prony terms [[share, relaxation time], ...]: [[20 %, 10 h], [15 %, 500 h]]"
@@ -183,7 +183,7 @@ class MaterialSpec(Model):
 
     @property
     def words(self) -> str:
-        """What it is in words: its name, if it has one, its modulus, and its strength, if that is known."""
+        """Description: its name, if it has one, its modulus, and its strength, if that is known."""
         values = f"E {format_short(self.modulus, 'stress')}"
         if self.yield_strength is not None:
             values += f", yield {format_short(self.yield_strength, 'stress')}"
@@ -278,7 +278,7 @@ class Hole(Model):
 
 
 class PartProcess(Model):
-    """How a part is made: a process, and what is known better than what is assumed of it."""
+    """Process that makes a part, and values known better than assumed."""
 
     name: ProcessName | None = Field(None, description="the process; default: by the material")
     kerf: FromZero | None = Field(None, description="width of the cut")
@@ -324,7 +324,7 @@ ProcessField = Annotated[PartProcess, BeforeValidator(_process_block, json_schem
 
 
 class PartFrame(Model):
-    """What stands and what is moved, around the elastic part: thicknesses in the plane."""
+    """Standing and moved pieces around the elastic part: thicknesses in the plane."""
 
     wall: AboveZero | None = Field(None, description="thickness of the held parts behind the roots")
     shuttle: AboveZero | None = Field(None, description="thickness of the driven part behind the roots")
@@ -343,7 +343,7 @@ class AroundFrame(PartFrame):
 
 
 class CutPart(Model):
-    """How a part is cut: what every family that is cut from a sheet can say."""
+    """Cut of a part from a sheet, common to all families."""
 
     process: ProcessField | None = Field(
         None,
@@ -373,7 +373,7 @@ class CutPart(Model):
 
 
 class PaddedPart(CutPart):
-    """How a part that ends in pads is cut."""
+    """Cut of a part that ends in pads."""
 
     pad: tuple[AboveZero, AboveZero] | None = Field(
         None, description="depth and breadth of the pads at held and driven ends"
@@ -393,7 +393,7 @@ def fillet_of(part: CutPart | None, thinnest: float) -> float:
 
 
 class RoundedCorners:
-    """What a mechanism that has `part` and `thinnest` knows of the inside corners of its part."""
+    """Inside corners of the part of a mechanism that has `part` and `thinnest`."""
 
     @property
     def fillet(self: Any) -> float:

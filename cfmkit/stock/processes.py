@@ -20,7 +20,7 @@ ProcessName = Literal["laser", "wire-edm", "fdm", "sls", "mill"]
 
 @dataclass(frozen=True)
 class ProcessAccuracy:
-    """What a process is assumed to hold."""
+    """Accuracy that is assumed of a process."""
 
     name: ProcessName  # how a specification calls it
     kerf: float  # width of the cut; 0 where nothing is cut [m]

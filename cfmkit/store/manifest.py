@@ -1,4 +1,4 @@
-"""What a run wrote: ``manifest.json``, the last file of a run and the only one with a time in it."""
+"""Files that a run wrote: ``manifest.json``, the last file of a run and the only one with a time in it."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _REASONS = {
     errno.EPERM: "permission denied",
     errno.EISDIR: "it is a folder",
     errno.ENOTDIR: "a part of the path is a file, not a folder",
-    errno.EEXIST: "a file of that name is in the way",
+    errno.EEXIST: "the file exists",
     errno.ENOENT: "the folder is not there",
     errno.ENAMETOOLONG: "the name is too long",
     errno.ELOOP: "it is a link, or there are too many links on the way",

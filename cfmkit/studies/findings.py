@@ -2,7 +2,7 @@
 
 FINDINGS = {
     "sensitivity": {
-        "failed_samples": "samples have no result; the policy says what became of them",
+        "failed_samples": "samples have no result: indices that need them are not stated; as parts they are bad",
         "not_stated": "indices or tolerances that cannot be stated are empty",
         "no_value": "a metric has no value for the specification itself and is left out",
         "correlation_not_used": "correlated deviations are stated for a method that varies every parameter by itself",

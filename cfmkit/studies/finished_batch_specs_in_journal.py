@@ -1,4 +1,4 @@
-"""What a batch knows of specifications that it finished before.
+"""Specifications that a batch finished before.
 
 An end is kept by content: the text of the specification and what it is called, the options, cfmkit's own files and the
 versions of its libraries. It is believed as long as the data files that the specification names and all files of the

@@ -1,4 +1,4 @@
-"""What has changed in the metrics of many specifications since an earlier batch."""
+"""Changes of the metrics of many specifications since an earlier batch."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, UsageError, visible
+from cfmkit.metrics import flat_metrics
 from cfmkit.metrics.compare import TOLERANCE, Compared, MetricChange, compare
 from cfmkit.results import Status
 from cfmkit.tables import Table, TableColumn, text_column
@@ -64,7 +65,7 @@ def earlier(folder: str) -> Known:
     for one in listed:
         if isinstance(one, dict) and isinstance(name := one.get("folder"), str):
             own = _read(os.path.join(folder, name, "metrics.json")) or {}
-            metrics = own.get("metrics", {})
+            metrics = flat_metrics(own.get("metrics", {}))
             known[name] = Earlier(str(one.get("status", "")), int(one.get("exit_code", 0)), metrics)
     return known
 
@@ -103,7 +104,8 @@ def changes(
             ends = _ends(before.status, before.exit_code), _ends(entry.status, int(entry.code))
             found.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
-            now = (_read(os.path.join(folder, entry.folder, "metrics.json")) or {}).get("metrics", {})
+            own = _read(os.path.join(folder, entry.folder, "metrics.json")) or {}
+            now = flat_metrics(own.get("metrics", {}))
             sides = Compared("the earlier batch", metrics=before.metrics), Compared(entry.spec, metrics=now)
             found += compare(*sides, tolerance=tolerance).changes
     return tuple(found)

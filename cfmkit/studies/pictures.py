@@ -76,7 +76,7 @@ def scales(
 
 def best_words(name: str, sense: str, ties: int) -> str:
     """Return what makes the best point the best, for the key."""
-    more = f", first of {ties} as good" if ties > 1 else ""
+    more = f" ({ties} tie)" if ties > 1 else ""
     return f"best: {sense} {name.replace('_', ' ')}{more}"
 
 

@@ -1,4 +1,4 @@
-"""How work gets done: an executor takes jobs as they come and yields outcomes as they finish.
+"""Executors: an executor takes jobs as they come and yields outcomes as they finish.
 
 ``executor(work, jobs, stopping)`` yields (job, outcome) in any order. It pulls from
 `jobs` only as fast as it works, and once ``stopping()`` is true it pulls no more,

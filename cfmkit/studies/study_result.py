@@ -1,4 +1,4 @@
-"""What a study gives to a program: the same tables and the same summary as its files, in memory."""
+"""Outcome of a study for a program: the same tables and the same summary as its files, in memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study found, in one record: how many points ended how, the best of them, requirements, extremes.
+"""Outcome of a study, in one record: how many points ended how, the best of them, requirements, extremes.
 
 The best point is the one with the best value of one metric, among those that meet every
 requirement, else among all that were solved. The metric is that of the first

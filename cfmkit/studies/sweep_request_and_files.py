@@ -15,7 +15,7 @@ from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.tables import curves_csv, results_csv
 from cfmkit.studies.variable_paths import length_to_vary
-from cfmkit.studies.varied_axes import WantedVariation, axes, wishes
+from cfmkit.studies.varied_axes import WantedVariation, axes, collect_variations
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,7 +43,7 @@ class SweepRequest:
     design: bool | None = None
     curves: bool | None = None
     metrics: tuple[str, ...] = ()  # columns; none: as in the specification, else all
-    seed: int = 0  # of everything random
+    seed: int = 0  # random seed
     most: int = MOST_POINTS  # points that are allowed
     pictures: bool = False  # whether pictures will be drawn: those of one parameter show curves
 
@@ -59,7 +59,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
         If a path or value is wrong.
     """
     block = spec.sweep
-    asked = request.vary or (wishes(block.vary) if block else ())
+    asked = request.vary or (collect_variations(block.vary) if block else ())
     if not asked:
         raise UsageError(NOTHING.replace("{example}", _example(spec)))
     plan = _plan(spec, request, asked)

@@ -144,7 +144,7 @@ def _kind(slot: Slot) -> Kind | None:
 
 
 def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...]) -> str:
-    """Say that there is nothing at a path, and which one could be meant."""
+    """Return an error that there is nothing at a path, and which one could be meant."""
     known = list(paths(spec_type))
     last = path.rpartition(".")[2]
     same = [one for one in known if one.rpartition(".")[2] == last]

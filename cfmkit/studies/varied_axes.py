@@ -1,4 +1,4 @@
-"""What is varied: ``mechanism.roller_radius=8 mm:16 mm:5`` read against a specification.
+"""Variations: ``mechanism.roller_radius=8 mm:16 mm:5`` read against a specification.
 
 A range includes both ends and is spaced evenly in the unit of the border, so that
 8 mm to 16 mm in five steps is 8, 10, 12, 14, 16 mm and not 10.000000000000002 mm.
@@ -44,7 +44,7 @@ class Axis:
     count: int | None = None  # number of values; None for a range to draw from
 
 
-def wish(option: str) -> WantedVariation:
+def parse_variation(option: str) -> WantedVariation:
     """Return what ``--vary PATH=...`` asks for.
 
     Raises
@@ -72,7 +72,7 @@ def wish(option: str) -> WantedVariation:
     return WantedVariation(path, reading.tree, source)
 
 
-def wishes(vary: Mapping[str, Any]) -> tuple[WantedVariation, ...]:
+def collect_variations(vary: Mapping[str, Any]) -> tuple[WantedVariation, ...]:
     """Return what a mapping asks for: path -> ``"start:stop:n"`` or a sequence of values."""
     found = []
     for path, content in vary.items():
@@ -99,7 +99,7 @@ def axes(spec: Spec, wanted: Iterable[WantedVariation], drawn: bool = False, joi
     Raises
     ------
     cfmkit.errors.SpecError
-        With every fault of every wish.
+        With every fault of every request.
     """
     asked = tuple(wanted)
     problems = [Problem(one.source, 0, 0, "", message) for one, message in faults(spec, asked, drawn, joint)]
@@ -111,7 +111,7 @@ def axes(spec: Spec, wanted: Iterable[WantedVariation], drawn: bool = False, joi
 def faults(
     spec: Spec, asked: tuple[WantedVariation, ...], drawn: bool, joint: bool = False
 ) -> Iterator[tuple[WantedVariation, str]]:
-    """Yield (wish, what is wrong with it)."""
+    """Yield (request, what is wrong with it)."""
     for index, one in enumerate(asked):
         try:
             found = axis(spec, one, drawn)

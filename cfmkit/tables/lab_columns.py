@@ -1,4 +1,4 @@
-"""What the columns of a lab file are: names, units and roles.
+"""Columns of a lab file: names, units and roles.
 
 Units are read or stated by the user, never guessed. A unit stands in the header as ``Force [N]``, ``Kraft (N)``,
 ``s/mm``, ``Load, N`` or ``travel in mm``, in a line of its own below the names, in the cells (``6.00 N``), in a column

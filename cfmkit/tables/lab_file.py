@@ -65,7 +65,7 @@ EMPTY = ' \t\r;,|"\u00a0-=:+*_'
 
 @dataclass(frozen=True)
 class Dialect:
-    """How the numbers of a file are written."""
+    """Notation of the numbers of a file."""
 
     separator: str  # between cells; a space stands for any number of spaces and tabs
     decimal: str  # "." or ","
@@ -94,7 +94,7 @@ class Dialect:
 
 @dataclass(frozen=True)
 class RowPattern:
-    """What the lines of a table have in common."""
+    """Common pattern of the lines of a table."""
 
     dialect: Dialect
     width: int  # cells in each line

@@ -37,10 +37,9 @@ def test_metrics_json_holds_raw_and_filtered_values_in_border_units(cli, data):
     document = json.loads((cli.folder / "out/metrics.json").read_text())
     assert document["metrics"]["hysteresis_area"]["value"] == pytest.approx(229.53181, abs=1e-4)
     assert document["metrics_filtered"]["hysteresis_area"]["value"] == pytest.approx(229.5, abs=1e-4)
-    assert document["metrics_filtered"]["force_mean[load]"] == {
-        "value": pytest.approx(50.658152, abs=1e-6), "unit": "N",  # over the displacement; 50.658418 over the points
-        "definition": document["metrics"]["force_mean[load]"]["definition"],
-    }  # fmt: skip
+    assert document["metrics_filtered"]["force_mean"]["branches"]["load"] == {
+        "value": pytest.approx(50.658152, abs=1e-6),  # over the displacement; 50.658418 over the points
+    }
     assert (document["status"], document["cycles"]) == ("complete", 1)
     assert document["window"] == {"from": 40.0, "to": 210.0, "unit": "mm"}
     assert document["filter"].startswith("Butterworth of order 6 per pass, back and forth, cut-off 2 Hz")
@@ -133,8 +132,8 @@ def test_tare_zero_and_flip_are_taken_out_and_spikes_and_reversals_left_out(cli,
     assert done.code == 0
     assert [item["name"] for item in done.document["warnings"]] == ["spikes", "reversals", "window_at_reversal"]
     raw = done.document["metrics"]
-    assert raw["force_ripple[load]"]["value"] == pytest.approx(0.6 / 50.8, rel=1e-3)
-    assert raw["force_mean[unload]"]["value"] == pytest.approx(49.5, abs=0.02)
+    assert raw["force_ripple"]["branches"]["load"]["value"] == pytest.approx(0.6 / 50.8, rel=1e-3)
+    assert raw["force_mean"]["branches"]["unload"]["value"] == pytest.approx(49.5, abs=0.02)
     assert done.document["window"]["from"] == pytest.approx(1.5)
     assert done.document["reading"][-3:] == [
         "-0.4 N subtracted from the force", "3 mm subtracted from the displacement", "sign of the force reversed",

@@ -102,9 +102,9 @@ def test_json_is_readable_in_every_encoding(cli, cam):
         (["-o", "v"], False, 0),
     ],
 )
-def test_wishes_for_output_are_read_off_a_command_line_that_may_be_malformed(arguments, json, verbose):
-    wishes = Terminal.guess(arguments)
-    assert (wishes.json, wishes.verbose) == (json, verbose)
+def test_options_of_output_are_read_off_a_command_line_that_may_be_malformed(arguments, json, verbose):
+    output = Terminal.guess(arguments)
+    assert (output.json, output.verbose) == (json, verbose)
 
 
 class Watched(io.StringIO):

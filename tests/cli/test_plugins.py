@@ -104,16 +104,16 @@ def test_a_family_has_its_article(monkeypatch):
 LINE = "warning  the family 'broken' of the package broken-one 1.0 cannot be used: it cannot be imported: "
 
 
-WISH = ("suggest", "--force", "10 N", "--travel", "3 mm", "--room", "80x60x6mm", "-o", "out", "--no-plots")
+REQUEST = ("suggest", "--force", "10 N", "--travel", "3 mm", "--envelope", "80x60x6mm", "-o", "out", "--no-plots")
 
 
-@pytest.mark.parametrize("arguments", [("show",), ("show", "references"), ("show", "pla"), ("schema",), WISH])
+@pytest.mark.parametrize("arguments", [("show",), ("show", "references"), ("show", "pla"), ("schema",), REQUEST])
 def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site, arguments, capsys, monkeypatch):
-    """Of the wish in this process, and without the families of cfmkit, which search for seconds."""
+    """Of the request in this process, and without the families of cfmkit, which search for seconds."""
     monkeypatch.setattr(search, "names", lambda: ("oblique", "broken"))
     monkeypatch.setattr(search, "until", lambda _executor, _deadline: serial)
     packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
-    code = 4 if arguments is WISH else 0
+    code = 4 if arguments is REQUEST else 0
     assert main(list(arguments)) == code
     out, err = capsys.readouterr()
     assert [line for line in err.splitlines() if line.startswith(LINE)] == err.splitlines()

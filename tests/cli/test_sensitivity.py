@@ -58,7 +58,6 @@ def test_every_method_writes_its_tables_and_pictures(cli, study, method):
     reported = report(cli, "out")
     assert reported["method"] == method
     assert reported["samples"]["evaluated"] == len(samples)
-    assert reported["samples"]["on_failure"] == "fail"
     assert list((cli.folder / "out" / "figures").glob("*.png"))
     listed = json.loads((cli.folder / "out" / "manifest.json").read_text())["files"]
     assert "indices.csv" in str(listed)
@@ -132,19 +131,6 @@ def test_samples_that_fail_leave_the_indices_out_and_exit_with_6(cli, study, met
     assert "failed_samples" in [one["name"] for one in reported["warnings"]]
 
 
-def test_resampling_and_bounds_are_told_with_their_counts(cli, study):
-    options = ("--method", "sobol", "--samples", "8", "-j", "1", *QUICK)
-    assert cli("sensitivity", study, "-o", "again", *FAILING, *options, "--on-failure", "resample").code == 6
-    reported = report(cli, "again")["samples"]
-    assert reported["replaced_blocks"] > 0
-    assert reported["failed"] >= reported["replaced_blocks"]
-    assert lines(cli, "again", "total_order")["mechanism.rolling_friction"]["value"] != ""
-    assert cli("sensitivity", study, "-o", "bound", *FAILING, *options, "--on-failure", "bound").code == 6
-    bounded = lines(cli, "bound", "total_order")["mechanism.rolling_friction"]
-    assert float(bounded["low"]) < float(bounded["high"])
-    assert report(cli, "bound")["samples"]["on_failure"] == "bound"
-
-
 def test_the_same_seed_gives_the_same_bytes_however_many_processes_and_another_seed_does_not(cli, study):
     tables = []
     for number, options in enumerate((("-j", "1"), ("-j", "2"), ("-j", "1", "--seed", "7"))):
@@ -178,7 +164,7 @@ def test_more_samples_reuse_those_that_are_there(cli, study):
         (("--vary", "mechanism.roller_radius=20 mm:21 mm"), 3, "nominal value is outside"),
         (("--metrics", "force_men"), 2, "force_men"),
         (("--samples", "1"), 2, "--samples"),
-        (("--method", "oat", "--on-failure", "resample"), 3, "draws no samples"),
+        (("--set", "sensitivity.on_failure=bound"), 3, "was removed; samples without a result are counted"),
         (("--max-points", "10"), 2, "--max-points"),
         (("--set", "sensitivity=null"), 2, "nothing to vary"),
         (("--set", "sensitivity.correlated.0.correlation=2"), 3, "<= 1"),

@@ -216,12 +216,13 @@ def test_a_signal_at_any_time_of_a_run_shows_no_traceback_and_leaves_nothing_hal
 EARLY = """
 import signal, sys
 from cfmkit.cli import main, run_spec_and_print_page
-from cfmkit.runs import batch, read_wish
+from cfmkit.runs import batch, read_suggest_file
 
 def ended(*_, **__):
     signal.raise_signal(signal.SIGTERM)
 
-run_spec_and_print_page.folder_of = run_spec_and_print_page.execute = batch.batch = read_wish.wish_of = ended
+run_spec_and_print_page.folder_of = run_spec_and_print_page.execute = batch.batch = ended
+read_suggest_file.read_request = ended
 print(main.main(sys.argv[1:]))
 """
 

@@ -1,4 +1,4 @@
-"""`cfmkit suggest`: three wishes in the quick tests, some more in the slow ones, all fifty in the long ones."""
+"""`cfmkit suggest`: three requests in the quick tests, some more in the slow ones, all fifty in the long ones."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from cfmkit.documents.document import Written
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import ExitCode
 
-WISHES = Path(__file__).parents[1] / "wishes"
-FEASIBLE = sorted(path.stem for path in (WISHES / "sources").glob("*.yaml"))
-UNREACHABLE = sorted(path.stem for path in WISHES.glob("unreachable-*.yaml"))
+REQUESTS = Path(__file__).parents[1] / "requests"
+FEASIBLE = sorted(path.stem for path in (REQUESTS / "sources").glob("*.yaml"))
+UNREACHABLE = sorted(path.stem for path in REQUESTS.glob("unreachable-*.yaml"))
 SLOW = "cam-six-springs", "unreachable-torque-of-a-coin"
-CONTRADICTIONS = sorted(path.stem for path in WISHES.glob("contradiction-*.yaml"))
+CONTRADICTIONS = sorted(path.stem for path in REQUESTS.glob("contradiction-*.yaml"))
 
 
 def marked(names):
-    """Return wishes as parameters; a search whose proposals are judged as solids takes minutes."""
+    """Return requests as parameters; a search whose proposals are judged as solids takes minutes."""
     return [pytest.param(name, marks=pytest.mark.slow if name in SLOW else pytest.mark.long) for name in names]
 
 
 def suggested(name, out, *options):
-    """Return the exit code of a wish, and the numbers of its proposals."""
-    code = main(["suggest", str(WISHES / f"{name}.yaml"), "-o", str(out), "-q", "--no-plots", *options])
+    """Return the exit code of a request, and the numbers of its proposals."""
+    code = main(["suggest", str(REQUESTS / f"{name}.yaml"), "-o", str(out), "-q", "--no-plots", *options])
     file = out / "metrics.json"
     return code, json.loads(file.read_text()) if file.exists() else None
 
@@ -47,9 +47,9 @@ def check_proposals(found, out):
 @pytest.fixture(scope="module")
 def published(tmp_path_factory):
     """Return the folder of a search for the published cam, and what it printed."""
-    out, page = tmp_path_factory.mktemp("a wish's") / "out", io.StringIO()
+    out, page = tmp_path_factory.mktemp("a request's") / "out", io.StringIO()
     with redirect_stdout(page):
-        code = main(["suggest", str(WISHES / "cam-published.yaml"), "-o", str(out), "-j", "1", "--no-plots"])
+        code = main(["suggest", str(REQUESTS / "cam-published.yaml"), "-o", str(out), "-j", "1", "--no-plots"])
     assert code == 0
     return out, page.getvalue()
 
@@ -82,9 +82,16 @@ def test_the_next_line_is_a_command_that_writes_files_to_cut(published, tmp_path
 def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
     one = {"family": "cam", "variant": "2 springs", "mean": 20.0, "ripple": 0.01, "across": 1.0, "along": 2.0}
     one |= {"depth": None, "safety_factor": None, "parts": 3, "hysteresis": None, "model": "quasi-static"}
-    one |= {"unjudged": [], "warnings": []}
+    one |= {"unjudged": [], "warnings": [], "verdict": "meets", "life": None, "yield": None}
     both = [one | {"folder": "1-cam-2-springs"}, one | {"folder": "10-cam"}]
-    data = {"message": "2 mechanisms meet the wish", "proposals": both, "wish": {}, "near_misses": [], "unjudged": []}
+    data = {
+        "message": "2 mechanisms meet the requirements",
+        "proposals": both,
+        "suggest": {},
+        "near_misses": [],
+        "unjudged": [],
+        "order": ["size"],
+    }
     written = Written("out", ("1-cam-2-springs/design.yaml", "10-cam/design.yaml", "10-cam/metrics.json"))
     document = document_of(data | {"families": [], "warnings": []}, ExitCode.OK, written)
     notes = [note.text for note in document.notes if note.word == "note"]
@@ -92,7 +99,7 @@ def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
     assert "the time ran out: of 1-cam-2-springs only design.yaml was written" in notes[0]
 
 
-def test_a_wish_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):
+def test_a_request_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):
     """A thousand times the torque that a coin cannot give: nobody begins a design."""
     code, found = suggested("unreachable-torque-of-a-coin", tmp_path / "out", "-j", "1", "--torque", "500 N*m")
     assert (code, found["proposals"]) == (4, [])
@@ -100,8 +107,8 @@ def test_a_wish_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_p
     assert all(one["reason"] for one in found["families"])
 
 
-@pytest.mark.slow  # the nearest wishes are designed and analysed: some 50 s of processor time
-def test_a_wish_beyond_everybody_ends_with_4_and_the_nearest_one(tmp_path):
+@pytest.mark.slow  # the nearest requests are designed and analysed: some 50 s of processor time
+def test_a_request_beyond_everybody_ends_with_4_and_the_nearest_one(tmp_path):
     code, found = suggested("unreachable-rubber", tmp_path / "out", "-j", "1", "--time-budget", "600s")
     assert code == 4
     assert found["proposals"] == []
@@ -125,7 +132,7 @@ def test_a_finished_search_is_reused_by_content(tmp_path):
 
 
 @pytest.mark.parametrize("name", marked(FEASIBLE))
-def test_no_proposal_of_a_feasible_wish_misses_it(name, tmp_path):
+def test_no_proposal_of_a_feasible_request_misses_it(name, tmp_path):
     """By beams all are in reach; not all pass as solids, and links of soft materials bend under their springs."""
     code, found = suggested(name, tmp_path / "out", "--time-budget", "600s")
     assert code == (0 if found["proposals"] else 6 if found["unjudged"] else 4)
@@ -135,7 +142,7 @@ def test_no_proposal_of_a_feasible_wish_misses_it(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", marked(UNREACHABLE))
-def test_no_wish_beyond_reach_gets_a_proposal(name, tmp_path):
+def test_no_request_beyond_reach_gets_a_proposal(name, tmp_path):
     code, found = suggested(name, tmp_path / "out", "--time-budget", "600s")
     assert (code, found["proposals"]) == (4, [])
 

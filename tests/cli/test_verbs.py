@@ -165,7 +165,7 @@ def test_new_never_replaces_a_file(cli, cam):
     for arguments in (("new", "cam"), ("new", "cam", "-o", cam)):
         done = cli(*arguments)
         assert done.code == 7
-        assert "a file of that name is in the way" in done.err
+        assert "the file exists" in done.err
     assert (cli.folder / cam).read_text() == "mine"
 
 

@@ -199,4 +199,4 @@ def test_python_measures_files_and_arrays_alike(tmp_path):
                 continue
             assert found.numbers.filtered[name].value == pytest.approx(value.value, rel=1e-9, abs=1e-12), name
     assert names(*one.warnings) == {"reversals"}
-    assert one.data["metrics"]["force_mean[load]"]["unit"] == "N"
+    assert one.data["metrics"]["force_mean"]["unit"] == "N"

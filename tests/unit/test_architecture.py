@@ -176,7 +176,7 @@ ROOMS = {
     "design": "design",
     "draw": "figures",
     "outline": "outline",
-    "propose": "proposals_for_wish",
+    "propose": "proposals",
     "part": "part",
     "free": "redesign_variables_and_process_errors",
     "errors": "redesign_variables_and_process_errors",

@@ -18,7 +18,7 @@ from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.row_blocks_for_journal import joined
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
-from cfmkit.studies.varied_axes import axes, wishes
+from cfmkit.studies.varied_axes import axes, collect_variations
 
 CLOSED = (
     "cam", "cam_catalogue", "cam_friction", "cam_gravity", "cam_no_undercut", "cam_preloaded", "cam_six_springs",
@@ -47,7 +47,7 @@ def config(stem):
 
 def work(spec=SPEC, ranges=RANGES, count=60, names=()):
     """Return a study of points drawn in ranges, by default with every metric that a sweep notes."""
-    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", count))
+    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", count))
     return Work(Study(spec, plan.paths, metrics_of(spec, names, cfmkit.analyze(spec).curve)), plan)
 
 
@@ -318,7 +318,7 @@ def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_
         {"analysis.travel": None, "analysis.window": ("240 mm", "100 %"), "requirements": []}
     )
     ranges = {"mechanism.springs.stiffness.0": "0.65 N/mm:0.73 N/mm"}
-    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 4))
+    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 4))
     many = Work(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan)
     assert {run(many).row(k).status(0) for k in range(4)} == {
         (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import re
-import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -85,13 +84,3 @@ def test_after_the_sign_of_equality_come_the_words_of_a_closed_choice():
     found = completed("mechanism.positive.structure=", spec=str(ROOT / "configs/vcfm_pla.yaml"))
     assert "mechanism.positive.structure=diamond" in found
     assert completed("mechanism.positive.length=", spec=str(ROOT / "configs/vcfm_pla.yaml")) == []
-
-
-def test_the_recipe_for_conda_needs_what_the_package_needs():
-    other = {"matplotlib-base": "matplotlib"}
-    recipe = (ROOT / "conda" / "meta.yaml").read_text()
-    run = recipe[recipe.index("  run:") : recipe.index("\ntest:")]
-    listed = {tuple(line.strip("- ").split(" >=")) for line in run.splitlines()[1:] if ">=" in line}
-    listed = {(other.get(name, name), version) for name, version in listed if name != "python"}
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert listed == {tuple(one.lower().split(">=")) for one in project["dependencies"]}

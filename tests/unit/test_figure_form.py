@@ -124,7 +124,7 @@ def test_a_style_file_changes_the_look_and_only_inside(cam, tmp_path):
         ({"style": "nowhere.mplstyle"}, "cannot be read"),
     ],
 )
-def test_a_malformed_wish_is_refused_in_one_line(given, reported):
+def test_a_malformed_request_is_refused_in_one_line(given, reported):
     with pytest.raises(UsageError, match=re.escape(reported)):
         form_of(**given)
 

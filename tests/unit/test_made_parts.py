@@ -259,16 +259,9 @@ def test_the_estimate_and_the_test_plan_draw_the_parts_that_a_study_draws():
     assert assumed.parameters[at].spread.deviation == pytest.approx(3e-5)  # what a laser is assumed to hold
 
 
-@pytest.mark.parametrize(
-    ("fate", "value", "ends"), [("bad", 0.5, (0.5, 0.5)), ("unknown", None, None), ("either", 0.6, (0.5, 0.7))]
-)
-def test_a_share_says_what_failed_parts_count_as(fate, value, ends):
-    share = Share.of(np.arange(10) < 5, np.arange(10) >= 8, fate)
+def test_failed_parts_count_as_bad_ones():
+    share = Share.of(np.arange(10) < 5, np.arange(10) >= 8)
     assert (share.good, share.failed, share.count) == (5, 2, 10)
     found = share.as_json()
-    assert found["value"] == value
-    if value is None:
-        assert found["wilson"] == found["clopper_pearson"] == [None, None]
-        return
-    assert share.ends == ends
-    assert found["clopper_pearson"] == [clopper_pearson(5, 10)[0], clopper_pearson(round(10 * ends[1]), 10)[1]]
+    assert found["value"] == 0.5
+    assert found["clopper_pearson"] == list(clopper_pearson(5, 10))

@@ -15,7 +15,7 @@ from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
-from cfmkit.studies.varied_axes import wish
+from cfmkit.studies.varied_axes import parse_variation
 
 TORQUE = cfmkit.load("configs/slider_crank_li2019.yaml")
 CAM = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
@@ -80,7 +80,7 @@ def test_a_bound_of_a_force_on_a_torque_is_refused_once_the_curve_is_known():
 def test_a_sweep_over_torques_notes_either_name_in_the_same_bytes():
     from cfmkit.studies.tables import results_csv
 
-    options = wish(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]")
+    options = parse_variation(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]")
     written = []
     for name in ("force_ripple", "torque_ripple"):
         work = prepare(TORQUE, SweepRequest(vary=(options,), metrics=(name, "torque_mean")))
@@ -91,7 +91,7 @@ def test_a_sweep_over_torques_notes_either_name_in_the_same_bytes():
 
 def test_the_best_point_follows_a_requirement_under_its_other_name():
     spec = with_requirements({"metric": "force_max", "max": "1 N*m"})
-    work = prepare(spec, SweepRequest(vary=(wish(f"{STIFFNESS}=[1.1 N/cm, 1 N/cm]"),)))
+    work = prepare(spec, SweepRequest(vary=(parse_variation(f"{STIFFNESS}=[1.1 N/cm, 1 N/cm]"),)))
     names = work.study.names
     found = Summary(work.study, main_columns(work.study, ()))
     for indices, rows in run(work).batches():
@@ -123,7 +123,7 @@ def test_a_branch_that_a_family_cannot_have_is_refused_with_those_it_has(tmp_pat
 
 
 def test_default_columns_of_a_torque_are_torques():
-    work = prepare(TORQUE, SweepRequest(vary=(wish(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]"),)))
+    work = prepare(TORQUE, SweepRequest(vary=(parse_variation(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]"),)))
     sample = sample_curve(TORQUE, work.plan, False)
     assert sample.kind == "torque"
     own = values_of_family(family("slider-crank").values)
@@ -133,7 +133,7 @@ def test_default_columns_of_a_torque_are_torques():
 @pytest.mark.parametrize("names", [("torque_mean", "half_band"), ("force_mean", "half_band")])
 def test_a_block_of_torques_takes_either_name_and_bounds_of_a_torque(names):
     spec = with_requirements({"metric": "force_max", "max": "150 N*mm"})
-    work = prepare(spec, SweepRequest(vary=(wish(f"{STIFFNESS}=1 N/cm:20 N/cm:9"),), metrics=names))
+    work = prepare(spec, SweepRequest(vary=(parse_variation(f"{STIFFNESS}=1 N/cm:20 N/cm:9"),), metrics=names))
     assert work.vectorised
     (rows,) = [rows for _, rows in run(work).batches()]
     alone = [work.study.evaluate(work.plan.point(k)) for k in range(9)]

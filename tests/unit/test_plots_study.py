@@ -12,7 +12,7 @@ from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
-from cfmkit.studies.varied_axes import wishes
+from cfmkit.studies.varied_axes import collect_variations
 from cfmkit.tables import Table, TableColumn
 
 X = np.repeat(np.linspace(1.0, 3.0, 5), 4)
@@ -188,13 +188,13 @@ def _texts(figure):
 
 @pytest.mark.parametrize(("count", "shape"), [(1, (20,)), (2, (5, 4)), (2, ()), (3, (5, 2, 2))])
 def test_every_picture_of_a_sweep_says_whose_it_is_and_what_its_marks_mean(count, shape):
-    case = replace(found(count, shape), name="my-cam", best_words="best: smallest force ripple, first of 4 as good")
+    case = replace(found(count, shape), name="my-cam", best_words="best: smallest force ripple (4 tie)")
     for draw in figures(case).values():
         figure = draw()
         assert any(text.startswith("my-cam: ") for text in _texts(figure))
         (key,) = figure.legends
         assert [text.get_text() for text in key.get_texts()] == [
-            "best: smallest force ripple, first of 4 as good",
+            "best: smallest force ripple (4 tie)",
             "requirement missed, or not solved",
         ]
 
@@ -207,8 +207,8 @@ def test_a_key_has_only_the_marks_that_occur():
 
 def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
     spec = cfmkit.load("configs/cam.yaml").replace({"requirements": ()})
-    wish = wishes({"mechanism.rolling_friction": (0.001, 0.002)})
-    work = prepare(spec, SweepRequest(vary=wish, metrics=("force_ripple", "force_mean")))
+    request = collect_variations({"mechanism.rolling_friction": (0.001, 0.002)})
+    work = prepare(spec, SweepRequest(vary=request, metrics=("force_ripple", "force_mean")))
     records = run(work)
     summary = summary_of(records)
     for batch in records.batches():
@@ -220,8 +220,8 @@ def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
 
 def test_points_that_are_as_good_as_the_best_are_counted():
     spec = cfmkit.load("configs/cam.yaml")
-    wish = wishes({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
-    records = run(prepare(spec, SweepRequest(vary=wish, metrics=("force_ripple",))))
+    request = collect_variations({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
+    records = run(prepare(spec, SweepRequest(vary=request, metrics=("force_ripple",))))
     summary = summary_of(records)
     for batch in records.batches(1):  # one at a time: ties are counted across batches
         summary.add(*batch)
@@ -231,8 +231,8 @@ def test_points_that_are_as_good_as_the_best_are_counted():
 
 @pytest.mark.parametrize("at_once", [1, 3])
 def test_of_points_that_only_rounding_tells_apart_the_first_is_the_best(at_once):
-    wish = wishes({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
-    records = run(prepare(cfmkit.load("configs/cam.yaml"), SweepRequest(vary=wish, metrics=("force_ripple",))))
+    request = collect_variations({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
+    records = run(prepare(cfmkit.load("configs/cam.yaml"), SweepRequest(vary=request, metrics=("force_ripple",))))
     summary = summary_of(records)
     for indices, rows in records.batches(at_once):
         rounding = 1.0 - 1e-13 * np.asarray(indices)[:, None]
@@ -256,8 +256,8 @@ def test_the_nominal_curve_is_read_in_one_pass_over_the_cells(monkeypatch):
 def test_parameters_of_the_same_last_name_are_told_apart():
     """A map of two structures had 'structure' on both axes."""
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"requirements": ()})
-    wish = wishes({f"mechanism.{part}.width": ("5 mm", "6 mm") for part in ("bistable", "positive")})
-    records = run(prepare(spec, SweepRequest(vary=wish, metrics=("force_ripple",))))
+    request = collect_variations({f"mechanism.{part}.width": ("5 mm", "6 mm") for part in ("bistable", "positive")})
+    records = run(prepare(spec, SweepRequest(vary=request, metrics=("force_ripple",))))
     summary = summary_of(records)
     for batch in records.batches():
         summary.add(*batch)

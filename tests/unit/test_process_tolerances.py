@@ -82,14 +82,14 @@ def test_what_is_assumed_is_of_the_materials_that_beams_have():
 def test_a_cam_whose_parts_end_in_its_window_gets_no_number_one_with_shares_does_and_a_design_with_tolerances_no_line():
     cam = cfmkit.load("configs/cam.yaml")
     stated = (Requirement(metric="deviation_from_target", max="3 %", over=("5 mm", "240 mm")),)
-    made = dict(designed(cam.replace({"requirements": stated}), Run()).supplement.lines)["made"]
+    made = dict(designed(cam.replace({"requirements": stated}), Run()).supplement.lines)["yield"]
     assert made.startswith("no yield is estimated for the assumed tolerances of laser: ")
-    made = dict(designed(cam, Run()).supplement.lines)["made"]
-    assert made.startswith("about 23 % of parts would meet the requirements if made by laser")
+    made = dict(designed(cam, Run()).supplement.lines)["yield"]
+    assert made.startswith("about 23 % (laser, assumed tolerances)")
     assert "rates of springs within 5 %" in made
     toleranced = cam.replace({"design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}})
     found = designed(toleranced.replace({"design.samples": 20}), Run())
-    assert "made" not in dict(found.supplement.lines)
+    assert "yield" not in dict(found.supplement.lines)
 
 
 def test_the_estimate_does_not_solve_the_design_again(monkeypatch):

@@ -171,7 +171,7 @@ WARNED = {
         *changed("analysis.dynamics.method=multibody", "mechanism.mounting={elevation: 0 deg}"),
     ),
     "corner in nine coordinates": (
-        *("cam", "contact_not_single_valued", "analyze", MOVING),
+        *("cam", "undercut", "analyze", MOVING),
         *changed("analysis.dynamics.method=multibody", "analysis.dynamics.slider_position=188.6 mm"),
     ),
     "roller that hangs": (

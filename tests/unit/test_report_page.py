@@ -253,17 +253,18 @@ def test_a_batch_links_the_page_of_each_and_escapes_what_it_says():
     assert "1 invalid" in outline.text
 
 
-def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
+def test_a_request_has_a_page_with_every_proposal_and_why_there_are_no_more():
     one = {
         "family": "cam", "variant": HOSTILE, "mean": 20.0, "ripple": 0.0123, "hysteresis": None, "safety_factor": 1.7,
         "across": 80.0, "along": 90.5, "depth": None, "parts": 12, "life": None, "stiffening": None,
         "folder": "1-cam-a b", "misses": [], "notes": [HOSTILE], "model": "quasi-static", "unjudged": [HOSTILE],
-        "warnings": [HOSTILE],
+        "warnings": [HOSTILE], "verdict": "meets", "yield": None,
     }  # fmt: skip
     reported = {
-        "status": "complete", "message": "1 meets the wish", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
-        "proposals": [one], "unjudged": [],
-        "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
+        "status": "complete", "message": "1 meets the requirements",
+        "suggest": {"force": "20 N", "envelope": ["1 mm", "2 mm"]},
+        "proposals": [one], "unjudged": [], "order": ["size"],
+        "near_misses": [one | {"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"], "verdict": "fails"}],
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip
@@ -273,5 +274,5 @@ def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
     assert outline.unbalanced == []
     assert {tag for tag, _ in outline.tags}.isdisjoint({"script", "img"})
     assert [attributes["href"] for tag, attributes in outline.tags if tag == "a"] == ["1-cam-a%20b/report.html"]
-    for part in ("20 N, room 1 mm x 2 mm", "1.2 %", "80 x 90.5 mm", "ripple 9 % > 5 %", "travel 4 mm", HOSTILE):
+    for part in ("20 N, envelope 1 mm x 2 mm", "1.2 %", "80x90.5 mm", "ripple 9 % > 5 %", "travel 4 mm", HOSTILE):
         assert part in outline.text, part

@@ -222,7 +222,7 @@ def test_the_tolerance_that_matters_is_the_one_to_tighten():
     # Halving a tolerance takes three quarters of its share of the variance away.
     np.testing.assert_allclose(drop.value, [0.75 * 9 / 11, 0.75 * 2 / 11], atol=0.01)
     assert (drop.low < drop.value).all()
-    gain = monte_carlo_yield.yield_gains(np.abs(outputs) < 4, np.zeros(outputs.shape, bool), "fail")
+    gain = monte_carlo_yield.yield_gains(np.abs(outputs) < 4, np.zeros(outputs.shape, bool))
     exact = [
         (2 * NormalDist(0, sqrt(after)).cdf(4) - 1) - (2 * NormalDist(0, sqrt(11)).cdf(4) - 1)
         for after in (9 / 4 + 2, 9 + 2 / 4)
@@ -234,7 +234,7 @@ def test_the_tolerance_that_matters_is_the_one_to_tighten():
 def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
     points = made([normal(1.0), normal(0.1)], np.eye(2), 1000, groups=((1,),))
     met = np.abs(points.sum(axis=2)) < 1
-    gain = monte_carlo_yield.yield_gains(met, np.zeros(met.shape, bool), "fail")
+    gain = monte_carlo_yield.yield_gains(met, np.zeros(met.shape, bool))
     alone = Share.of(met[:, 0], np.zeros(len(met), bool)).wilson
     assert gain.high[0] - gain.low[0] < 0.5 * (alone[1] - alone[0])
 

@@ -289,7 +289,7 @@ def test_caps_on_rates_and_springs_that_are_not_needed_are_told():
     assert {"spring_at_bound", "spring_dropped"} <= names
 
 
-def test_slack_lets_other_wishes_decide():
+def test_slack_lets_other_requests_decide():
     window = {"torque": "2 N*mm", "angle": ("0.866 deg", "4.866 deg")}
     best = cfmkit.design(config("li2019", design=window))
     even = cfmkit.design(config("li2019", design=window | {"slack": "0.05 %", "prefer": "even-rates"})).spec

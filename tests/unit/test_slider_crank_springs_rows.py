@@ -17,7 +17,7 @@ from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import zipped
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
-from cfmkit.studies.varied_axes import axes, wishes
+from cfmkit.studies.varied_axes import axes, collect_variations
 
 PATHS = tuple(f"mechanism.springs.{name}" for name in ("pivot", "crank_pin", "slider_pin", "slider"))
 
@@ -237,12 +237,12 @@ def test_words_are_drawn_as_regions_and_as_steps():
 def test_lists_side_by_side_may_repeat_a_value_but_not_a_set():
     spec = config("li2019")
     lists = {PATHS[0]: ("0 N*mm/rad", "1 N*mm/rad", "1 N*mm/rad"), PATHS[1]: ("1 N*mm/rad", "0 N*mm/rad", "1 N*mm/rad")}
-    assert len(zipped(axes(spec, wishes(lists), joint=True))) == 3
+    assert len(zipped(axes(spec, collect_variations(lists), joint=True))) == 3
     with pytest.raises(cfmkit.SpecError, match="appears twice"):
-        axes(spec, wishes(lists))
+        axes(spec, collect_variations(lists))
     twice = {path: (*values, values[0]) for path, values in lists.items()}
     with pytest.raises(cfmkit.UsageError, match="number 4 repeats number 1"):
-        zipped(axes(spec, wishes(twice), joint=True))
+        zipped(axes(spec, collect_variations(twice), joint=True))
 
 
 def test_a_sensitivity_of_a_word_is_refused():

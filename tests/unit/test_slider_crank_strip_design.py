@@ -165,7 +165,7 @@ def test_a_strip_without_force_all_the_way_is_no_design(monkeypatch: pytest.Monk
     free = "design.beam={shape: uniform, goal: ripple, width: 5 mm, stressed: false}"
     refused = cfmkit.design(spec("strip", free))
     assert refused.status is Status.INFEASIBLE
-    assert "has no force all the way (solved over everything that was requested)" in refused.message
+    assert "has no force all the way (solved over the full travel)" in refused.message
 
 
 def test_a_strip_that_breaks_its_band_where_it_begins_is_searched_with_more_in_reserve(

@@ -22,7 +22,7 @@ from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.serial_and_cluster_executors import Cluster, stamp_of
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
-from cfmkit.studies.varied_axes import axes, wish
+from cfmkit.studies.varied_axes import axes, parse_variation
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cfmkit[cluster]'")
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -31,7 +31,7 @@ SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 2001})
 
 
 def work(count):
-    plan = grid(axes(SPEC, [wish(f"mechanism.profile.friction=0:0.002:{count}")]))
+    plan = grid(axes(SPEC, [parse_variation(f"mechanism.profile.friction=0:0.002:{count}")]))
     return Work(Study(SPEC, plan.paths, metrics_of(SPEC, ("force_mean", "force_ripple"))), plan)
 
 
@@ -110,7 +110,7 @@ def test_a_local_cluster_gives_the_same_bytes_though_a_worker_of_it_is_killed(bl
         asked = ("mechanism.brace_length=[60 mm, 200 mm, -1 mm]", "mechanism.rolling_friction=0:0.01:20")
         asked = (*asked, "analysis.gravity=[true, false]")
     names = ("force_mean", "force_ripple", "theoretical_force")
-    plan = grid(axes(spec, [wish(option) for option in asked]))
+    plan = grid(axes(spec, [parse_variation(option) for option in asked]))
     many = Work(Study(spec, plan.paths, metrics_of(spec, names), curves=not block), plan)
     assert many.vectorised is block
     killer = Killer(workers_of_this_process, len(plan) // 10)

@@ -23,7 +23,7 @@ from cfmkit.studies.row_blocks_for_journal import ResultRows, squeezed, unsqueez
 from cfmkit.studies.summary import Objective, Summary
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
 from cfmkit.studies.tables import results_csv
-from cfmkit.studies.varied_axes import axes, wish, wishes
+from cfmkit.studies.varied_axes import axes, collect_variations, parse_variation
 from cfmkit.tables import read_csv
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
@@ -32,7 +32,7 @@ BRACE = "mechanism.brace_length=[60 mm, 200 mm, 100 m, -1 mm]"
 
 
 def work(*options, spec=SPEC, names=("force_mean", "force_mean[load]", "theoretical_force"), **more):
-    plan = grid(axes(spec, [wish(option) for option in options]))
+    plan = grid(axes(spec, [parse_variation(option) for option in options]))
     return Work(Study(spec, plan.paths, metrics_of(spec, names), **more), plan)
 
 
@@ -129,7 +129,7 @@ def test_a_point_is_designed_as_the_design_verb_does_it(monkeypatch):
     spec = spec.replace({"design.verify": "solid"})
     made = cfmkit.design(spec).spec
     assert (made.mechanism.crank_length, made.mechanism.offset) == (0.0401, 0.0003)
-    study = prepare(spec, SweepRequest(wishes({"mechanism.offset": ["0 mm", "0.1 mm"]}), design=True)).study
+    study = prepare(spec, SweepRequest(collect_variations({"mechanism.offset": ["0 mm", "0.1 mm"]}), design=True)).study
     assert study.solve(spec).spec.mechanism == made.mechanism
 
 
@@ -365,7 +365,7 @@ def test_a_stopped_study_has_the_rows_that_were_finished():
 
 
 def test_the_default_columns_are_every_metric_that_such_a_curve_can_have():
-    option = wish("mechanism.brace_length=[60 mm, 200 mm]")
+    option = parse_variation("mechanism.brace_length=[60 mm, 200 mm]")
     lost = SPEC.replace({"mechanism.brace_length": 0.06})
     curve = sample_curve(lost, grid(axes(lost, [option])), design=False)
     assert curve is not None

@@ -8,14 +8,14 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, names
 from cfmkit.studies.plan import Draw, grid, sampled, zipped
 from cfmkit.studies.variable_paths import leaf, paths
-from cfmkit.studies.varied_axes import axes, wish, wishes
+from cfmkit.studies.varied_axes import axes, collect_variations, parse_variation
 
 SPEC = cfmkit.load("configs/cam.yaml")
 RADIUS = "mechanism.roller_radius"
 
 
 def read(*options, drawn=False):
-    return axes(SPEC, [wish(option) for option in options], drawn)
+    return axes(SPEC, [parse_variation(option) for option in options], drawn)
 
 
 def test_a_range_has_both_ends_and_short_decimals_between_them():
@@ -45,7 +45,7 @@ def test_a_list_holds_numbers_words_and_switches(option, values):
 
 def test_a_value_of_a_list_in_the_spec_varies_by_its_index():
     spec = cfmkit.load("configs/cam_six_springs.yaml")
-    plan = grid(axes(spec, [wish("mechanism.springs.stiffness.2=0.6 N/mm:0.7 N/mm:2")]))
+    plan = grid(axes(spec, [parse_variation("mechanism.springs.stiffness.2=0.6 N/mm:0.7 N/mm:2")]))
     changed = spec.replace({plan.paths[0]: plan.point(0)[0]})
     assert changed.mechanism.springs.stiffness[2] == 600.0
     assert changed.mechanism.springs.stiffness[3] == spec.mechanism.springs.stiffness[3]
@@ -140,10 +140,10 @@ def test_what_cannot_vary_is_named_with_the_cure(option, message):
 @pytest.mark.parametrize("option", ["mechanism.roller_radius", "mechanism.roller_radius=", "=[1]", "a..b=[1]"])
 def test_a_malformed_option_is_a_matter_of_usage(option):
     with pytest.raises(UsageError, match="--vary"):
-        wish(option)
+        parse_variation(option)
 
 
-def test_every_fault_of_every_wish_is_told_at_once():
+def test_every_fault_of_every_request_is_told_at_once():
     with pytest.raises(SpecError) as caught:
         read("mechanism.x=[1]", f"{RADIUS}=8:9:3", "analysis.points=[7]", "analysis.points=[8]")
     assert len(caught.value.problems) == 3
@@ -156,7 +156,7 @@ def test_ranges_to_draw_from_have_no_steps():
 
 
 def test_a_block_of_the_specification_says_the_same_as_options():
-    block = wishes({RADIUS: "8 mm:16 mm:5", "analysis.path_method": ["ode"]})
+    block = collect_variations({RADIUS: "8 mm:16 mm:5", "analysis.path_method": ["ode"]})
     assert grid(axes(SPEC, block)).block(0, 5)[0].tolist() == grid(read(f"{RADIUS}=8mm:16mm:5")).block(0, 5)[0].tolist()
 
 

@@ -1,4 +1,4 @@
-"""Wishes: what they may say, what families answer, and that only what does everything is shown."""
+"""Requests: what they may say, what families answer, and that only what does everything is shown."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
+from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, seconds
 from cfmkit.designing.run_many_starts import NEVER
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
-from cfmkit.families.beam.proposals_for_wish import kept_shapes
+from cfmkit.families.beam.proposals import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
-from cfmkit.families.slider_crank.proposals_for_wish import PUSHED, _strip, largest_printed
-from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
-from cfmkit.families.wishes import FamilyOffer
+from cfmkit.families.slider_crank.proposals import PUSHED, _strip, largest_printed
+from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, wound
+from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
-from cfmkit.runs.read_wish import wish_of
+from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.specs.units import TravelShare
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
@@ -32,31 +32,38 @@ from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import pareto_and_scale_drawings, proposal_making_and_judging, search, yield_of_proposal
-from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.relaxed_requests import nearest
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
 
-WISHES = Path(__file__).parents[1] / "wishes"
+REQUESTS = Path(__file__).parents[1] / "requests"
 
-POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
+POM = {
+    "safety": "1",
+    "force": "10 N",
+    "travel": "3 mm",
+    "ripple": "3 %",
+    "envelope": "[80 mm, 60 mm, 12 mm]",
+    "material": "pom",
+}
 
 
-def wish(**keys):
-    return wish_of(None, POM | keys).wish()
+def request(**keys):
+    return read_request(None, POM | keys).request()
 
 
-@pytest.mark.parametrize("path", sorted(WISHES.glob("contradiction-*.yaml")), ids=lambda path: path.stem)
-def test_a_wish_that_contradicts_itself_is_refused_in_one_line(path):
+@pytest.mark.parametrize("path", sorted(REQUESTS.glob("contradiction-*.yaml")), ids=lambda path: path.stem)
+def test_a_request_that_contradicts_itself_is_refused_in_one_line(path):
     with pytest.raises(SpecError) as error:
-        wish_of(str(path), {})
+        read_request(str(path), {})
     assert len(error.value.problems) == 1
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("path", sorted((WISHES / "sources").glob("*.yaml")), ids=lambda path: path.stem)
-def test_a_feasible_wish_is_in_reach_of_its_own_family(path):
+@pytest.mark.parametrize("path", sorted((REQUESTS / "sources").glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_feasible_request_is_in_reach_of_its_own_family(path):
     spec = cfmkit.load(path)
-    asked = wish_of(str(WISHES / path.name), {}).wish()
+    asked = read_request(str(REQUESTS / path.name), {}).request()
     offer = function_named(family(spec.family).propose)(asked, Run())
     assert offer.candidates, offer.reason
 
@@ -67,13 +74,13 @@ LASTING = f"{{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 40 M
 
 def test_more_cycles_than_a_material_is_known_for_are_refused_in_one_line():
     with pytest.raises(SpecError, match=r"'cycles' is 2e.06, more than the 1e.06 at which 'points' end") as error:
-        wish(material=f"[pom, {LASTING}]", cycles="2000000")
+        request(material=f"[pom, {LASTING}]", cycles="2000000")
     assert len(error.value.problems) == 1
-    assert wish(material=f"[pom, {LASTING}]", cycles="1000000").cycles == 1_000_000
+    assert request(material=f"[pom, {LASTING}]", cycles="1000000").cycles == 1_000_000
 
 
 def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_known_to_last():
-    keys = {"force": "11.14 N", "travel": "3.23 mm", "room": "[110 mm, 80 mm, 20 mm]", "cycles": "10000"}
+    keys = {"force": "11.14 N", "travel": "3.23 mm", "envelope": "[110 mm, 80 mm, 20 mm]", "cycles": "10000"}
     asked, candidates = offered("vcfm", **keys, material=LASTING)
     coiled = next(one for one in candidates if one.variant == "2 Vs, catalogue springs")
     one = made(ProposalJob("vcfm", coiled, asked, 0))
@@ -89,7 +96,7 @@ def test_a_family_that_fails_to_answer_does_not_look_as_if_the_time_were_up():
     def crashed(work, jobs, stopping):
         yield from ((job, Lost(Status.CRASHED, "a bug in cfmkit: oh")) for job in jobs)
 
-    found = suggest(wish(), Run(executor=crashed))
+    found = suggest(request(), Run(executor=crashed))
     assert not found.late
     assert {one.offer.reason for one in found.answers} == {"a bug in cfmkit: oh"}
 
@@ -111,7 +118,7 @@ def test_a_bug_costs_its_own_candidate_only_and_keeps_its_traceback(monkeypatch,
     monkeypatch.setattr(search, "function_named", lambda _: offer)
     monkeypatch.setattr(proposal_making_and_judging, "function_named", lambda _: broken)
     monkeypatch.setattr(search, "_with_nearest", lambda answers, *_: answers)
-    found = suggest(wish(), Run())
+    found = suggest(request(), Run())
     reasons = [*found.failed.get("cam", ()), *(one.offer.reason for one in found.answers if one.offer.reason)]
     assert reasons == ["a bug in cfmkit: KeyError: 'analysis.window'"]
     assert len(found.bugs) == 1
@@ -121,12 +128,12 @@ def test_a_bug_costs_its_own_candidate_only_and_keeps_its_traceback(monkeypatch,
 
 
 def test_options_replace_keys_of_a_file(tmp_path):
-    file = tmp_path / "wish.yaml"
-    file.write_text("cfmkit: 1\nwish: {force: 10 N, travel: 3 mm, room: [80 mm, 60 mm]}\n")
-    block = wish_of(str(file), {"force": "[9 N, 11 N]"})
-    assert block.wish().banded
-    assert block.wish().low == pytest.approx(9.0)
-    assert block.wish().travel == pytest.approx(3e-3)
+    file = tmp_path / "request.yaml"
+    file.write_text("cfmkit: 1\nsuggest: {force: 10 N, travel: 3 mm, envelope: [80 mm, 60 mm]}\n")
+    block = read_request(str(file), {"force": "[9 N, 11 N]"})
+    assert block.request().banded
+    assert block.request().low == pytest.approx(9.0)
+    assert block.request().travel == pytest.approx(3e-3)
 
 
 def test_a_material_named_again_is_one_more_and_replaces_none():
@@ -141,8 +148,8 @@ def test_a_material_named_again_is_one_more_and_replaces_none():
 
 
 def test_a_room_and_a_time_may_be_written_short():
-    assert room("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
-    assert room("8cm x 60 mm") == "[8 cm, 60 mm]"
+    assert parse_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
+    assert parse_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
     assert seconds("90s") == 90.0
     assert seconds("2 min") == 120.0
     with pytest.raises(UsageError):
@@ -157,8 +164,8 @@ def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
     assert extension_spring(690.0, 0.132, 0.050) is None
 
 
-def test_a_proposal_keeps_the_wish_when_its_file_is_analysed():
-    asked = wish()
+def test_a_proposal_keeps_the_request_when_its_file_is_analysed():
+    asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
     found = [made(ProposalJob("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
     good = [one for one in found if one.good]
@@ -172,10 +179,10 @@ def test_a_proposal_keeps_the_wish_when_its_file_is_analysed():
         assert one.numbers["depth"] <= 0.012
 
 
-def test_what_misses_a_wish_says_which():
-    asked = wish()
+def test_what_misses_a_request_says_which():
+    asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
-    narrow = replace(asked, room=(0.010, 0.060, 0.012))
+    narrow = replace(asked, envelope=(0.010, 0.060, 0.012))
     one = made(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
     assert not one.good
     assert any("across the travel" in reported for reported in one.missed)
@@ -191,7 +198,7 @@ def few_parts(monkeypatch):
 
 
 def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts):
-    asked = wish(**PRINTED_CAM, **{"yield": "30 %"})
+    asked = request(**PRINTED_CAM, **{"yield": "30 %"})
     offer = function_named(family("cam").propose)(asked, Run())
     one = made(ProposalJob("cam", offer.candidates[0], asked, 3))
     assert one.good, one.missed
@@ -202,8 +209,8 @@ def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts)
     assert found.summary["yield"]["value"] == one.numbers["yield"]
 
 
-def test_a_wish_for_more_good_parts_than_there_are_is_missed(few_parts):
-    asked = wish(**PRINTED_CAM, **{"yield": "95 %"})
+def test_a_request_for_more_good_parts_than_there_are_is_missed(few_parts):
+    asked = request(**PRINTED_CAM, **{"yield": "95 %"})
     offer = function_named(family("cam").propose)(asked, Run())
     one = made(ProposalJob("cam", offer.candidates[0], asked, 3))
     assert one.near
@@ -212,21 +219,21 @@ def test_a_wish_for_more_good_parts_than_there_are_is_missed(few_parts):
     assert one.numbers["yield"] < 0.95
 
 
-def test_a_part_of_which_nobody_knows_the_errors_misses_a_wish_for_good_parts():
-    asked = wish_of(str(WISHES / "crank-lumped.yaml"), {"yield": "50 %"}).wish()
+def test_a_part_of_which_nobody_knows_the_errors_misses_a_request_for_good_parts():
+    asked = read_request(str(REQUESTS / "crank-lumped.yaml"), {"yield": "50 %"}).request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     flexures = next(one for one in offer.candidates if one.variant == "flexures")
     assert "its yield is not known" in " ".join(made(ProposalJob("slider-crank", flexures, asked, 0)).missed)
 
 
 def offered(name, **keys):
-    asked = wish(**keys)
+    asked = request(**keys)
     return asked, function_named(family(name).propose)(asked, Run()).candidates
 
 
 @pytest.mark.parametrize("variant", ["2 Vs, folded spring", "2 cosine arches"])
-def test_other_springs_and_leaves_do_what_is_wished(variant):
-    asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]")
+def test_other_springs_and_leaves_do_what_is_required(variant):
+    asked, candidates = offered("vcfm", envelope="[90 mm, 60 mm, 15 mm]")
     one = made(ProposalJob("vcfm", next(each for each in candidates if each.variant == variant), asked, 0))
     assert one.passes, one.missed or one.message
     kinds = one.spec.mechanism.kinds
@@ -237,7 +244,7 @@ def test_other_springs_and_leaves_do_what_is_wished(variant):
 def test_where_no_diamond_fits_leaves_stand_on_bought_springs(adjustable):
     """A V-beam on slender compression springs, read off its analysis, with 15 % more room."""
     block = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
-    keys = {"force": "11.14 N", "travel": "3.23 mm", "ripple": "0.6 %", "room": "[92.2 mm, 71.4 mm, 4.1 mm]"}
+    keys = {"force": "11.14 N", "travel": "3.23 mm", "ripple": "0.6 %", "envelope": "[92.2 mm, 71.4 mm, 4.1 mm]"}
     more = {} if adjustable is None else {"adjustable": adjustable}
     asked, candidates = offered("vcfm", **keys, material=block, **more)
     assert candidates[0].variant == "2 Vs, catalogue springs"
@@ -250,8 +257,8 @@ def test_where_no_diamond_fits_leaves_stand_on_bought_springs(adjustable):
 
 
 @pytest.mark.slow
-def test_hybrid_leaves_are_offered_and_need_a_rougher_wish():
-    asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]", ripple="9 %")
+def test_hybrid_leaves_are_offered_and_need_a_rougher_request():
+    asked, candidates = offered("vcfm", envelope="[90 mm, 60 mm, 15 mm]", ripple="9 %")
     hybrid = next(each for each in candidates if each.variant == "2 hybrid Vs")
     one = made(ProposalJob("vcfm", hybrid, asked, 0))
     assert one.passes, one.missed or one.message
@@ -260,7 +267,7 @@ def test_hybrid_leaves_are_offered_and_need_a_rougher_wish():
 
 def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
     band, room = "[19 N, 22 N]", "[120 mm, 80 mm, 20 mm]"  # wide strips of 20 N may have 9.6 % more
-    keys = {"force": band, "room": room, "material": "aluminium-7075-t6", "ripple": "5 %"}
+    keys = {"force": band, "envelope": room, "material": "aluminium-7075-t6", "ripple": "5 %"}
     asked, candidates = offered("slider-crank", **keys)
     found = {}
     for variant in ("strip", "pair of strips"):
@@ -277,8 +284,8 @@ def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
 @pytest.mark.parametrize("lengths", PUSHED)
 def test_the_largest_strip_of_some_proportions_just_fits_its_room(lengths, crank):
     """Pads of small parts are smaller, those of large ones are not larger: the box is that of the finished drawing."""
-    keys = {"force": "0.5 N", "travel": "2 mm", "room": "[1 m, 1 m, 5 mm]"}
-    spec = _strip(wish(**keys), {"name": "pom"}, lengths, crank, (1e-4, 0.05 * crank)).spec
+    keys = {"force": "0.5 N", "travel": "2 mm", "envelope": "[1 m, 1 m, 5 mm]"}
+    spec = _strip(request(**keys), {"name": "pom"}, lengths, crank, (1e-4, 0.05 * crank)).spec
     width = {"mechanism.beam.width": 4e-3, "mechanism.beam.thickness": 0.01 * crank}
     box = family("slider-crank").envelope(cfmkit.analyze(spec.replace({"design": None, **width})))
     assert largest_printed((box.across, box.along), lengths) == pytest.approx(crank, rel=2e-4)
@@ -289,26 +296,26 @@ def test_a_small_strip_with_pads_in_proportion_is_found():
     """A strip of half the published size in PETG does this; with pads of the usual size nothing fits."""
     room = "[50 mm, 78 mm, 2.95 mm]"
     asked, candidates = offered(
-        "slider-crank", force="0.417 N", travel="14 mm", ripple="2.2 %", room=room, material="petg"
+        "slider-crank", force="0.417 N", travel="14 mm", ripple="2.2 %", envelope=room, material="petg"
     )
     one = made(ProposalJob("slider-crank", next(one for one in candidates if one.variant == "strip"), asked, 0))
     assert one.passes, one.missed or one.message
 
 
 def test_a_material_without_a_known_strength_gets_designs_whose_stress_is_not_judged():
-    keys = {"force": "13 N", "travel": "1.98 mm", "ripple": "6 %", "room": "[95 mm, 72 mm, 14 mm]"}
-    asked = wish(**keys, material="{youngs_modulus: 1.477 GPa, poisson_ratio: 0.3}")
+    keys = {"force": "13 N", "travel": "1.98 mm", "ripple": "6 %", "envelope": "[95 mm, 72 mm, 14 mm]"}
+    asked = request(**keys, material="{youngs_modulus: 1.477 GPa, poisson_ratio: 0.3}")
     assert [one.materials[0]["yield_strength"] for one in asked.with_strengths] == [0.015 * 1.477e9, 0.04 * 1.477e9]
     candidate = search.offer_of(family("vcfm"), asked, Run()).candidates[0]
     one = made(ProposalJob("vcfm", candidate, asked, 0))
     assert one.passes, one.missed or one.message
     assert one.spec.mechanism.material.yield_strength is None
     assert any("no strength is known" in reason for reason in one.unjudged)
-    assert wish().with_strengths == (wish(),)
+    assert request().with_strengths == (request(),)
 
 
 def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
-    asked, candidates = offered("cam", room="[80 mm, 60 mm, 20 mm]")
+    asked, candidates = offered("cam", envelope="[80 mm, 60 mm, 20 mm]")
     one = next(each for each in candidates if each.variant == "catalogue springs")
     made_of = made(ProposalJob("cam", one, asked, 0))
     assert made_of.good, made_of.missed or made_of.message
@@ -319,7 +326,7 @@ def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
 
 
 def test_proposals_of_several_materials_say_which():
-    _, candidates = offered("beam", material="[pom, pla]", room="[80 mm, 60 mm]")
+    _, candidates = offered("beam", material="[pom, pla]", envelope="[80 mm, 60 mm]")
     assert {each.variant.rpartition(", ")[2] for each in candidates} == {"pom", "pla"}
 
 
@@ -332,13 +339,22 @@ def test_equal_names_are_told_apart_by_their_size():
     assert search.distinct([proposal(0.03)])[0].variant == "2 springs"
 
 
-def test_a_key_of_a_wish_is_listed_as_it_is_written():
+def test_a_key_of_a_request_is_listed_as_it_is_written():
     with pytest.raises(SpecError, match="cycles, yield, prefer"):
-        wish(colour="red")
+        request(colour="red")
+
+
+def test_words_of_before_are_refused_with_the_new_ones(tmp_path):
+    file = tmp_path / "old.yaml"
+    file.write_text("cfmkit: 1\nwish: {force: 10 N}\n")
+    with pytest.raises(SpecError, match="the key 'wish' was removed; write 'suggest'"):
+        read_request(str(file), {})
+    with pytest.raises(SpecError, match="the key 'room' was removed; write 'envelope'"):
+        request(room="[1 mm, 2 mm]")
 
 
 def test_a_search_without_time_has_asked_and_ends_with_6():
-    found = suggest(wish(), Run(time_budget=0.0))
+    found = suggest(request(), Run(time_budget=0.0))
     assert found.late
     assert found.proposals == ()
     assert exit_code(found) == 6
@@ -348,19 +364,21 @@ def test_what_was_found_before_the_time_was_up_is_kept(monkeypatch):
     clock = iter([0.0] + [1.0] * 6 + [100.0] * 10_000)
     monkeypatch.setattr(search, "time", SimpleNamespace(time=lambda: next(clock)))
     monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, text="cam"))
-    found = suggest(wish(), Run(time_budget=50.0))
+    found = suggest(request(), Run(time_budget=50.0))
     assert found.proposals
     assert found.late
     assert exit_code(found) == 0
 
 
-@pytest.mark.parametrize(("count", "reported"), [(1, "1 mechanism meets the wish"), (2, "2 mechanisms meet the wish")])
+@pytest.mark.parametrize(
+    ("count", "reported"), [(1, "1 mechanism meets the requirements"), (2, "2 mechanisms meet the requirements")]
+)
 def test_one_proposal_is_told_of_in_the_singular(count, reported):
     assert message(SimpleNamespace(proposals=("one", "other")[:count], unjudged=(), late=False)) == reported
 
 
 def test_a_candidate_whose_time_is_up_is_not_made():
-    asked = wish()
+    asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
     one = made(ProposalJob("cam", offer.candidates[0], asked, 0, deadline=1.0))
     assert (one.text, one.message) == ("", OUT_OF_TIME)
@@ -368,7 +386,7 @@ def test_a_candidate_whose_time_is_up_is_not_made():
 
 def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next_run(monkeypatch):
     monkeypatch.setattr("cfmkit.studies.suggest.proposal_making_and_judging.LONGEST", 0.0)
-    asked = wish()
+    asked = request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     designed = next(one for one in offer.candidates if one.variant == "tapered strip")
     assert made(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
@@ -376,12 +394,12 @@ def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next
     monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY))
     monkeypatch.setattr(search, "nearest", lambda *_: {})
     notes = SimpleNamespace(find=lambda _key: None, add=lambda _key, record: kept.append(record))
-    assert not suggest(wish(), Run(notes=notes)).proposals
+    assert not suggest(request(), Run(notes=notes)).proposals
     assert not any("variant" in record for record in kept)
 
 
 def test_a_family_out_of_reach_says_what_it_would_need():
-    offer = function_named(family("vcfm").propose)(wish(force="2 kN"), Run())
+    offer = function_named(family("vcfm").propose)(request(force="2 kN"), Run())
     assert not offer.candidates
     assert " mm " in offer.reason
 
@@ -389,7 +407,7 @@ def test_a_family_out_of_reach_says_what_it_would_need():
 def test_kept_shapes_scale_as_beams_that_only_bend():
     """Twice as large with twice the thickness: twice the force at twice the travel, the stress as before."""
     from cfmkit.families.beam.model import analyze
-    from cfmkit.families.beam.proposals_for_wish import _written
+    from cfmkit.families.beam.proposals import _written
 
     shape = kept_shapes()[0]
     own = shape.spec.mechanism
@@ -402,11 +420,11 @@ def test_kept_shapes_scale_as_beams_that_only_bend():
 
 
 @pytest.mark.parametrize(
-    ("room", "force", "shape"),
+    ("envelope", "force", "shape"),
     [("[90 mm, 30 mm, 12 mm]", "20 N", "shape lan-wide"), ("[46 mm, 50 mm, 25 mm]", "25 N", "shape lan-tall")],
 )
-def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(room, force, shape):
-    asked = wish(force=force, travel="4 mm", ripple="4 %", room=room)
+def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(envelope, force, shape):
+    asked = request(force=force, travel="4 mm", ripple="4 %", envelope=envelope)
     first = function_named(family("beam").propose)(asked, Run()).candidates[0]
     assert first.variant == shape
     found = made(ProposalJob("beam", first, asked, 0))
@@ -417,7 +435,9 @@ def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(room
 def test_two_layers_are_proposed_where_one_does_not_travel_so_far():
     material = "{youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 76 MPa}"
     room = "[74.3 mm, 97.5 mm, 10.1 mm]"
-    asked, candidates = offered("beam", force="9.67 N", travel="13 mm", ripple="5.3 %", room=room, material=material)
+    asked, candidates = offered(
+        "beam", force="9.67 N", travel="13 mm", ripple="5.3 %", envelope=room, material=material
+    )
     layered = next(one for one in candidates if one.variant == "shape lan-2010 in two layers")
     one = made(ProposalJob("beam", layered, asked, 0))
     assert one.passes, one.missed or one.message
@@ -425,22 +445,22 @@ def test_two_layers_are_proposed_where_one_does_not_travel_so_far():
 
 
 def test_the_reason_is_that_of_a_shape_that_travels_so_far():
-    asked = wish(force="60 N", travel="4 mm", ripple="4 %", room="[46 mm, 50 mm, 25 mm]")
+    asked = request(force="60 N", travel="4 mm", ripple="4 %", envelope="[46 mm, 50 mm, 25 mm]")
     offer = function_named(family("beam").propose)(asked, Run())
     assert not offer.candidates
     assert offer.reason.startswith("the beams would be ")
     assert offer.reason.endswith(" mm wide")
 
 
-def test_a_wish_beyond_energy_gets_nothing_and_ends_with_4():
-    found = suggest(wish_of(str(WISHES / "unreachable-grain-of-pla.yaml"), {}).wish(), Run())
+def test_a_request_beyond_energy_gets_nothing_and_ends_with_4():
+    found = suggest(read_request(str(REQUESTS / "unreachable-grain-of-pla.yaml"), {}).request(), Run())
     assert not found.proposals
     assert exit_code(found) == 4
     assert all(one.offer.reason for one in found.answers if not one.offer.candidates)
 
 
 def test_the_order_follows_what_is_preferred():
-    asked = wish()
+    asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
     found = [
         one for one in (made(ProposalJob("cam", each, asked, 0, None)) for each in offer.candidates[:5]) if one.good
@@ -450,14 +470,14 @@ def test_the_order_follows_what_is_preferred():
 
 
 def test_the_same_seed_gives_the_same_texts():
-    asked = wish()
+    asked = request()
     offers = [function_named(family("cam").propose)(asked, Run(3)) for _ in range(2)]
     texts = [[cfmkit.dumps(one.spec) for one in offer.candidates] for offer in offers]
     assert texts[0] == texts[1]
 
 
 def long_names(count):
-    spec = cfmkit.load(WISHES.parents[1] / "configs" / "cam.yaml")
+    spec = cfmkit.load(REQUESTS.parents[1] / "configs" / "cam.yaml")
     numbers = {"across": 0.05, "along": 0.05, "ripple": 0.01, "safety_factor": 1.5}
     variant = "catalogue springs of the widest sort, 138 x 93.8 mm (2)"
     text = cfmkit.dumps(spec)
@@ -466,7 +486,7 @@ def long_names(count):
 
 @pytest.mark.parametrize("drawn", [pareto_and_scale_drawings.pareto, pareto_and_scale_drawings.to_one_scale])
 def test_names_of_proposals_stay_on_the_page_and_off_each_other(drawn):
-    figure = drawn(long_names(12), wish())
+    figure = drawn(long_names(12), request())
     figure.draw_without_rendering()
     titles = [ax.title if ax.title.get_text() else ax._left_title for ax in figure.axes]
     boxes = [one.get_window_extent() for one in [*figure.texts, *titles] if one.get_text()]
@@ -476,7 +496,7 @@ def test_names_of_proposals_stay_on_the_page_and_off_each_other(drawn):
 
 
 def test_designs_in_a_wide_band_aim_at_the_middle_of_its_logarithm():
-    narrow, wide = (wish(force=band).target for band in (["19 N", "21 N"], ["1 N", "1000 N"]))
+    narrow, wide = (request(force=band).target for band in (["19 N", "21 N"], ["1 N", "1000 N"]))
     assert narrow == pytest.approx(20.0)
     assert wide == pytest.approx(31.622776601683793)
 
@@ -492,23 +512,23 @@ def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
     assert bare.without - began == pytest.approx(57.0, abs=1.0)
 
 
-def test_the_nearest_wish_gets_a_proposal_when_it_is_asked():
-    asked = wish(room="[26 mm, 20 mm, 12 mm]")
+def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
+    asked = request(envelope="[26 mm, 20 mm, 12 mm]")
     propose = function_named(family("beam").propose)
     assert not propose(asked, Run()).candidates
     found = nearest(asked, "beam", 0, NEVER)
     assert found
     for key, value in found.items():
-        text = f"[{value.replace(' x ', ', ')}]" if key == "room" else value
-        again = wish(**{"room": "[26 mm, 20 mm, 12 mm]", key: text})
+        text = f"[{value.replace(' x ', ', ')}]" if key == "envelope" else value
+        again = request(**{"envelope": "[26 mm, 20 mm, 12 mm]", key: text})
         jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
         assert any(made(job).passes for job in jobs), key
 
 
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
 def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
-    keys = {"force": "1.8 N", "travel": "12.8 mm", "room": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
-    offer = function_named(family("slider-crank").propose)(wish_of(None, keys).wish(), Run())
+    keys = {"force": "1.8 N", "travel": "12.8 mm", "envelope": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
+    offer = function_named(family("slider-crank").propose)(read_request(None, keys).request(), Run())
     kinds = [one.variant.partition(",")[0] for one in offer.candidates]
     assert {"strip", "flexures", "tapered strip"} <= set(kinds)
     assert "tapered strip" not in kinds[: -kinds.count("tapered strip")]
@@ -516,14 +536,16 @@ def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
 
 def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():
     keys = {"torque": "5 N*m", "angle": "10 deg", "ripple": "2 %"}
-    small, large = (wish_of(None, keys | {"room": room}).wish() for room in ("[5 mm, 5 mm]", "[50 mm, 250 mm]"))
+    small, large = (
+        read_request(None, keys | {"envelope": room}).request() for room in ("[5 mm, 5 mm]", "[50 mm, 250 mm]")
+    )
     propose = function_named(family("slider-crank").propose)
-    assert "fill the room" in propose(small, Run()).reason
+    assert "fill the envelope" in propose(small, Run()).reason
     assert propose(large, Run()).candidates
 
 
 def pinned(force_or_torque, room):
-    asked = wish_of(None, force_or_torque | {"ripple": "2 %", "room": room}).wish()
+    asked = read_request(None, force_or_torque | {"ripple": "2 %", "envelope": room}).request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     assert offer.candidates, offer.reason
     return [made(ProposalJob("slider-crank", one, asked, 0)) for one in offer.candidates[5:8]]
@@ -545,13 +567,13 @@ def test_springs_at_pins_are_of_wire_that_bears_the_motion_and_fit_the_room(torq
             assert loaded_length(coil) < one.numbers["along"]
 
 
-def test_springs_at_pins_stay_within_the_depth_wished():
+def test_springs_at_pins_stay_within_the_depth_required():
     """Ground, crank and coupler are 1 mm thick each; the pivot's spring is below them and all others are above.
 
     All of them are longest when they are wound up.
     """
-    keys = {"torque": "100 N*mm", "angle": "60 deg", "ripple": "5 %", "room": "[150 mm, 150 mm, 12 mm]"}
-    asked = wish_of(None, keys).wish()
+    keys = {"torque": "100 N*mm", "angle": "60 deg", "ripple": "5 %", "envelope": "[150 mm, 150 mm, 12 mm]"}
+    asked = read_request(None, keys).request()
     offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
     tried = (made(ProposalJob("slider-crank", one, asked, 0)) for one in offered[10:])
     one = next(one for one in tried if one.good)
@@ -567,7 +589,7 @@ def test_springs_at_pins_stay_within_the_depth_wished():
 
 
 def torque_offer(torque, angle, room):
-    asked = wish_of(None, {"torque": torque, "angle": angle, "ripple": "5 %", "room": room}).wish()
+    asked = read_request(None, {"torque": torque, "angle": angle, "ripple": "5 %", "envelope": room}).request()
     return asked, function_named(family("slider-crank").propose)(asked, Run())
 
 
@@ -603,8 +625,8 @@ def test_more_torque_than_the_bound_is_held_by_no_springs():
 
 
 def pinned_for_force(force, room):
-    keys = {"force": force, "travel": "20 mm", "ripple": "5 %", "room": room, "material": "steel-s235"}
-    asked = wish_of(None, keys).wish()
+    keys = {"force": force, "travel": "20 mm", "ripple": "5 %", "envelope": room, "material": "steel-s235"}
+    asked = read_request(None, keys).request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     return asked, offer, [one for one in offer.candidates if one.variant == "springs at pins"]
 
@@ -652,7 +674,9 @@ def test_the_stiffest_spring_that_fits_is_just_the_last_that_can_be_made(kind, m
 
 
 def test_a_torque_over_a_quarter_of_a_turn_is_held_by_springs_that_are_wound_up_first():
-    asked = wish_of(None, {"torque": "5 N*m", "angle": "90 deg", "ripple": "3 %", "room": "[150 mm, 700 mm]"}).wish()
+    asked = read_request(
+        None, {"torque": "5 N*m", "angle": "90 deg", "ripple": "3 %", "envelope": "[150 mm, 700 mm]"}
+    ).request()
     offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
     assert any(made(ProposalJob("slider-crank", one, asked, 0)).good for one in offered[5:])
 
@@ -662,8 +686,8 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
 
     What it misses is the band, to which wide beams add 7 %.
     """
-    keys = {"force": "0.4384 N", "travel": "2.55 mm", "ripple": "1.44 %", "room": "[39.6 mm, 12.2 mm, 9.2 mm]"}
-    asked = wish_of(None, keys | {"process": "laser"}).wish()
+    keys = {"force": "0.4384 N", "travel": "2.55 mm", "ripple": "1.44 %", "envelope": "[39.6 mm, 12.2 mm, 9.2 mm]"}
+    asked = read_request(None, keys | {"process": "laser"}).request()
     offered = function_named(family("beam").propose)(asked, Run()).candidates
     missed = [made(ProposalJob("beam", one, asked, 0)).missed for one in offered]
     assert any(all("needs" not in miss for miss in misses) for misses in missed)
@@ -672,16 +696,16 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
 @pytest.mark.parametrize(
     ("material", "words"),
     [
-        ("[nosuch]", "wish.material.0: there is no material 'nosuch'"),
-        ("[pla, pmo]", "wish.material.1: there is no material 'pmo'; did you mean 'pom'?"),
-        ("[{youngs_modulus: 0 GPa}]", "wish.material.0.youngs_modulus: 0 GPa is not allowed: must be > 0"),
+        ("[nosuch]", "suggest.material.0: there is no material 'nosuch'"),
+        ("[pla, pmo]", "suggest.material.1: there is no material 'pmo'; did you mean 'pom'?"),
+        ("[{youngs_modulus: 0 GPa}]", "suggest.material.0.youngs_modulus: 0 GPa is not allowed: must be > 0"),
         ("5", "5 is no material: give a name from `show materials`"),
-        ("[5]", "wish.material.0: 5 is no material: give a name from `show materials`"),
+        ("[5]", "suggest.material.0: 5 is no material: give a name from `show materials`"),
         ("[]", "the list has 0 items"),
     ],
 )
 def test_of_a_list_of_materials_the_one_that_is_wrong_is_told(material, words):
     with pytest.raises(SpecError) as caught:
-        wish_of(None, POM | {"material": material})
+        read_request(None, POM | {"material": material})
     (problem,) = caught.value.problems
     assert str(problem).startswith("--material: " + words)

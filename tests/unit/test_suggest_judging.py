@@ -1,4 +1,4 @@
-"""Proposals are judged by the finest model on all that is wished; what was not judged is said, and meets nothing."""
+"""Proposals are judged by the finest model on all that is required; what was not judged is said, and meets nothing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
-from cfmkit.runs.read_wish import wish_of
+from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.runs.suggestion_files import as_json, exit_code, table
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.studies.parts.assumed_errors import assumed
@@ -27,18 +27,26 @@ from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judged, made
+from cfmkit.studies.suggest.requirements_of_request import demanded
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
+POM = {
+    "safety": "1",
+    "force": "10 N",
+    "travel": "3 mm",
+    "ripple": "3 %",
+    "envelope": "[80 mm, 60 mm, 12 mm]",
+    "material": "pom",
+}
 
 
 def block(**keys):
-    return wish_of(None, POM | keys)
+    return read_request(None, POM | keys)
 
 
-def wish(**keys):
-    return block(**keys).wish()
+def request(**keys):
+    return block(**keys).request()
 
 
 def first(name, asked, variant=""):
@@ -54,8 +62,14 @@ def first(name, asked, variant=""):
         ({"material": "[pla, steel-304]", "process": "fdm"}, "steel-304 is not made by fdm"),
         ({"material": "{youngs_modulus: 100 GPa}", "process": "sls"}, "this metal is not made by sls"),
         ({"material": "pa12-sls", "process": "mill"}, "pa12-sls is not made by mill, but by sls"),
-        ({"material": "pla", "process": "fdm", "room": "[80 mm, 60 mm, 0.1 mm]"}, "the depth, 0.1 mm, is below the"),
-        ({"material": "pom", "process": "laser", "room": "[0.4 mm, 60 mm]"}, "the first side, 0.4 mm, is below the"),
+        (
+            {"material": "pla", "process": "fdm", "envelope": "[80 mm, 60 mm, 0.1 mm]"},
+            "the depth, 0.1 mm, is below the",
+        ),
+        (
+            {"material": "pom", "process": "laser", "envelope": "[0.4 mm, 60 mm]"},
+            "the first side, 0.4 mm, is below the",
+        ),
     ],
 )
 def test_what_no_process_makes_is_refused_in_one_line(keys, words):
@@ -74,13 +88,13 @@ def test_a_number_for_a_share_is_asked_back_as_a_percentage(key):
 
 @pytest.mark.parametrize("material", ["pla", "petg", "{youngs_modulus: 2 GPa, yield_strength: 40 MPa}"])
 def test_what_a_process_makes_is_accepted(material):
-    assert wish(material=material, process="fdm").process == "fdm"
+    assert request(material=material, process="fdm").process == "fdm"
 
 
 @pytest.fixture(scope="module")
 def beams():
-    """A network that does what is wished by its beams, and that no solid has judged."""
-    asked = wish()
+    """A network that does what is required by its beams, and that no solid has judged."""
+    asked = request()
     return asked, made(ProposalJob("beam", first("beam", asked), asked, 0))
 
 
@@ -95,7 +109,7 @@ def test_what_its_beams_alone_judged_meets_nothing(beams):
     record = as_json(found, block())
     assert record["proposals"] == []
     assert record["unjudged"][0]["unjudged"] == ["reissner model; solid not run"]
-    assert "no mechanism is known to meet the wish" in record["message"]
+    assert "no mechanism is known to meet the request" in record["message"]
     assert ",open,reissner," in table(found).decode()
 
 
@@ -122,7 +136,7 @@ def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(bea
 
     monkeypatch.setattr(judging, "judged", judge)
     correct = {judging.FIDELITY: "solid"}
-    monkeypatch.setattr(judging, "function_named", lambda _: lambda spec, _wish: spec.replace(correct))
+    monkeypatch.setattr(judging, "function_named", lambda _: lambda spec, _request: spec.replace(correct))
     candidate = replace(first("beam", asked), correct="it:is")
     found = made(ProposalJob("beam", candidate, asked, 0, near=near))
     assert found.good
@@ -132,9 +146,9 @@ def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(bea
 @pytest.mark.slow  # two or four solids
 @pytest.mark.parametrize(("name", "variant"), [("beam", "shape lan-tall"), ("vcfm", "2 Vs"), ("slider-crank", "strip")])
 def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(name, variant):
-    keys = {"force": "2 N", "travel": "5 mm", "ripple": "6 %", "room": "[120 mm, 120 mm, 12 mm]"}
-    deep = {"room": "[90 mm, 60 mm, 15 mm]"} if name == "vcfm" else {}  # as solids its leaves are wider
-    asked = wish(**keys) if name == "slider-crank" else wish(ripple="5 %", force="[9 N, 11 N]", **deep)
+    keys = {"force": "2 N", "travel": "5 mm", "ripple": "6 %", "envelope": "[120 mm, 120 mm, 12 mm]"}
+    deep = {"envelope": "[90 mm, 60 mm, 15 mm]"} if name == "vcfm" else {}  # as solids its leaves are wider
+    asked = request(**keys) if name == "slider-crank" else request(ripple="5 %", force="[9 N, 11 N]", **deep)
     offers = offer_of(family(name), asked, Run()).candidates
     job = ProposalJob(name, next(one for one in offers if one.variant == variant), asked, 0)
     near = made(job)
@@ -148,13 +162,13 @@ def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(n
 
 def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
     """Stiffness and number alone were written: nobody could order them, and nothing said what their wire bears."""
-    asked = wish(force="50 N", travel="100 mm", room="[250 mm, 350 mm, 80 mm]", material="steel-s235")
+    asked = request(force="50 N", travel="100 mm", envelope="[250 mm, 350 mm, 80 mm]", material="steel-s235")
     candidate = first("cam", asked, "2 springs")
     plain = cfmkit.design(candidate.spec).spec
     spec = function_named(candidate.finish)(plain, asked)
     wire = spec.mechanism.springs.wound
     assert wire.wound("extension").rate == pytest.approx(spec.mechanism.springs.stiffness, rel=1e-9)
-    assert spec.mechanism.springs.name.startswith("wound to measure, wire")
+    assert spec.mechanism.springs.name.startswith("custom, wire")
     result = cfmkit.analyze(spec)
     strength = tensile_strength(wire.wire)
     assert result.values["wire_stress_max"].value <= 0.38 * strength * (1 + 1e-9)
@@ -170,11 +184,11 @@ def test_the_mean_of_a_row_is_that_of_both_directions():
     result = cfmkit.analyze(cfmkit.load(CONFIGS / "cam_friction.yaml"))
     known = cfmkit.evaluate(result)
     up, down = (known[f"force_mean[{way}]"].value for way in ("load", "unload"))
-    assert judging.numbers_of(result, None, wish())["mean"] == pytest.approx((up + down) / 2, rel=1e-12)
+    assert judging.numbers_of(result, None, request())["mean"] == pytest.approx((up + down) / 2, rel=1e-12)
 
 
-def test_the_file_of_a_proposal_keeps_the_whole_wish():
-    asked = wish(process="wire-edm", material="steel-s235", hysteresis="30 %")
+def test_the_file_of_a_proposal_keeps_the_whole_request():
+    asked = request(process="wire-edm", material="steel-s235", hysteresis="30 %")
     one = made(ProposalJob("cam", first("cam", asked), asked, 0))
     assert one.text, one.message
     spec = cfmkit.loads(one.text)
@@ -210,7 +224,7 @@ def test_the_box_of_a_metric_of_a_sweep_is_computed():
 
 
 def test_what_cannot_be_judged_is_said_and_meets_nothing():
-    asked = wish(cycles="20000", hysteresis="5 %")
+    asked = request(cycles="20000", hysteresis="5 %")
     one = made(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
     assert one.passes, one.missed or one.message
     assert one.unjudged == (
@@ -223,7 +237,7 @@ def test_what_cannot_be_judged_is_said_and_meets_nothing():
 
 
 def test_a_mean_that_the_stiffening_of_wide_beams_takes_out_of_the_band_is_a_miss():
-    asked = wish()
+    asked = request()
     assert raised_out(asked, 10.1, 0.014) == []
     (reported,) = raised_out(asked, 10.1, 0.02)
     assert reported == "wide_beam: the force is between 10.1 N and 10.3 N, allowed <= 10.25 N"
@@ -232,13 +246,13 @@ def test_a_mean_that_the_stiffening_of_wide_beams_takes_out_of_the_band_is_a_mis
 @pytest.mark.parametrize(("share", "aim"), [(0.0, 10.0), (0.03, 10.0 / 1.015), (0.05, 1.002 * 9.75)])
 def test_a_part_is_aimed_between_its_force_without_and_with_the_stiffening(share, aim, monkeypatch):
     monkeypatch.setattr(stiffening_of_wide_beams, "stiffening", lambda *_: share)
-    asked = stiffening_of_wide_beams.aim_below_stiffening(None, wish(), None)
+    asked = stiffening_of_wide_beams.aim_below_stiffening(None, request(), None)
     assert asked.target == pytest.approx(aim)
 
 
 @pytest.mark.parametrize("force", ["12 N", "8 N"])
-def test_an_adjustment_is_judged_at_both_ends_whichever_is_wished(force):
-    asked = wish(force=force, ripple="4 %", room="[150 mm, 120 mm, 30 mm]", adjustable="[8 N, 12 N]")
+def test_an_adjustment_is_judged_at_both_ends_whichever_is_required(force):
+    asked = request(force=force, ripple="4 %", envelope="[150 mm, 120 mm, 30 mm]", adjustable="[8 N, 12 N]")
     one = made(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
     assert one.passes, one.missed or one.message
     values = cfmkit.analyze(one.spec).values
@@ -250,7 +264,7 @@ def test_an_adjustment_is_judged_at_both_ends_whichever_is_wished(force):
 
 
 def test_one_end_that_is_not_reached_is_missed():
-    asked = wish(force="8 N", ripple="4 %", room="[150 mm, 120 mm, 30 mm]", adjustable="[8 N, 12 N]")
+    asked = request(force="8 N", ripple="4 %", envelope="[150 mm, 120 mm, 30 mm]", adjustable="[8 N, 12 N]")
     good = made(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
     preloads = tuple(0.5 * one for one in good.spec.analysis.preloads)
     short = judged("vcfm", "2 Vs", good.spec.replace({"analysis.preloads": preloads}), asked)
@@ -339,7 +353,7 @@ def test_links_are_as_narrow_as_their_loads_allow():
 
 
 LINKAGE = {
-    "force": "12 N", "travel": "8 mm", "ripple": "5 %", "room": "[90 mm, 70 mm, 10 mm]", "material": "steel-s235",
+    "force": "12 N", "travel": "8 mm", "ripple": "5 %", "envelope": "[90 mm, 70 mm, 10 mm]", "material": "steel-s235",
 }  # fmt: skip
 
 
@@ -347,7 +361,7 @@ LINKAGE = {
 def test_the_links_of_springs_at_pins_bear_them_by_formulas_of_their_own(hysteresis):
     """Moments from the springs' turns along the curve, bars of the sheet in its file."""
     keys = LINKAGE | ({} if hysteresis is None else {"hysteresis": hysteresis})
-    asked = wish_of(None, keys).wish()
+    asked = read_request(None, keys).request()
     one = made(ProposalJob("slider-crank", first("slider-crank", asked, "springs at pins"), asked, 0))
     assert one.text, one.message
     spec, result = one.spec, cfmkit.analyze(one.spec)
@@ -385,3 +399,48 @@ def test_links_that_yield_are_found():
     assert values["link_stress_max"].value > 60e6
     assert values["link_safety_factor"].value < 1.0
     assert values["link_turn_share_max"].value > 0.3
+
+
+def test_a_safety_factor_is_required_of_stresses_and_leaves_less_strength_to_the_laws():
+    usual = read_request(None, {key: value for key, value in POM.items() if key != "safety"}).request()
+    assert usual.safety == 1.5
+    assert usual.strength_used == pytest.approx(request().strength_used / 1.5)
+    result = cfmkit.analyze("configs/vcfm_pla.yaml")
+    rows = {one["metric"]: one for one in demanded(usual, result, None, ())}
+    assert rows["safety_factor"]["min"] == "1.5"
+
+
+@pytest.mark.parametrize(
+    ("proposal", "verdict"),
+    [
+        (Proposal("cam", "a", text="x"), "meets"),
+        (Proposal("cam", "a", text="x", unjudged=("life not judged: no S-N data for petg",)), "open: life"),
+        (Proposal("cam", "a", text="x", pending="solid"), "open: solid"),
+        (
+            Proposal(
+                "cam", "a", text="x", missed=("1", "2", "3"), fails=("stress", "force", "stress"), pending="solid"
+            ),
+            "fails: stress, force",
+        ),
+    ],
+)
+def test_a_verdict_names_what_fails_or_is_open(proposal, verdict):
+    assert proposal.verdict == verdict
+    assert Proposal.of_record(proposal.as_record()).verdict == verdict
+
+
+def test_a_mechanism_whose_springs_are_stretched_too_far_is_no_proposal():
+    """It misses no number that was required: only a warning says it."""
+    spec = cfmkit.load("configs/cam.yaml").replace({"mechanism.springs.max_elongation": 0.05})
+    found = judged("cam", "2 springs", spec, request(force="50 N", travel="100 mm", envelope="[1 m, 1 m]"))
+    assert found.fails == ("springs",)
+    assert found.missed[0].startswith("spring_overstretched: ")
+    assert found.near
+
+
+def test_only_springs_of_the_kind_that_is_required_are_offered():
+    kinds = {None: {"catalogue", "custom"}, "catalogue": {"catalogue"}, "custom": {"custom"}}
+    for springs, allowed in kinds.items():
+        asked = request(envelope="[80 mm, 60 mm, 20 mm]", **({"springs": springs} if springs else {}))
+        offer = offer_of(family("cam"), asked, Run())
+        assert {one.springs for one in offer.candidates} == allowed

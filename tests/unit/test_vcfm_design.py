@@ -12,8 +12,8 @@ from cfmkit import api
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
-from cfmkit.families.vcfm import proposals_for_wish
-from cfmkit.families.wishes import Wish
+from cfmkit.families.suggestion_request import Request
+from cfmkit.families.vcfm import proposals
 from cfmkit.results import Status
 
 
@@ -146,12 +146,12 @@ def test_a_preload_without_what_it_is_to_give_is_refused(tmp_path):
 
 @pytest.mark.parametrize("structure", ["cosine arches", "hybrid leaves", "folded spring"])
 def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_spring(structure):
-    wish = Wish("force", 10.0, 9.9, 10.1, False, 2e-3, 0.05, (0.2, 0.2), adjustable=(8.0, 12.0))
-    words = proposals_for_wish.STRUCTURES[structure][1].variant
-    candidates = proposals_for_wish.propose(wish, Run()).candidates
+    request = Request("force", 10.0, 9.9, 10.1, False, 2e-3, 0.05, (0.2, 0.2), adjustable=(8.0, 12.0))
+    words = proposals.STRUCTURES[structure][1].variant
+    candidates = proposals.propose(request, Run()).candidates
     chosen = next(one for one in candidates if one.variant.startswith(words))
     made = family("vcfm").design(chosen.spec.replace({"design.refine": False}), Run()).spec
-    finished = function_named(chosen.finish)(made, wish)
+    finished = function_named(chosen.finish)(made, request)
     found = cfmkit.analyze(finished)
     change = next(one.values for one in found.tables["adjustability"]().columns if one.name == "force_change")
     assert list(change) == pytest.approx([0.0, 2.0, -2.0], abs=0.025)

@@ -40,7 +40,7 @@ from cfmkit.studies.engine import Work, run
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.variants_in_rows import evaluate_rows
-from cfmkit.studies.varied_axes import axes, wishes
+from cfmkit.studies.varied_axes import axes, collect_variations
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
 
@@ -230,7 +230,7 @@ NAMES = (*IN_WINDOW, "static_balance", *QUANTITIES)
 def test_rows_have_the_numbers_of_their_points(model, window):
     spec = table_i(f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]")
     ranges = {path: item for path, item in RANGES.items() if not path.endswith("modulus")}
-    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 64))
+    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
     many = Work(Study(spec, plan.paths, metrics_of(spec, NAMES)), plan)
     assert many.vectorised
     together = run(many)
@@ -254,7 +254,7 @@ def test_rows_have_the_warnings_of_their_points(model, window, preloads):
         preloads=preloads,
     )  # fmt: skip
     ranges = RANGES | {"mechanism.bistable.angle": "4 deg:17 deg", "mechanism.bistable.thickness": "0.4 mm:4 mm"}
-    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 64))
+    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
     many = Work(Study(spec, plan.paths, metrics_of(spec, ["force_mean", "rise"])), plan)
     assert many.vectorised
     together, seen = run(many), set()

@@ -35,7 +35,7 @@ class CheckOptions(Changing):
 
 @dataclass(frozen=True)
 class Checked:
-    """What became of one file: its spec, or the answer that its error is."""
+    """Outcome of one file: its spec, or the answer that its error is."""
 
     file: str
     spec: Spec | None

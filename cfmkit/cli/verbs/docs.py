@@ -55,7 +55,7 @@ class GuidePage:
 
     @property
     def text(self) -> str:
-        """What it says."""
+        """Its text."""
         return self.path.read_text(encoding="utf-8")
 
 

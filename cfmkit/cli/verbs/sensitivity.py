@@ -62,15 +62,6 @@ class SensitivityOptions(Studying):
             autocompletion=shell_completion.changes,
         ),
     ] = None
-    on_failure: Annotated[
-        Literal["fail", "resample", "bound"] | None,
-        option(
-            "--on-failure",
-            metavar="NAME",
-            text="For samples without a result: fail (report no index), resample (draw their block again) or bound "
-            "(report intervals); default: fail.",
-        ),
-    ] = None
     metrics: Annotated[
         str | None,
         option(
@@ -181,7 +172,6 @@ def changes_of(options: SensitivityOptions) -> dict[str, Any]:
     said = {
         "method": options.method,
         "samples": options.samples,
-        "on_failure": options.on_failure,
         "parameters": dict(map(spread, options.vary)) if options.vary else None,
         # What the spec says goes together names parameters that may not be there any more.
         "correlated": () if options.vary else None,

@@ -1,4 +1,4 @@
-"""``cfmkit suggest``: from a wish to mechanisms of every family that does it."""
+"""``cfmkit suggest``: from a request to mechanisms of every family that does it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.documents.document import Document
 
 PLACE = 5
-EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
+EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --envelope 100x100x20mm"
 
 BUDGET = "3min"
 
@@ -52,9 +52,9 @@ def _key(name: str, metavar: str, text: str) -> Any:
 class SuggestOptions(Common):
     """Arguments and options."""
 
-    wish: Annotated[
+    request: Annotated[
         str | None,
-        argument("WISH", "YAML file with a block 'wish'; - reads standard input."),
+        argument("FILE", "YAML file with a block 'suggest'; - reads standard input."),
     ] = None
     force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
@@ -63,8 +63,9 @@ class SuggestOptions(Common):
     ripple: Annotated[str | None, _key("ripple", "SHARE", "Largest (max - min)/max over the travel; default: 5 %.")] = (
         None
     )
-    room: Annotated[
-        str | None, _key("room", "AxBxCmm", "Space available: across the travel, along it, and the depth (optional).")
+    envelope: Annotated[
+        str | None,
+        _key("envelope", "AxBxCmm", "Space available: across the travel, along it, and the depth (optional)."),
     ] = None
     material: Annotated[
         list[str] | None,
@@ -77,11 +78,17 @@ class SuggestOptions(Common):
     hysteresis: Annotated[
         str | None, _key("hysteresis", "SHARE", "Largest energy loss of a cycle, as a share of its work.")
     ] = None
+    springs: Annotated[
+        str | None, _key("springs", "KIND", "Helical springs it may have: catalogue or custom; default: either.")
+    ] = None
+    safety: Annotated[
+        str | None, _key("safety", "FACTOR", "Least safety factor of stresses, against yield; default: 1.5.")
+    ] = None
     cycles: Annotated[
         str | None, _key("cycles", "N", "Required life in cycles; judged for materials with fatigue data.")
     ] = None
     made_well: Annotated[
-        str | None, _key("yield", "SHARE", "Required share of manufactured parts that meet the wish.")
+        str | None, _key("yield", "SHARE", "Required share of manufactured parts that meet the requirements.")
     ] = None
     prefer: Annotated[
         list[str] | None,
@@ -101,10 +108,10 @@ class SuggestOptions(Common):
 
 
 KEYS = (
-    "force", "torque", "travel", "angle", "ripple", "room", "material", "process", "adjustable", "hysteresis", "cycles",
-    "made_well", "prefer",
+    "force", "torque", "travel", "angle", "ripple", "envelope", "material", "process", "adjustable", "hysteresis",
+    "springs", "safety", "cycles", "made_well", "prefer",
 )  # fmt: skip
-"""Options that are keys of a wish."""
+"""Options that are keys of a request."""
 
 LISTS = ("material", "adjustable", "prefer")
 
@@ -113,10 +120,10 @@ BANDS = ("force", "torque")
 
 
 def run(options: SuggestOptions, terminal: Terminal) -> Document:
-    """Suggest mechanisms for a wish: a force, a travel and a room. Start here if there is no spec yet.
+    """Suggest mechanisms for requirements: a force, a travel and an envelope. Start here if there is no spec yet.
 
     Candidates from every family are designed and analysed from their written files with the finest model. Those that
-    meet the whole wish are listed, then those of which not everything could be judged.
+    meet all requirements are listed, then those of which not everything could be judged.
     """
     from cfmkit import families
     from cfmkit.cli.run_study_in_folder import noting
@@ -125,7 +132,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     from cfmkit.documents.document import Written, with_skipped_families
     from cfmkit.families.run_control import Run
     from cfmkit.runs import suggestion_files
-    from cfmkit.runs.read_wish import wish_of
+    from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.runs.run import long_run
     from cfmkit.store import RunFolder
     from cfmkit.studies.pool import Pool
@@ -135,10 +142,10 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)
     given = keys(options)
-    if options.wish is None and not given:
-        raise UsageError("a wish is missing: name a file, or say --force, --travel and --room")
+    if options.request is None and not given:
+        raise UsageError("requirements are missing: name a file, or give --force, --travel and --envelope")
     ends = begun + budget
-    block = wish_of(options.wish, given)
+    block = read_request(options.request, given)
     out = _folder(options)
     with RunFolder(out) as folder, terminal.progress() as progress:
         folder.check("metrics.json", "suggestions.csv")
@@ -148,7 +155,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
             reserve = max(SPARE, WRITTEN * budget) if options.no_plots else RESERVE
-            found = suggest(block.wish(), working, block.prefer, reserve)
+            found = suggest(block.request(), working, block.prefer, reserve)
             deadlines = suggestion_files.Deadlines(Clock(ends - SPARE), Clock(ends - WRITING))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
             for name, content in suggestion_files.files(
@@ -159,7 +166,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
         manifest = folder.commit(
             {
                 "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,
-                "wish": block.model_dump(mode="json", exclude_unset=True, by_alias=True), "reused": found.reused,
+                "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True), "reused": found.reused,
                 "status": code.name.lower(), "exit_code": int(code),
             }
         )  # fmt: skip
@@ -184,7 +191,7 @@ def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:
 
 
 def keys(options: SuggestOptions) -> dict[str, str]:
-    """Return the keys of a wish that options say, each as a file would have it."""
+    """Return the keys of a request that options say, each as a file would have it."""
     found = {}
     for one in fields(options):
         value = getattr(options, one.name)
@@ -192,8 +199,8 @@ def keys(options: SuggestOptions) -> dict[str, str]:
             continue
         if isinstance(value, list):
             value = value[0] if len(value) == 1 else ",".join(part.strip().strip("[]") for part in value)
-        if one.name == "room":
-            value = room(value)
+        if one.name == "envelope":
+            value = parse_envelope(value)
         elif (one.name in LISTS or (one.name in BANDS and _are_two(value))) and not value.strip().startswith("["):
             value = f"[{value}]"
         found["yield" if one.name == "made_well" else one.name] = value
@@ -206,12 +213,12 @@ def _are_two(text: str) -> bool:
     return len(parts) == 2 and all(re.search(r"[a-zA-Z]", part) for part in parts)
 
 
-def room(text: str) -> str:
-    """Return the sides of a room as a list: ``80x60x6mm``, or ``80 mm x 60 mm``.
+def parse_envelope(text: str) -> str:
+    """Return the sides of an envelope as a list: ``80x60x6mm``, or ``80 mm x 60 mm``.
 
     Examples
     --------
-    >>> room("80x60x6mm"), room("80 mm x 6 cm")
+    >>> parse_envelope("80x60x6mm"), parse_envelope("80 mm x 6 cm")
     ('[80 mm, 60 mm, 6 mm]', '[80 mm, 6 cm]')
     """
     if text.strip().startswith("["):
@@ -227,7 +234,7 @@ def _folder(options: SuggestOptions) -> str:
         if not options.out.strip():
             raise UsageError("--out is empty; give a folder")
         return options.out
-    if options.wish == "-":
-        raise UsageError("a wish from standard input has no name; give the output folder with --out")
-    stem = "options" if options.wish is None else Path(options.wish).stem
+    if options.request == "-":
+        raise UsageError("standard input has no name; give the output folder with --out")
+    stem = "options" if options.request is None else Path(options.request).stem
     return str(Path("cfm-out") / f"{stem}-suggest")

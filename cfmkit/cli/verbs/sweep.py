@@ -126,13 +126,13 @@ def request(options: SweepOptions) -> SweepRequest:
     """
     from cfmkit.cli.run_study_in_folder import names
     from cfmkit.studies.sweep_request_and_files import SweepRequest
-    from cfmkit.studies.varied_axes import wish
+    from cfmkit.studies.varied_axes import parse_variation
 
     if options.zip and options.sample:
         raise UsageError("--zip and --sample exclude each other")
     method, samples = _sample(options.sample) if options.sample else ("zip" if options.zip else None, None)
     return SweepRequest(
-        vary=tuple(wish(option) for option in options.vary or ()),
+        vary=tuple(parse_variation(option) for option in options.vary or ()),
         combine=method,  # type: ignore[arg-type]
         samples=samples,
         design=options.design or None,

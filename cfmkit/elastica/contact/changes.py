@@ -366,7 +366,7 @@ class WatchedProblem(NetworkProblem):
 
 @dataclass(frozen=True, eq=False)
 class StepBetween:
-    """What lies between two points of a piece, by the cubic through them, or the chord where slopes are steep."""
+    """Path between two points of a piece, by the cubic through them, or the chord where slopes are steep."""
 
     part: PieceOfPath
     first: PathEquilibrium

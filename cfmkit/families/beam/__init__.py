@@ -32,7 +32,7 @@ FAMILY = Family(
     elastic_parts="cfmkit.families.beam.plane_fem_analysis:elastic_parts",
     elastic_networks="cfmkit.families.beam.plane_fem_analysis:elastic_networks",
     levels=("design.rescale.force", "design.optimise.force.target"),
-    propose="cfmkit.families.beam.proposals_for_wish:propose",
+    propose="cfmkit.families.beam.proposals:propose",
     part="cfmkit.families.beam.part:part_over_motion",
     headline=(
         "nominal_force",

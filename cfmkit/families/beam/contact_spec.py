@@ -1,4 +1,4 @@
-"""What a specification says about contact: stops of nodes, and rigid obstacles that the pads of nodes may touch."""
+"""Specification of contact: stops of nodes, and rigid obstacles that the pads of nodes may touch."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ LONGEST_POLYLINE = 200  # corners
 
 
 class StopBase(Model):
-    """What both kinds of stops have in common."""
+    """Common part of both kinds of stops."""
 
     kind_tag: ClassVar[str]  # how the kind is told apart in places of faults
 
@@ -95,7 +95,7 @@ StopSpec = Annotated[
 
 
 class ObstacleBase(Model):
-    """What all kinds of obstacles have in common; `outline` is what tells them apart."""
+    """Common part of all kinds of obstacles, which differ in `outline`."""
 
     nodes: dict[str, Annotated[Length, Field(ge=0)]] | None = Field(
         None,

@@ -305,7 +305,7 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator[tuple[str, str]]:
-    """Say where the side of a beam lies in an obstacle, beside the pads of nodes."""
+    """Yield where the side of a beam lies in an obstacle, beside the pads of nodes."""
     path, mechanism, keep = solution.path, solution.spec.mechanism, solution.keep
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()

@@ -155,7 +155,7 @@ class AlongMotion:
 
     @cached_property
     def start(self) -> float:
-        """Where the force first reaches 0.95 of that at the end [m]."""
+        """Displacement at which the force first reaches 0.95 of that at the end [m]."""
         if not abs(self.nominal) > (self.solution.effort_error or 0.0):  # else 95 % of it are rounding
             return np.nan
         place = self._settled(lambda x, force: crossing(x, force / self.nominal, 1 - BAND))
@@ -183,7 +183,7 @@ class AlongMotion:
 
     @cached_property
     def stress_limit(self) -> float:
-        """Where the largest stress first reaches the allowable one [m], beam by beam."""
+        """Displacement at which the stress first reaches the allowable one [m], beam by beam."""
         allowable = self.solution.assembly.allowable_stress
         if np.isnan(self.nominal) or allowable is None:
             return np.nan

@@ -308,7 +308,7 @@ def _with_analysis(spec: BeamSpec, **update: Any) -> BeamSpec:
 
 
 def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
-    """Say how far Eq. 6 alone is off where beams stretch: at the end of the window as given, times the size."""
+    """Return by how much Eq. 6 alone is off where beams stretch: at the end of the window as given, times the size."""
     if spec.fidelity == "inextensible" or (force := _force(spec)) is None:
         return []
     changed = changed_spec(spec, wanted)
@@ -335,7 +335,7 @@ def _force_ratio(old: Mechanism, new: Mechanism) -> float:
 
 
 def _stress(spec: BeamSpec) -> list[Finding]:
-    """Say where the travel is longer than the stress allows after the change."""
+    """Return from where on the stress is too large after the change, in words."""
     solution = solve(spec)
     allowable, along = solution.assembly.allowable_stress, solution.along
     stress, place = (number_of(name, solution) for name in ("stress_at_end", "stress_limit_displacement"))

@@ -1,4 +1,4 @@
-"""What the part of a beam mechanism is united from: strips, what closes them at nodes, and the blocks at their ends.
+"""Pieces of the part of a beam mechanism: strips, what closes them at nodes, and the blocks at their ends.
 
 One rule: the part is the union of the strips as specified. Where beams meet, the smallest piece closes them that leaves
 the section as thick as the beams; pads, bars and arms lie behind all beams that end at them.

@@ -293,7 +293,7 @@ def reactions(result: Result) -> Figure:
 
 
 def _left_out(beams: Mapping[str, object]) -> str:
-    """Say that a diagram has not all beams."""
+    """Note that a diagram has not all beams."""
     return "" if len(beams) <= MOST_BEAMS else f"; the {MOST_BEAMS} largest of {len(beams)}"
 
 

@@ -1,4 +1,4 @@
-"""What a beam mechanism can suffer from, by name, and the rules that find it and put it into numbers.
+"""Warnings of the beam family: their rules and sentences.
 
 The names are stable; the sentences say what the name means. The message that a run reports carries the numbers.
 """
@@ -149,7 +149,7 @@ def _is_raw(solution: Solution) -> bool:
 
 
 def _forced_beams(solution: Solution) -> Sentence:
-    """Say what it costs to force beams into place."""
+    """Return the cost of forcing beams into place, in words."""
     gaps = ", ".join(f"{name} by {format_short(one.gap, 'length')}" for name, one in _misfits(solution).items())
     return (
         f"beams miss their nodes ({gaps}) and are forced into place: at rest the drive carries "
@@ -160,7 +160,7 @@ def _forced_beams(solution: Solution) -> Sentence:
 
 
 def _fitted_beams(solution: Solution) -> Sentence:
-    """Say how each beam was fitted."""
+    """Return the fit of each beam, in words."""
     reported = ", ".join(
         f"{name} {format_short(float(np.real(one.rotation)), 'angle')} and x {float(np.real(one.scale)):.5f} "
         f"(it missed by {format_short(one.gap, 'length')})"
@@ -207,7 +207,7 @@ def _bifurcations_under(what: str) -> FindingRule[Solution]:
 
 
 def _after(solution: Solution) -> str:
-    """Say where the curve goes at a bifurcation."""
+    """Return the course of the curve at a bifurcation, in words."""
     if (solution.path.branch[solution.keep] == "primary").all():
         return "; the curve stays on the primary path"
     side = "analysis.other_side=" + ("false" if solution.spec.analysis.other_side else "true")
@@ -283,7 +283,7 @@ def _is_overstressed(solution: Solution) -> bool:
 
 
 def _too_large_stress(solution: Solution) -> Sentence:
-    """Say where the stress in the window is too large."""
+    """Return where the stress in the window is too large, in words."""
     names, window, shown = _beams_of_known_strength(solution), window_of(solution), solution.with_ends
     inside = np.flatnonzero(within(shown, *window))
     values = np.array([shown.stresses[name][0] for name in names])

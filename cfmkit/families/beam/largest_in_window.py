@@ -101,7 +101,7 @@ def _solved(winding: AlongTheWay, arcs: FloatArray) -> Path:
 
 
 def _within(motion: FloatArray, window: tuple[float, float]) -> FloatArray:
-    """Tell which places are in a window, (n,) of bool."""
+    """Return which places are in a window, (n,) of bool."""
     slack = SLACK * float(np.ptp(motion)) if len(motion) else 0.0
     return np.asarray((motion >= window[0] - slack) & (motion <= window[1] + slack))
 

@@ -1,4 +1,4 @@
-"""What a specification may say about a network of beams as a whole, and what can be wrong with it."""
+"""Specification of a network of beams as a whole, and its checks."""
 
 from __future__ import annotations
 

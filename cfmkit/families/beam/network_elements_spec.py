@@ -1,4 +1,4 @@
-"""What a specification says about a network: nodes, beams, springs, loads, drives, copies, and how it is cut."""
+"""Specification of the elements of a network: nodes, beams, springs, loads, drives, copies, and how it is cut."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ MaterialField = Annotated[BeamMaterial, material_input(BeamMaterial)]
 
 
 class Moved(Model):
-    """Where the held motions of a support are held, before anything else is done."""
+    """Initial displacements of a support."""
 
     along: Length = Field(0.0, description="along the support's direction")
     across: Length = Field(0.0, description="90 deg to the left of it")
@@ -358,7 +358,7 @@ DriveSpec = Annotated[
 
 
 class Copies(Model):
-    """How often the part that is described occurs: side by side, mirrored, or stacked."""
+    """Copies of the part that is described: side by side, mirrored, or stacked."""
 
     mirror: Point | None = Field(
         None, description="a point of the mirror axis, which runs along the drive: two halves, twice the force"
@@ -374,7 +374,7 @@ class Copies(Model):
 
 
 class PartSpec(PaddedPart):
-    """How the part is cut, and what can be cut."""
+    """Cutting of the part, and limits of the cut."""
 
     min_gap: Annotated[Length, Field(ge=0)] = Field(0.0, description="smallest gap that can be cut")
     min_feature: Annotated[Length, Field(ge=0)] = Field(0.0, description="smallest thickness that can be made")

@@ -1,4 +1,4 @@
-"""Where the material of a beam mechanism is: strips and blocks as made, what of them is held, and all as it moves.
+"""Geometry of a beam mechanism over its motion: strips and blocks as made, what of them is held, and all as it moves.
 
 At clamps and at the part that is guided the beams end in pads, at pinned supports in eyes with a hole; rigid links and
 what joins two mirrored halves are bars. Stages in series are drawn above each other, legs side by side once.

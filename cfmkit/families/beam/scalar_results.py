@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def within(solution: OnCurve, low: float, high: float) -> Any:
-    """Tell which accurate points of the curve are in a window."""
+    """Return which accurate points of the curve are in a window."""
     x = solution.motion
     slack = 1e-12 * float(np.abs(x).max())
     return (x >= low - slack) & (x <= high + slack) & solution.accurate

@@ -1,4 +1,4 @@
-"""What is known of a solved beam mechanism.
+"""Solution of a beam mechanism.
 
 Every other file of this family may import these types.
 """

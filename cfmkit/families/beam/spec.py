@@ -1,4 +1,4 @@
-"""What a YAML specification of a beam mechanism may say."""
+"""YAML specification of a beam mechanism may say."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ LEAST_SHARE = 0.05
 
 
 class BeamDesign(DesignBlock):
-    """What `cfmkit design` is to do."""
+    """Tasks of `cfmkit design`."""
 
     rescale: Rescale | None = Field(None, description="another size, section or material for the same curve")
     optimise: Optimise | None = Field(None, description="node positions and beam shapes for a constant force")
@@ -160,7 +160,7 @@ class BeamDesign(DesignBlock):
 
 
 class Outputs(Model):
-    """What else the curve is to have a column of."""
+    """Further columns of the curve."""
 
     nodes: tuple[str, ...] = Field((), max_length=100, description="nodes whose motion is reported: [tip]")
     reactions: tuple[str, ...] = Field(
@@ -172,7 +172,7 @@ class Outputs(Model):
 
 
 class BeamAnalysis(Analysis):
-    """How a beam mechanism is run."""
+    """Analysis of a beam mechanism."""
 
     points: int = Field(181, ge=5, le=1_000_000, description="points of the curve, even over the travel or the load")
     travel: Displacement | None = Field(None, description="final displacement or angle, for a drive by motion")
@@ -299,7 +299,7 @@ class BeamSpec(Spec):
 
     @property
     def stress(self) -> Literal["bending", "total"]:
-        """What counts as stress."""
+        """Kind of stress."""
         return self.analysis.stress or ("bending" if self.fidelity == "inextensible" else "total")
 
     @property
@@ -310,12 +310,12 @@ class BeamSpec(Spec):
 
     @property
     def motion(self) -> Literal["length", "angle"]:
-        """What the curve runs over: the displacement or the angle of the driven node."""
+        """Abscissa of the curve: the displacement or the angle of the driven node."""
         return "angle" if self.mechanism.drive.turns else "length"
 
     @property
     def extent(self) -> float:
-        """How far the drive goes: the travel [m or rad], the force [N] or the moment [N m]."""
+        """End of the drive: the travel [m or rad], the force [N] or the moment [N m]."""
         value: float = getattr(self.analysis, self.mechanism.drive.extent)
         return float(value)
 

@@ -219,7 +219,7 @@ class Tip:
         return self.contact(place, way) * (slope + self.surface.friction) / np.hypot(1.0, slope)
 
     def follows(self, place: FloatArray) -> Any:
-        """Tell at which places the mechanism is solved for what the surface asks of it, and presses on it."""
+        """Return at which places the mechanism follows the surface and presses on it."""
         u = self.displacement(place)
         slack = _SLACK * (self.x[-1] - self.x[0])
         inside = (u >= self.x[0] - slack) & (u <= self.x[-1] + slack)

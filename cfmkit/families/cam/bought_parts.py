@@ -1,4 +1,4 @@
-"""What is bought for a cam mechanism: springs, bearings and pins that the specification names or dimensions."""
+"""Bought parts of a cam mechanism: springs, bearings and pins that the specification names or dimensions."""
 
 from __future__ import annotations
 

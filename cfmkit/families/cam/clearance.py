@@ -1,4 +1,4 @@
-"""How far the moving parts of a cam mechanism stay from the plate, its screws and each other over the travel.
+"""Clearances of the moving parts of a cam mechanism to the plate, its screws and each other over the travel.
 
 Rollers run in the plane of the plate; braces, springs and slider move beside it, where only the heads of its screws
 stand out.

@@ -211,7 +211,7 @@ def curvature(result: Result) -> Figure:
         found.append(MarkedRange(float(x[0]), profile.corner.first_contact, text))
     scales = Scale("x of the roller's axis", "length"), Scale("radius of curvature", "length", log=True)
     series = [Series(radius, "roller path", BLUE, prefer=0.5), Series(flank, "cam", GREY, dashed=True, prefer=0.15)]
-    heading = Heading.of(result, "is the roller small enough for its path?")
+    heading = Heading.of(result, "Radius of curvature")
     figure = diagram_figure(heading, [Diagram(x, *scales, series, limits, found)], top_mm=9.0)
     travel = profile.path.travel(x) + solution.origin
     top_axis(figure.axes[0], parts.mm(x), parts.mm(travel), TRAVEL.label)

@@ -1,4 +1,4 @@
-"""What a cam mechanism can suffer from, by name, and the checks that find it and put it into numbers.
+"""Warnings of the cam family: their rules and sentences.
 
 The names are stable; the sentences say what the name means. The message that a run reports carries the numbers that
 decide and the cure.
@@ -37,7 +37,6 @@ FINDINGS = {
     "start",
     "undercut": "the roller is larger than the path's radius of curvature: the cam starts with a corner",
     "undercut_total": "the roller is so large that no part of the flank remains",
-    "contact_not_single_valued": "while the roller pivots on the corner, the contact does not follow the slider",
     "corner_pressure": "on the sharp corner the contact pressure is unbounded",
     "overstressed": "the contact pressure exceeds the one at which the material first yields below the surface",
     "up_jam": "the mechanism self-locks: no force moves the slider up",
@@ -160,8 +159,9 @@ def rubbing_left_out(spec: CamSpec, model: str) -> tuple[Finding, ...]:
 
 
 def _undercut(solution: Solution) -> tuple[str, ...]:
-    profile, corner = solution.assembly.track.profile, solution.corner_travel
-    law = profile.path.law
+    profile, travel = solution.assembly.track.profile, solution.corner_travel
+    assert profile.corner is not None
+    law, point = profile.path.law, profile.corner.point
     (place, radius), missing = law.tightest(profile.end), max(-_offset(solution), 0.0)
     where = "at the start" if place <= law.rest_half_width else f"at x = {mm(place)}"
     roller = f"the {mm(profile.roller_radius - missing)} roller"
@@ -175,8 +175,8 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
     fits = f"a roller <= {mm(radius - missing)}" if radius > missing else "less missing material"
     return (
         f"{roller} is larger than the path's smallest radius of curvature "
-        f"({mm(radius)}, {where}); the first {mm(corner)} run on a corner, "
-        f"without the {'constant force' if law.constant else 'force it is cut for'}. "
+        f"({mm(radius)}, {where}): over the first {mm(travel)} it runs on the corner at x = {mm(point[0])}, "
+        f"y = {mm(point[1])}, and {'the force is not constant' if law.constant else 'the force is not as cut'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,
     )
@@ -184,17 +184,8 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
 
 def _undercut_in_short(solution: Solution) -> str:
     law = solution.assembly.track.profile.path.law
-    what = "no constant force" if law.constant else "force not as cut"
-    return f"{what} for the first {mm(solution.corner_travel)}"
-
-
-def _two_contacts(solution: Solution) -> tuple[str, ...]:
-    corner, travel = solution.assembly.track.profile.corner, mm(solution.corner_travel)
-    assert corner is not None
-    return (
-        f"for the first {travel} of travel the contact stays on the corner at x = {mm(corner.point[0])}, "
-        f"y = {mm(corner.point[1])}: a profile x(y) measured by the roller's height is not single-valued there",
-    )
+    what = "force not constant" if law.constant else "force not as cut"
+    return f"{what} over the first {mm(solution.corner_travel)}"
 
 
 def _corner_pressure(solution: Solution) -> tuple[str, ...]:
@@ -353,12 +344,6 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     number = max(map(len, solution.all_jams))
     return (
         FindingRule("undercut", _is_undercut, _undercut, _undercut_in_short),
-        FindingRule(
-            "contact_not_single_valued",
-            _is_undercut,
-            _two_contacts,
-            lambda one: f"contact on a corner for the first {mm(one.corner_travel)}",
-        ),
         FindingRule(
             "corner_pressure",
             lambda one: one.mechanism.contact is not None and _is_undercut(one),

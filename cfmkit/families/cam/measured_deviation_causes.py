@@ -1,4 +1,4 @@
-"""Where a measured loop departs from the constant force: profile, friction, rest length of the springs.
+"""Causes of the departure of a measured loop: profile, friction, rest length of the springs.
 
 The area between the branches is proportional to the rolling friction, whatever moves both of them
 together; the line midway between them is not moved by friction, but by springs that are longer or

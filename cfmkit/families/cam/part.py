@@ -1,4 +1,4 @@
-"""Where plate, rollers, slider and springs of a cam mechanism are over its motion; lengths in metres."""
+"""Geometry of a cam mechanism over its motion; lengths in metres."""
 
 from __future__ import annotations
 

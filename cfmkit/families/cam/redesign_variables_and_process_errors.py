@@ -1,4 +1,4 @@
-"""What a yield of cams depends on: values of the design that may change for it, and values that err."""
+"""Variables of a yield of cams: values of the design that may change for it, and values that err."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of a cam mechanism that was put together and solved.
+"""Solution of a cam mechanism.
 
 Values are computed when they are first read; figures, findings and results import these types.
 """
@@ -93,7 +93,7 @@ class Solution(ShortRepr):
 
     @property
     def mechanism(self) -> Any:
-        """What the specification says of the mechanism."""
+        """Block `mechanism` of the specification."""
         return self.assembly.spec.mechanism
 
     def of_each_cam(self, read: Callable[[Assembly], float]) -> FloatArray:
@@ -233,7 +233,7 @@ class Solution(ShortRepr):
 
     @property
     def requested(self) -> Any:
-        """How far the sliders were to go [m]; without a request, as far as the flank was to be cut."""
+        """Requested travel of the sliders [m]; without a request, as far as the flank was to be cut."""
         analysis, stroke, last = self.assembly.spec.analysis, self.mechanism.profile.stroke, self.travel[..., -1:]
         if analysis.travel is not None:
             return analysis.travel

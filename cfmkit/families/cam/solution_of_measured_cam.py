@@ -1,4 +1,4 @@
-"""What is known of a mechanism with a measured cam: both sides, and the parts of the force."""
+"""Solution of a mechanism with a measured cam: both sides, and the parts of the force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a YAML specification of a cam mechanism may say."""
+"""YAML specification of a cam mechanism may say."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Plate(Model):
 
 
 class Stops(Model):
-    """Where the slider is stopped, as travel from the start of the roller path."""
+    """Stops of the slider, as travel from the start of the roller path."""
 
     lower: NonNegativeLength = Field(0.0, description="lowest position: the curve begins there")
     upper: PositiveLength | None = Field(None, description="highest position; default: only the end of the flank")
@@ -97,7 +97,7 @@ class Envelope(Model):
 
 
 class Contact(Model):
-    """What decides the contact pressure between roller and cam."""
+    """Contact of roller and cam, for its pressure."""
 
     width: PositiveLength = Field(description="width of the line contact, usually the plate's thickness")
     material: MaterialField = Field(
@@ -107,7 +107,7 @@ class Contact(Model):
 
 
 class Bearings(Model):
-    """What a roller turns on: its friction, and how long it lasts."""
+    """Bearings of a roller: its friction, and how long it lasts."""
 
     bore: PositiveLength = Field(description="diameter of its shaft, at which the friction acts")
     friction: Friction = Field(
@@ -128,7 +128,7 @@ MOUNTINGS = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
 
 
 class Mounting(Model):
-    """How the mechanism stands in the field of gravity."""
+    """Attitude of the mechanism in the field of gravity."""
 
     elevation: Annotated[Angle, Field(ge=-0.5 * pi, le=0.5 * pi)] = Field(
         0.5 * pi,
@@ -274,7 +274,7 @@ class Mechanism(Model):
 
 
 class CamDesign(DesignBlock):
-    """What `cfmkit design` is to reach, and what it may choose."""
+    """Targets and choices of `cfmkit design`."""
 
     force: Annotated[Force, Field(gt=0)] | None = Field(
         None, description="target force, weight included if gravity is on"
@@ -369,7 +369,7 @@ class Manufacturing(Model):
 
 
 class CamAnalysis(Analysis):
-    """How a cam mechanism is run."""
+    """Analysis of a cam mechanism."""
 
     travel: PositiveLength | None = Field(None, description="slider travel; default: the profile's stroke")
     gravity: bool | None = Field(

@@ -1,4 +1,4 @@
-"""What a specification may say about the springs of a cam mechanism."""
+"""Specification of the springs of a cam mechanism."""
 
 from __future__ import annotations
 

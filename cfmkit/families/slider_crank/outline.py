@@ -1,4 +1,4 @@
-"""What is cut or printed of a slider-crank: outlines of its links, or of its part, and the mirror image of a pair."""
+"""Outlines of a slider-crank as cut or printed: its links, or its part, and the mirror image of a pair."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the material of a slider-crank is over its motion: a printed part, or links and pins with their springs."""
+"""Geometry of a slider-crank over its motion: a printed part, or links and pins with their springs."""
 
 from __future__ import annotations
 

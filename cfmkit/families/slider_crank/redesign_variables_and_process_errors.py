@@ -1,4 +1,4 @@
-"""What a yield depends on: values that the design chooses and may change for it, and values that a process errs in."""
+"""Variables of a yield: values that the design chooses and may change for it, and values that a process errs in."""
 
 from __future__ import annotations
 

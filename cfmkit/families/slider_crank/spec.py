@@ -1,4 +1,4 @@
-"""What a YAML specification of a slider-crank mechanism may say."""
+"""YAML specification of a slider-crank mechanism may say."""
 
 from __future__ import annotations
 
@@ -77,11 +77,11 @@ class Mechanism(Printed):
 
 
 class CrankDesign(SpringDesign, PrintedDesign):
-    """What `cfmkit design` is to reach: rates of the springs, and lengths where a range is given."""
+    """Targets of `cfmkit design`: rates of the springs, and lengths where a range is given."""
 
 
 class CrankAnalysis(PrintedAnalysis):
-    """How a slider-crank is run."""
+    """Analysis of a slider-crank."""
 
     drive: Literal["torque", "force"] = Field(
         "torque", description="torque at the crank over its angle, or force at the slider over its travel"
@@ -136,7 +136,7 @@ class SliderCrankSpec(Spec):
 
     @property
     def motion(self) -> Literal["length", "angle"]:
-        """What the curve runs over: the slider's travel, or the angle of the crank; printed parts are pressed."""
+        """Abscissa of the curve: the slider's travel, or the angle of the crank; printed parts are pressed."""
         return "length" if self.analysis.drive == "force" or self.fidelity != "prb" else "angle"
 
     @property
@@ -151,7 +151,7 @@ class SliderCrankSpec(Spec):
 
     @property
     def piece(self) -> Literal["prb", "lumped", "beam"]:
-        """What is made: links and springs, flexures or a strip; of a solid the finest that there is data for."""
+        """Kind: links and springs, flexures or a strip; of a solid the finest that there is data for."""
         return self.mechanism.finest if self.fidelity == "solid" else self.fidelity
 
     @model_validator(mode="after")

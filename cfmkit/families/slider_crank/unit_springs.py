@@ -1,4 +1,4 @@
-"""What a unit spring at each joint of a slider-crank gives: over the crank's angle, or over the slider's travel.
+"""Effort of a unit spring at each joint of a slider-crank: over the crank's angle, or over the slider's travel.
 
 Torsion springs at pivot A, crank pin B and slider pin C, an extension spring at the slider, all
 relaxed in one position. Energy, effort and stiffness are linear in the four rates, so

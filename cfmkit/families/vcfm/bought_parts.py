@@ -1,4 +1,4 @@
-"""What is bought for a mechanism of snap-through leaves: its springs, where they are no structure of leaves."""
+"""Bought parts of a mechanism of snap-through leaves: its springs, where they are no structure of leaves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a specification may say about springs that are bought in place of a structure of leaves."""
+"""Specification of springs that are bought in place of a structure of leaves."""
 
 from __future__ import annotations
 

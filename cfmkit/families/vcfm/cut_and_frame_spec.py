@@ -1,4 +1,4 @@
-"""How leaves and spring are cut, and what stands around them, in a specification."""
+"""Specification of the cut of leaves and spring, and of the frame around them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cfmkit.stock.material_and_part_spec import CutPart, PartFrame, RoundedCorne
 
 
 class StandingFrame(PartFrame):
-    """What joins the walls, stops the shuttle and holds the preload of the spring."""
+    """Frame: it joins the walls, stops the shuttle and holds the preload of the spring."""
 
     stop: PositiveLength | None = Field(
         None, description="travel at which a bar across the shuttle's top lands on the walls; default: no stop"
@@ -22,7 +22,7 @@ class StandingFrame(PartFrame):
 
 
 class VcfmPart(CutPart):
-    """How both parts are cut, and what of them stands."""
+    """Cut of both parts, and what of them stands."""
 
     frame: StandingFrame | None = Field(
         None, description="{wall, shuttle, ground, stop, seat}: thicknesses, a stop of the travel, a seat of the spring"
@@ -30,7 +30,7 @@ class VcfmPart(CutPart):
 
 
 class CutLeaves(RoundedCorners):
-    """What a mechanism of `bistable` leaves, and a `positive` spring unless that is bought, knows of its part."""
+    """Part of a mechanism of `bistable` leaves and, unless it is bought, a `positive` spring."""
 
     @property
     def thinnest(self: Any) -> float:

@@ -76,8 +76,7 @@ def _network_of(about: Bistable, made_of: MaterialSpec, wide: bool) -> Network:
 
 
 KEPT = 128
-"""Paths of leaves, some 50 kB each: a catalogue asks for one leaf with one spring after another, a wish for one design
-in one room after another."""
+"""Paths of leaves, some 50 kB each: a catalogue needs one leaf with many springs, `suggest` one in many envelopes."""
 
 
 @lru_cache(maxsize=KEPT)

@@ -287,7 +287,7 @@ def _poses(solution: Solution) -> list[tuple[str, float, float]]:
     low, high = solution.window_of_one
     middle = 0.5 * (low + high)
     reported, pushed = value_text(middle, "length"), value_text(most.preload, "length")
-    first = [("as made", 0.0, 0.0), (f"pushed by {reported}", middle, nominal.preload)]
+    first = [("unloaded", 0.0, 0.0), (f"pushed by {reported}", middle, nominal.preload)]
     if most.preload == nominal.preload:
         end = float(nominal.travel[-1])
         flat = solution.parts.balance

@@ -1,4 +1,4 @@
-"""What would make the force of a mechanism flat over its window: other widths, or another window; only what was tried.
+"""Remedies for a force that is not flat over its window: other widths, or another window; only what was tried.
 
 Forces are linear in the widths, so that other widths need no other solution.
 """

@@ -1,4 +1,4 @@
-"""What a specification may say about the leaves that snap through and about a spring of leaves, and of which kinds."""
+"""Specification of the leaves that snap through and about a spring of leaves, and of which kinds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the material of a mechanism is: exact edges as made, and everything when the shuttle has travelled so far.
+"""Geometry of a mechanism: exact edges as made, and everything when the shuttle has travelled so far.
 
 The shuttle moves down along x = 0; the leaves go from it to the walls at both sides, the spring stands below it on
 a base that the preload pushes up. The as-made apex of the lowest leaves is the origin.

@@ -133,7 +133,7 @@ class SolidSampler(ExactSampler):
         self.accuracy = self.mesh_error.force
 
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
-        """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
+        """Return at which travels [m] leaves and, unless it is bought, spring have a pose."""
         found = _poses_at(travel, (self.pushed, self.pulled))
         if self.coils is None:
             found &= _poses_at(self.chain.travel * (travel + preload), self.sides)
@@ -141,7 +141,7 @@ class SolidSampler(ExactSampler):
 
 
 def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
-    """Tell at which travels (n,) [m] one of some paths has a pose."""
+    """Return at which travels (n,) [m] one of some paths has a pose."""
     known = np.concatenate([path.solved.course.solved_travel for path in paths])
     near = 1e-9 * float(np.abs(known).max(initial=0.0))
     return np.asarray((np.abs(places[:, None] - known) <= near).any(axis=1))

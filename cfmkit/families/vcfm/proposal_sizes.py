@@ -11,9 +11,9 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import coils, spring_room
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.suggestion_request import Request
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmSpec
-    from cfmkit.families.wishes import Wish
 
 
 def fit_in_window(
@@ -54,7 +54,7 @@ def opened(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSp
 
 
 def preloads_for(
-    spec: VcfmSpec, wish: Wish, per_force: float | None = None, known: tuple[float, ...] = (0.0,)
+    spec: VcfmSpec, request: Request, per_force: float | None = None, known: tuple[float, ...] = (0.0,)
 ) -> tuple[float, ...]:
     """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
 
@@ -62,13 +62,13 @@ def preloads_for(
     `known` are those of a mechanism that has them already: without an adjustment they stay.
     """
     design, bought = spec.design, spec.mechanism.springs
-    if wish.adjustable is None or (len(known) == 1 and (design is None or not design.adjustment)):
+    if request.adjustable is None or (len(known) == 1 and (design is None or not design.adjustment)):
         return known
     if per_force is None:
         stroke = design.preload_stroke / design.adjustment if design and design.adjustment else 0.0
         per_force = stroke if bought is None else 1.0 / coils(bought).stiffness
-    low, high = wish.adjustable
-    return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
+    low, high = request.adjustable
+    return (0.0, *(one for one in ((high - request.target) * per_force, (low - request.target) * per_force) if one))
 
 
 def widened(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:

@@ -1,4 +1,4 @@
-"""Where the closed forms of leaves and spring hold, and what is said of a mechanism that is beyond.
+"""Range of the closed forms of leaves and spring, and warnings beyond it.
 
 Predicates take the solution of any number of mechanisms, sentences that of one.
 """

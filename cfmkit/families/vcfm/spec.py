@@ -1,4 +1,4 @@
-"""What a YAML specification of a V-beam and diamond mechanism may say."""
+"""YAML specification of a V-beam and diamond mechanism may say."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Mechanism(CutLeaves, Model):
 
 
 class VcfmDesign(DesignBlock):
-    """What `cfmkit design` is to reach. Angle and thickness of the spring, and the number of leaves, stay."""
+    """Targets of `cfmkit design`. Angle and thickness of the spring, and the number of leaves, stay."""
 
     force: Annotated[Force, Field(gt=0)] | None = Field(None, description="constant force without preload")
     target: Target | None = Field(
@@ -184,7 +184,7 @@ class VcfmDesign(DesignBlock):
 
 
 class Measured(Model):
-    """What is reported of a built mechanism, to be checked for consistency."""
+    """Reported values of a built mechanism, to be checked for consistency."""
 
     force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
     positive_stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="K_p of the spring")
@@ -207,7 +207,7 @@ OTHER_DEFAULTS = "; ".join(
 
 
 class VcfmAnalysis(Analysis):
-    """How the mechanism is run. Displacements are the shuttle's from the as-made pose."""
+    """Analysis of the mechanism. Displacements are the shuttle's from the as-made pose."""
 
     preloads: tuple[Length, ...] = Field(
         (0.0,),
@@ -367,6 +367,6 @@ class VcfmSpec(Spec):
 
     @property
     def travel(self) -> float:
-        """How far the shuttle goes [m]."""
+        """Travel of the shuttle [m]."""
         leaf = self.mechanism.bistable
         return self.analysis.travel or 1.4 * leaf.length * sin(leaf.angle)

@@ -1,4 +1,4 @@
-"""Where walls, stop of the travel and seat of the spring stand: what of the leaves' part does not bend."""
+"""Walls, stop of the travel and seat of the spring: what of the leaves' part does not bend."""
 
 from __future__ import annotations
 

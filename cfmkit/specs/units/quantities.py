@@ -168,7 +168,7 @@ def _split(text: str, dimensions: tuple[str, ...]) -> tuple[str, str]:
 
 
 def _no_number(text: str, dimensions: tuple[str, ...]) -> str:
-    """Say what is wrong with text that does not start with a number."""
+    """Return an error about text that does not start with a number."""
     for part in (text.split(" ")[0], re.split("[A-Za-z%]", text)[0].strip(" "), text):
         if complaint := number_complaint(part):
             return complaint
@@ -250,7 +250,7 @@ _MOST_TRIES = 200
 
 
 def unit_complaint(unit: str, dimensions: Sequence[str]) -> str:
-    """Say that `unit` is none, and name the nearest one, of the wanted dimensions if there is one."""
+    """Return an error that `unit` is none, with the nearest one, of the wanted dimensions if possible."""
     if "(" in unit and is_unit(re.sub("[()]", "", unit)):
         return f"{shown(unit)} has parentheses; write the unit without them, e.g. N/mm/s"
     if re.search(r"[A-Za-z%)] +[A-Za-z(]", unit) and all(word in SYMBOLS for word in re.findall("[A-Za-z%]+", unit)):

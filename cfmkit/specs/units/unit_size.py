@@ -24,7 +24,7 @@ _BASES = {"meter": "m", "kilogram": "kg", "second": "s", "radian": "rad"}
 
 @dataclass(frozen=True)
 class Size:
-    """What a unit is in SI: its exact size, and the powers of m, kg, s and rad."""
+    """Unit in SI: its exact size, and the powers of m, kg, s and rad."""
 
     factor: Fraction
     powers: tuple[tuple[str, int], ...]

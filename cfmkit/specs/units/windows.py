@@ -36,7 +36,7 @@ class TravelShare(Place):
         return not self == other
 
     def __hash__(self) -> int:
-        """Tell a share from a place of the same number."""
+        """Distinguish a share from a place of the same number."""
         return hash((SHARE, float(self)))
 
     def __reduce__(self) -> tuple[type[TravelShare], tuple[float]]:  # type: ignore[override]

@@ -1,4 +1,4 @@
-"""What a specification's type allows at a path: its fields, choices and examples.
+"""Content that a specification's type allows at a path: its fields, choices and examples.
 
 pydantic tells where an error is by `loc`, which mixes keys with the labels of
 union members. `trace` follows it through the types and the tree side by side, so
@@ -103,7 +103,7 @@ class Slot:
 
 @dataclass(frozen=True)
 class Trace:
-    """Where a pydantic error is: the path in the tree, what is there, and what is allowed."""
+    """Location of a pydantic error: the path in the tree, what is there, and what is allowed."""
 
     path: Path
     node: Any

@@ -34,7 +34,7 @@ MOST_PROBLEMS = 100
 
 @dataclass(frozen=True)
 class YamlDocument:
-    """What a file and the options after it say, before any type is known."""
+    """Content of a file and the options after it, before any type is known."""
 
     tree: Any  # nested dicts, tuples, text, numbers, bools and None
     source: str  # the file's name for messages
@@ -203,7 +203,7 @@ class Option:
 
     @property
     def label(self) -> str:
-        """How messages name it: ``--set a.b``."""
+        """Its name in messages: ``--set a.b``."""
         return "--set " + dotted(self.path)
 
 

@@ -1,4 +1,4 @@
-"""What pydantic found, in the words of the person who wrote the specification.
+"""Errors of pydantic in the words of the person who wrote the specification.
 
 One fault gives one message: of a union only the member that the user can have
 meant is heard, and a missing key is not reported where a misspelt one explains it.
@@ -156,7 +156,7 @@ def _unknown_kind(line: _Error) -> Complaint:
 
 
 def not_among(value: Any, allowed: Sequence[Any]) -> str:
-    """Say that a value is none of a closed list of words, and which one comes near."""
+    """Return an error that a value is none of a closed list of words, and which one comes near."""
     if len(allowed) == 1:
         return f"{described(value)} is not allowed here, only {described(allowed[0])} is"
     hint = did_you_mean(str(value), [str(item) for item in allowed])
@@ -193,7 +193,7 @@ def _without_echoes(complaints: list[Complaint]) -> list[Complaint]:
 
 
 def _needs(line: _Error) -> str:
-    """Say what is wanted in place of what is there."""
+    """Return what is needed in place of what is there, in words."""
     value = line.trace.node
     if value is None:
         return f"nothing is given here; {expected(line.trace.slots)} is needed"

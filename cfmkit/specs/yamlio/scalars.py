@@ -1,4 +1,4 @@
-"""What an unquoted scalar of a specification means: YAML 1.2, minus what misleads.
+"""Meaning of an unquoted scalar: YAML 1.2, minus what misleads.
 
 YAML 1.1 reads ``1:30`` as 90, ``010`` as 8 and ``no`` as false; 1.2 does not, and
 people expect either. What two readers take differently is refused with a hint.

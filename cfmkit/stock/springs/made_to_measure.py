@@ -1,4 +1,4 @@
-"""Springs wound to measure: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
+"""Custom springs: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
 The formulas are those of `cfmkit.stock.springs.helical_spring_formulas`, the wire is music wire of the diameters in its
 table, the share of the strength is that of the generic series. Bodies are close-wound, loops are as high as the inside
@@ -55,7 +55,7 @@ def as_stated(spring: Wound) -> dict[str, Any]:
     """Return designation and wire of a spring as a specification has them."""
     wire, coil = (format_short(size, "length") for size in (spring.wire, spring.coil))
     return {
-        "name": f"wound to measure, wire {wire}, coil {coil}, {spring.turns:.3g} turns",
+        "name": f"custom, wire {wire}, coil {coil}, {spring.turns:.3g} turns",
         "wound": {"wire": spring.wire, "coil": spring.coil, "turns": spring.turns},
     }
 

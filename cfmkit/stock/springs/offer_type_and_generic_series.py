@@ -1,4 +1,4 @@
-"""What springs are on offer: those of a list, or the generic series; and which of them come nearest where none fits.
+"""Springs on offer: those of a list, or the generic series; and which of them come nearest where none fits.
 
 The generic series is no maker's list: it is computed (`cfmkit.stock.springs.helical_spring_formulas`) from preferred
 numbers of wire diameters, spring indices and turns. It says what can be had; the spring itself is then bought by its

@@ -1,4 +1,4 @@
-"""How every family's `design.catalogue` says what springs are on offer: a list, a file, or the generic series."""
+"""Springs on offer in `design.catalogue`: a list, a file, or the generic series."""
 
 from __future__ import annotations
 

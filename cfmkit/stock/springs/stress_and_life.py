@@ -1,4 +1,4 @@
-"""What a bought spring is put through by the mechanism that it is built into: the stress in its wire, and its life.
+"""Load of a bought spring in its mechanism: the stress in its wire, and its life.
 
 The life follows from the S-N data of the wire where they are given, between the smallest and the largest load of the
 travel [W, ch. 4: stress with the factor of curvature]; else it is what the maker states. Nothing is assumed.

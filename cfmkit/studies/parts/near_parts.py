@@ -237,13 +237,14 @@ def _reported(found: Assumed, shares: ExpectedShares) -> str:
     if found.as_stated:
         reported.append("moduli of beams' own materials as stated")
     reason = f": {process.reason}" if "thickness" in used else ""
-    text = f"{_about(shares.good)} parts would meet the requirements if made by {process.name} "
-    text += f"({', '.join(reported)}; assumed{reason}; to first order)"
-    return text if found.modulus is None else f"{text}, {_about(shares.measured)} parts once the modulus is measured"
+    text = f"{_about(shares.good)} ({process.name}, assumed tolerances)"
+    if found.modulus is not None:
+        text += f", {_about(shares.measured)} once the modulus is measured"
+    return f"{text}: {', '.join(reported)}{reason}; linear estimate"
 
 
 def _about(share: Share) -> str:
-    """Return a share of drawn parts, before the word 'parts': to two digits, and never as all of them or none."""
+    """Return a share of drawn parts to two digits, and never as all of them or none."""
     if 100.0 * share.value >= 99.5:
-        return "over 99 % of"
-    return f"about {100.0 * share.value:.2g} % of" if share.good else "hardly any"
+        return "over 99 %"
+    return f"about {100.0 * share.value:.2g} %" if share.good else "hardly any"

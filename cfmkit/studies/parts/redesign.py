@@ -353,16 +353,16 @@ def _designed(design: Design, part: PartNumbers, found: RobustResult, good: int,
     x, spec, worst = found.x, part.written(found, problem), part.costliest(found, problem)
     if _misses(good, problem):
         return _impossible(design, part, good, worst, problem)
-    solved = f"of {CHECKED} parts that were solved {good} are good; the tolerance that costs most is that of {worst}"
+    solved = f"{good} of {CHECKED} solved parts meet them; largest contributor: {worst}"
     reported = (
-        f"{len(x)} values moved in {found.steps} steps: to first order about {100 * found.began:.3g} % of parts were "
-        f"good before and {100 * found.share:.3g} % are now; {solved}"
+        f"{len(x)} values moved in {found.steps} steps: yield about {100 * found.began:.3g} % before, "
+        f"{100 * found.share:.3g} % now (linear estimate); {solved}"
         if len(x)
         else f"{NOTHING_FREE}; {solved}"
     )
     numbers: dict[str, tuple[float | None, str, str]] = {
         "margins_steps": (float(found.steps), "count", "steps towards the requested yield"),
-        "margins_first_order": (found.share, "ratio", "share of good parts, estimated to first order"),
+        "margins_first_order": (found.share, "ratio", "yield, linear estimate"),
         "margins_solved": (good / CHECKED, "ratio", f"share of {CHECKED} parts that were solved at a few poses"),
     }
     places = part.rows.places
@@ -379,8 +379,8 @@ def _impossible(design: Design, part: PartNumbers, good: int, worst: str, proble
     if not len(problem.bounds):
         reported, cure = f"{NOTHING_FREE} until {wanted}", "name such values"
     reported += (
-        f": {value:.3g} % at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: "
-        f"make it tighter, {cure} or require less"
+        f": {value:.3g} % at most, of {CHECKED} that were solved; largest contributor: {worst}: "
+        f"make its tolerance tighter, {cure} or require less"
     )
     if short := part.ends_early():
         reported += (

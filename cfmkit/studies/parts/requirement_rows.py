@@ -61,7 +61,7 @@ class RequirementRows:
 
     @property
     def efforts(self) -> int:
-        """How many of the numbers, the first ones, are efforts."""
+        """Number of the first values that are efforts."""
         return len(self.branches) * len(self.places)
 
     def limits(self, numbers: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isnan, nan, sqrt
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,7 +22,6 @@ LEVEL = 0.95
 """Confidence of every interval."""
 
 Interval = tuple[float, float]
-Fate = Literal["bad", "unknown", "either"]
 
 
 @dataclass(frozen=True)
@@ -30,48 +29,29 @@ class Share:
     """Share of good parts among some."""
 
     good: int  # parts that meet everything
-    failed: int  # parts without a complete result
+    failed: int  # parts without a complete result, which count as bad
     count: int  # all parts
-    # what a failed part is: a bad one; unknown, so that the share has no value; either, so that it lies between two
-    fate: Fate = "bad"
     why: str = ""  # what became of the first failed part
 
     @classmethod
-    def of(cls, met: NDArray[np.bool_], failed: NDArray[np.bool_], fate: Fate = "bad", why: str = "") -> Share:
-        """Return the share of parts that meet what they should, (n,), and of which it is known."""
-        return cls(int((met & ~failed).sum()), int(failed.sum()), len(met), fate, why)
-
-    @property
-    def most(self) -> int:
-        """Number of good parts, should all failed ones whose fate is open be good."""
-        return self.good + (0 if self.fate == "bad" else self.failed)
-
-    @property
-    def ends(self) -> Interval:
-        """The shares if all failed parts whose fate is open are bad, and if all are good."""
-        return self.good / self.count, self.most / self.count
-
-    @property
-    def known(self) -> bool:
-        """Whether the share can be stated."""
-        return bool(self.count) and not (self.failed and self.fate == "unknown")
+    def of(cls, met: NDArray[np.bool_], failed: NDArray[np.bool_], why: str = "") -> Share:
+        """Return the share of parts that meet what they should, (n,), of which some failed."""
+        return cls(int((met & ~failed).sum()), int(failed.sum()), len(met), why)
 
     @property
     def value(self) -> float:
-        """The share, between the ends where they differ; NaN if it cannot be stated."""
-        return (self.good + self.most) / (2.0 * self.count) if self.known else nan
+        """The share; NaN of no parts."""
+        return self.good / self.count if self.count else nan
 
     @property
     def wilson(self) -> Interval:
-        """Score interval of the share [W], which holds every fate of failed parts."""
-        return (wilson(self.good, self.count)[0], wilson(self.most, self.count)[1]) if self.known else (nan, nan)
+        """Score interval of the share [W]."""
+        return wilson(self.good, self.count) if self.count else (nan, nan)
 
     @property
     def clopper_pearson(self) -> Interval:
-        """Exact interval of the share [CP], which holds every fate of failed parts."""
-        if not self.known:
-            return nan, nan
-        return clopper_pearson(self.good, self.count)[0], clopper_pearson(self.most, self.count)[1]
+        """Exact interval of the share [CP]."""
+        return clopper_pearson(self.good, self.count) if self.count else (nan, nan)
 
     def excludes(self, wanted: float) -> bool:
         """Return True if so few parts are good that the wanted share is out of the question, with 95 % confidence."""

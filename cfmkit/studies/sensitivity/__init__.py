@@ -1,8 +1,8 @@
-"""How results depend on parameters: six methods, and what becomes of samples that fail.
+"""Dependence of results on parameters: six methods, and what becomes of samples that fail.
 
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
-`oat`, `local`, `morris`, `sobol` and `monte_carlo_yield`, with `failed_sample_policy` (what a sample without a value
+`oat`, `local`, `morris`, `sobol` and `monte_carlo_yield`, with `indices` (what a sample without a value
 means for an index: never "no influence"). Distributions, made parts, shares of good ones and the tolerances that keep a
 yield are those of `cfmkit.studies.parts`.
 

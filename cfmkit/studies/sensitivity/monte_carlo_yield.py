@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.studies.parts.distributions import values_at
 from cfmkit.studies.parts.share import LEVEL, paired_difference
-from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
+from cfmkit.studies.sensitivity.indices import Analysis, Index
 from cfmkit.studies.sensitivity.sobol import RESAMPLES, varies_not
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.parts.distributions import ParameterSpread
-    from cfmkit.studies.sensitivity.failed_sample_policy import Policy
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
 TIGHTER = 0.5
@@ -56,20 +55,18 @@ def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups)
     return np.stack(blocks, axis=1)
 
 
-def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy) -> Index:
+def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Index:
     """Return how much the yield gains when each group is tightened.
 
     Parameters
     ----------
     met, failed : (n, 1 + groups) array of bool
-        As drawn, then tightened. Under ``bound`` a failed sample is a bad part.
-    policy : {"fail", "resample", "bound"}
-        What a failed sample means.
+        As drawn, then tightened. A failed sample is a bad part.
     """
     count = len(met)
     gains = []
     for group in range(1, met.shape[1]):
-        if not count or (policy != "bound" and failed[:, (0, group)].any()):
+        if not count:
             gains.append((np.nan, np.nan, np.nan))
             continue
         before, after = met[:, 0] & ~failed[:, 0], met[:, group] & ~failed[:, group]

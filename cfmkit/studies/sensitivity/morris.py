@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
+from cfmkit.studies.sensitivity.indices import Analysis, Index
 from cfmkit.studies.sensitivity.sobol import RESAMPLES, problem
 
 if TYPE_CHECKING:

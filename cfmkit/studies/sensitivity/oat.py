@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
+from cfmkit.studies.sensitivity.indices import Analysis, Index
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.studies.sensitivity.failed_sample_policy import Policy
 
 LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"
 
@@ -38,13 +37,8 @@ def sample(nominal: FloatArray, ends: FloatArray, count: int) -> FloatArray:
     return points
 
 
-def analyze(
-    nominal: FloatArray, ends: FloatArray, outputs: FloatArray, at_nominal: float, policy: Policy = "fail"
-) -> Analysis:
-    """Return what each parameter does to one output.
-
-    Where a point failed, the swing of that parameter is not stated; under ``bound`` it
-    is stated as "at least": its upper end is open.
+def analyze(nominal: FloatArray, ends: FloatArray, outputs: FloatArray, at_nominal: float) -> Analysis:
+    """Return what each parameter does to one output; where a point failed, its swing is not stated.
 
     Parameters
     ----------
@@ -56,22 +50,14 @@ def analyze(
         NaN where a point failed.
     at_nominal : float
         The output there.
-    policy : {"fail", "bound"}
-        What to say where a point failed.
     """
-    missing = np.isnan(outputs)
     low, high = outputs[:, 0], outputs[:, -1]
-    known = ~missing.any(axis=1)
-    if policy == "bound":
-        known = ~missing.all(axis=1)
-    filled = np.where(missing, at_nominal, outputs)
-    swing = np.where(known, filled.max(axis=1) - filled.min(axis=1), np.nan)
+    swing = outputs.max(axis=1) - outputs.min(axis=1)
     gap = np.full(len(low), np.nan)
-    top = np.where(known & missing.any(axis=1), np.inf, swing)
     return (
         Index(LOW, low, gap, gap),
         Index(HIGH, high, gap, gap),
-        Index(SWING, swing, swing, top),
+        Index(SWING, swing, swing, swing),
         Index(SLOPE, _slope(nominal, ends, high - low, at_nominal), gap, gap),
     )
 

@@ -18,18 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.store.safe_disk_changes import Data
-    from cfmkit.studies.parts.share import Share
     from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.setup import Setup
 
 YIELD = "share of parts that meet every requirement, of those drawn from the tolerances"
-POLICIES = {
-    "fail": "an index that needs a failed sample is not stated",
-    "resample": "blocks with failed samples were drawn again, whole: the indices hold for those parameter values at "
-    "which the mechanism works",
-    "bound": "failed samples taken as the smallest and as the largest value found: the intervals hold both",
-}
 
 
 def outputs(found: Findings) -> Iterator[tuple[str, Data]]:
@@ -101,19 +94,14 @@ def yield_ok(found: Findings) -> bool:
         return True
     share = found.all_met
     return share is not None and (
-        _shown_good(share, wanted) or (found.setup.method == "inverse" and share.wilson[1] >= wanted)
+        share.value >= wanted or (found.setup.method == "inverse" and share.wilson[1] >= wanted)
     )
-
-
-def _shown_good(share: Share, wanted: float) -> bool:
-    """Return whether so many parts are good, even if all whose fate is not known are bad."""
-    return share.value >= wanted and share.ends[0] >= wanted
 
 
 def by_interval(found: Findings) -> bool:
     """Return whether the yield is what was requested because its interval has that in it, and not its value."""
     wanted, share = found.setup.block.min_yield, found.all_met
-    return wanted is not None and share is not None and not _shown_good(share, wanted) and yield_ok(found)
+    return wanted is not None and share is not None and share.value < wanted and yield_ok(found)
 
 
 def message(found: Findings) -> str:
@@ -136,9 +124,8 @@ def warnings(found: Findings) -> tuple[Finding, ...]:
     evaluator, setup = found.evaluator, found.setup
     extra = []
     if evaluator.failed:
-        reported = f"{evaluator.failed} of {evaluator.count} samples have no result: {POLICIES[setup.policy]}"
-        if setup.policy == "resample":
-            reported += f" ({found.replaced} blocks)"
+        reported = f"{evaluator.failed} of {evaluator.count} samples have no result: indices that need them are not "
+        reported += "stated, and as parts they count as bad"
         extra.append(Finding("failed_samples", reported))
     elif found.unstated and not found.interrupted:
         reported = f"{found.unstated} indices are not stated: "
@@ -185,7 +172,7 @@ def _metrics(found: Findings) -> dict[str, Quantity]:
         for one, value in zip(study.metrics, values, strict=True)
     }
     if found.all_met is not None:
-        noted["yield"] = Quantity(_known(found.all_met.value), "ratio", YIELD, "samples failed")
+        noted["yield"] = Quantity(_known(found.all_met.value), "ratio", YIELD, "no parts were drawn")
     return noted
 
 
@@ -197,10 +184,9 @@ def _requirements(found: Findings) -> list[dict[str, Any]]:
     if wanted is None or found.all_met is None:
         return each
     value, good = _known(found.all_met.value), yield_ok(found)
-    shown = "no value (samples failed)" if value is None else f"{100 * value:.4g} %"
+    shown = "no value" if value is None else f"{100 * value:.4g} %"
     if value is not None and found.all_met.failed:
-        low, high = found.all_met.ends
-        shown = f"{100 * low:.4g} % to {100 * high:.4g} % (samples failed)"
+        shown += f" ({found.all_met.failed} of {found.all_met.count} parts failed)"
     outcome = "ok, within the 95 % interval" if by_interval(found) else "ok" if good else "missed"
     sentence = f"yield {shown}, required >= {100 * wanted:.4g} %: {outcome}"
     bounds = {"value": value, "min": wanted, "max": None, "unit": "1", "over": None, "over_unit": None}
@@ -218,9 +204,7 @@ def _samples(found: Findings) -> dict[str, Any]:
     if found.interrupted:
         about["missing"] = evaluator.missing
     return about | {
-        "replaced_blocks": found.replaced,
         "by_status": ends,
-        "on_failure": setup.policy,
         "seed": setup.seed,
     }
 

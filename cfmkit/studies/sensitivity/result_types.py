@@ -1,4 +1,4 @@
-"""What a sensitivity study found: indices as lines of a tidy table, the yield, and how many samples failed."""
+"""Outcome of a sensitivity study: indices as lines of a tidy table, the yield, and how many samples failed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.share import Share
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.evaluation import Evaluator
-    from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
+    from cfmkit.studies.sensitivity.indices import Analysis
     from cfmkit.studies.sensitivity.setup import Setup
 
 IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
@@ -50,7 +50,6 @@ class Findings:
     # points, outputs: blocks of samples, (b, s, d) and (b, s, m + r)
     points: FloatArray | None = None
     outputs: FloatArray | None = None
-    replaced: int = 0  # blocks that were drawn again
     all_met: Share | None = None  # of parts that meet all requirements
     each_met: tuple[Share, ...] = ()  # of parts that meet one
     interrupted: bool = False  # whether the user stopped it: there are no indices

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ from cfmkit.studies.parts.share import Share
 from cfmkit.studies.point_evaluation import Metric
 from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
-from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
+from cfmkit.studies.sensitivity.indices import analyze_complete
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
 from cfmkit.studies.sensitivity.result_types import stated as reported
 
@@ -27,9 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.parts.allowed_tolerances import ToleranceFactors
-    from cfmkit.studies.parts.share import Fate
     from cfmkit.studies.parts.uncertain_values import Parameter
-    from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
     from cfmkit.studies.sensitivity.setup import Setup
 
 DEFAULT_YIELD, ESTIMATED = 0.95, 4000
@@ -64,7 +63,7 @@ def _oat(setup: Setup, evaluator: Evaluator) -> Findings:
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         nominal = float(setup.nominal.values[m])
-        analysis = oat.analyze(setup.values, setup.ends, outputs[..., m], nominal, setup.policy)
+        analysis = oat.analyze(setup.values, setup.ends, outputs[..., m], nominal)
         found += lines_of(metric, setup.paths, analysis, setup.samples)
     return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 
@@ -126,99 +125,53 @@ def _morris(setup: Setup, evaluator: Evaluator) -> Findings:
     count, seed = len(setup.parameters), setup.seed
     spreads = [one.spread for one in setup.parameters]
 
-    def drawn(start: int, number: int) -> FloatArray:
-        unit = morris.sample(start, number, count, seed)
-        return values_across(spreads, unit.reshape(-1, count)).reshape(unit.shape)
-
+    unit = morris.sample(0, setup.samples, count, seed)
+    points = values_across(spreads, unit.reshape(-1, count)).reshape(unit.shape)
     roles = [f"step {k}" for k in range(count + 1)]
-    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
+    outputs = evaluator.outputs(points, roles)
     low, high = setup.ends.T
-    grid = np.rint((blocks.points - low) / (high - low) * (morris.LEVELS - 1)) / (morris.LEVELS - 1)
+    grid = np.rint((points - low) / (high - low) * (morris.LEVELS - 1)) / (morris.LEVELS - 1)
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
-        analysis = _stated(
-            setup, blocks.outputs[..., m], lambda one: morris.analyze(grid, one, seed), morris.NAMES, count
-        )
+        analysis = analyze_complete(outputs[..., m], lambda one: morris.analyze(grid, one, seed), morris.NAMES, count)
         found += lines_of(metric, setup.paths, analysis, len(grid))
-    return Findings(
-        setup,
-        evaluator,
-        tuple(found),
-        points=blocks.points,
-        outputs=blocks.outputs,
-        replaced=blocks.replaced,
-    )
+    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 
 
 def _sobol(setup: Setup, evaluator: Evaluator) -> Findings:
     count, seed = len(setup.parameters), setup.seed
     spreads = [one.spread for one in setup.parameters]
 
-    def drawn(start: int, number: int) -> FloatArray:
-        unit = sobol.sample(start, number, count, seed)
-        return values_at(spreads, unit.reshape(-1, count)).reshape(unit.shape)
-
+    unit = sobol.sample(0, setup.samples, count, seed)
+    points = values_at(spreads, unit.reshape(-1, count)).reshape(unit.shape)
     roles = ["A", *(f"A with {path} of B" for path in setup.paths), "B"]
-    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
+    outputs = evaluator.outputs(points, roles)
     found: list[IndexLine] = []
     on_the_way: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
-        outputs = blocks.outputs[..., m]
         for size in sobol.stages(len(outputs)):
-            analysis = _stated(setup, outputs[:size], lambda one: sobol.analyze(one, seed), sobol.NAMES, count)
+            known = outputs[:size, ..., m]
+            analysis = analyze_complete(known, lambda one: sobol.analyze(one, seed), sobol.NAMES, count)
             lines = list(lines_of(metric, setup.paths, analysis, size))
             on_the_way += lines
         found += lines
-    return Findings(
-        setup,
-        evaluator,
-        tuple(found),
-        tuple(on_the_way),
-        points=blocks.points,
-        outputs=blocks.outputs,
-        replaced=blocks.replaced,
-    )
+    return Findings(setup, evaluator, tuple(found), tuple(on_the_way), points=points, outputs=outputs)
 
 
 def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
     count, groups = len(setup.parameters), setup.together
     spreads = [one.spread for one in setup.parameters]
-
-    def drawn(start: int, number: int) -> FloatArray:
-        # One stream, so that more samples leave the first ones as they are.
-        unit = setup.parts.unit(start + number, setup.seed)[start:]
-        return monte_carlo_yield.sample(unit.reshape(number, count), spreads, groups)
-
+    unit = setup.parts.unit(setup.samples, setup.seed).reshape(setup.samples, count)
+    points = monte_carlo_yield.sample(unit, spreads, groups)
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
-    roles = [DRAWN, *(f"halved {name}" for name in names)]
-    blocks = evaluated(
-        drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy, _verdicts(setup)
-    )
+    outputs = evaluator.outputs(points, [DRAWN, *(f"halved {name}" for name in names)])
+    drops = partial(monte_carlo_yield.variance_drops, seed=setup.seed)
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
-        analysis = _stated(
-            setup,
-            _known(blocks.outputs[..., m], setup),
-            lambda one: monte_carlo_yield.variance_drops(one, setup.seed),
-            (monte_carlo_yield.VARIANCE_DROP,),
-            len(names),
-        )
-        found += lines_of(metric, names, analysis, len(blocks.outputs))
-    plain = Findings(
-        setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
-    )
+        analysis = analyze_complete(outputs[..., m], drops, (monte_carlo_yield.VARIANCE_DROP,), len(names))
+        found += lines_of(metric, names, analysis, len(outputs))
+    plain = Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
     return _with_yield(plain, names) if setup.study.spec.part_requirements else plain
-
-
-def _verdicts(setup: Setup) -> int:
-    """Return from which output on parts are judged: none is drawn again for a mere metric without value."""
-    return len(setup.study.metrics) if setup.study.spec.part_requirements else 0
-
-
-def _known(outputs: FloatArray, setup: Setup) -> FloatArray:
-    """Return the blocks with all values of a metric, where those that lack one may be left out as if drawn again."""
-    known = ~np.isnan(outputs).any(axis=1)
-    return outputs[known] if setup.policy == "resample" and known.any() else outputs
 
 
 def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
@@ -232,16 +185,10 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     factors = np.where(np.isfinite(answer.allocated), np.maximum(answer.allocated, LEAST_FACTOR), 1.0)
     tight = [one.tightened(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
 
-    def drawn(start: int, number: int) -> FloatArray:
-        return values_at(tight, setup.parts.unit(start + number, setup.seed)[start:])[:, None, :]
-
-    blocks = evaluated(
-        drawn, lambda points: evaluator.outputs(points, [DRAWN]), setup.samples, setup.policy, _verdicts(setup)
-    )
-    plain = Findings(
-        setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
-    )
-    return _with_shares(plain, *_judged(setup, blocks.outputs))
+    points = values_at(tight, setup.parts.unit(setup.samples, setup.seed))[:, None, :]
+    outputs = evaluator.outputs(points, [DRAWN])
+    plain = Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+    return _with_shares(plain, *_judged(setup, outputs))
 
 
 def _tolerance_lines(setup: Setup, answer: ToleranceFactors) -> Iterator[IndexLine]:
@@ -264,9 +211,8 @@ def _judged(setup: Setup, outputs: FloatArray) -> tuple[NDArray[np.bool_], NDArr
 
 def _with_shares(found: Findings, met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Findings:
     """Return findings with the shares of parts, as drawn, that meet all requirements and each of them."""
-    fate: Fate = "either" if found.setup.policy == "bound" else "unknown"
-    each = tuple(Share.of(met[:, 0, k], failed[:, 0], fate) for k in range(met.shape[-1]))
-    return replace(found, all_met=Share.of(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0], fate), each_met=each)
+    each = tuple(Share.of(met[:, 0, k], failed[:, 0]) for k in range(met.shape[-1]))
+    return replace(found, all_met=Share.of(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0]), each_met=each)
 
 
 def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
@@ -275,15 +221,9 @@ def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     if outputs is None:
         return found
     met, failed = _judged(setup, outputs)
-    gains = monte_carlo_yield.yield_gains(np.asarray(met.all(axis=-1)), failed, setup.policy)
+    gains = monte_carlo_yield.yield_gains(np.asarray(met.all(axis=-1)), failed)
     lines = (*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines)
     return replace(_with_shares(found, met, failed), lines=lines)
-
-
-def _stated(
-    setup: Setup, outputs: FloatArray, analyze: Callable[[FloatArray], Analysis], names: tuple[str, ...], count: int
-) -> Analysis:
-    return stated(analyze, outputs, setup.policy, nothing(names, count))
 
 
 METHODS: dict[str, Callable[[Setup, Evaluator], Findings]] = {

@@ -1,4 +1,4 @@
-"""What a sensitivity study is to do: read off a specification, checked before anything is computed."""
+"""Task of a sensitivity study: read off a specification, checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.units import Ends
     from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.point_evaluation import Metric
-    from cfmkit.studies.sensitivity.failed_sample_policy import Policy
 
 Method = Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"]
 SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000, "inverse": 200}
@@ -72,11 +71,6 @@ class Setup:
     def method(self) -> Method:
         """Method by which the indices or tolerances are computed."""
         return self.block.method
-
-    @property
-    def policy(self) -> Policy:
-        """Policy for failed samples."""
-        return self.block.on_failure
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -170,10 +164,7 @@ def points_of(method: Method, samples: int, parameters: int, groups: int) -> int
 
 
 def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
-    """Raise if method, failure policy and parameters do not go together."""
-    if block.method in ("oat", "local") and block.on_failure == "resample":
-        reported = f"{block.method!r} draws no samples that could be drawn again; take 'fail' or 'bound'"
-        raise SpecError([Problem("", 0, 0, "sensitivity.on_failure", reported)])
+    """Raise if method and parameters do not go together."""
     if block.method == "inverse" and not spec.part_requirements:
         lacking = "finds the tolerances that keep a yield: give 'requirements' that a part meets or misses"
         raise SpecError([Problem("", 0, 0, "sensitivity.method", lacking)])

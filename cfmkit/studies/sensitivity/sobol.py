@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index, nothing
+from cfmkit.studies.sensitivity.indices import Analysis, Index, unstated_indices
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -74,7 +74,7 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
     """
     count = outputs.shape[1] - 2
     if varies_not(outputs):
-        return nothing(NAMES, count)
+        return unstated_indices(NAMES, count)
     from SALib.analyze import sobol
 
     # SALib takes a seed of zero for none.

@@ -1,1 +1,1 @@
-"""From a wish to mechanisms: every family proposes candidates, all are analysed, those that meet the wish are shown."""
+"""Mechanisms for a request: each family proposes candidates, all are analysed, those that meet it are shown."""

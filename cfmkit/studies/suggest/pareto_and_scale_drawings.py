@@ -1,4 +1,4 @@
-"""Pictures of what came of a wish: size against ripple, and all proposals to one scale in the room given."""
+"""Pictures of what came of a request: size against ripple, and all proposals to one scale in the envelope."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.families.wishes import Wish
+    from cfmkit.families.suggestion_request import Request
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
 COLUMNS = 3
@@ -39,10 +39,10 @@ def named(number: int, proposal: Proposal) -> str:
 
 
 @styled
-def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
+def pareto(proposals: Sequence[Proposal], request: Request) -> Figure:
     """Return the area that each proposal needs against its ripple; the larger the bubble, the more it is stressed."""
     names = [_within(38.0, named(number, one)) for number, one in enumerate(proposals[:MOST], 1)]
-    key = "bubbles: stress over the\nallowable one; the smallest:\nno stress is modelled.\nDashed: what was wished"
+    key = "bubbles: stress over the\nallowable one; the smallest:\nno stress is modelled.\nDashed: what was required"
     height = max(100.0, 18.0 + LINE * sum(len(text.split("\n")) for text in [*names, key]) + 1.2 * len(names))
     figure = new_figure(160.0, height)
     ax = axes_mm(figure, (17.0, 13.0, 100.0, height - 24.0))
@@ -62,17 +62,17 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
         ax.annotate(str(number), (area, ripple), ha="center", va="center", fontsize=SMALL, zorder=5)
         areas.append(area)
         ripples.append(ripple)
-    given = 1e4 * wish.room[0] * wish.room[1]
+    given = 1e4 * request.envelope[0] * request.envelope[1]
     ax.axvline(given, color=BAND, linewidth=0.8, dashes=(5, 2))
-    ax.axhline(100.0 * wish.ripple, color=BAND, linewidth=0.8, dashes=(5, 2))
+    ax.axhline(100.0 * request.ripple, color=BAND, linewidth=0.8, dashes=(5, 2))
     ax.set_xlim(0.0, 1.08 * max([given, *areas]))
-    ax.set_ylim(0.0, 1.12 * max([100.0 * wish.ripple, *ripples]))
-    ax.set_xlabel("room needed in the plane [cm²]")
-    ax.set_ylabel(f"ripple over the {'travel' if wish.kind == 'force' else 'angle'} [%]")
+    ax.set_ylim(0.0, 1.12 * max([100.0 * request.ripple, *ripples]))
+    ax.set_xlabel("size in the plane [cm²]")
+    ax.set_ylabel(f"ripple over the {'travel' if request.kind == 'force' else 'angle'} [%]")
     figure.text(
         0.02,
         1.0 - 3.5 / height,
-        "what the proposals need, and how flat they are" + _left_out(proposals),
+        "Size and ripple of the proposals" + _left_out(proposals),
         fontsize=NORMAL,
         color=INK,
     )
@@ -85,10 +85,10 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
 
 
 @styled
-def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
-    """Return every proposal as it is made, to one scale, in the room that was given."""
+def to_one_scale(proposals: Sequence[Proposal], request: Request) -> Figure:
+    """Return every proposal as it is made, to one scale, in the envelope."""
     drawn = [_drawn(one) for one in proposals[:MOST]]
-    sizes = [_room_in_the_drawing(space, wish) for _, space in drawn]
+    sizes = [_envelope_in_drawing(space, request) for _, space in drawn]
     wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))
     rows = -(-len(drawn) // COLUMNS)
     columns = min(COLUMNS, len(drawn))
@@ -110,10 +110,10 @@ def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     figure.text(
         0.02,
         1.0 - 5.0 / total,
-        "the proposals to one scale, each in the room given" + _left_out(proposals),
+        "Proposals in the envelope, same scale" + _left_out(proposals),
         fontsize=NORMAL,
     )
-    figure.text(0.02, 1.5 / total, _scale_reported(wish), fontsize=SMALL, color=GREY)
+    figure.text(0.02, 1.5 / total, _scale_reported(request), fontsize=SMALL, color=GREY)
     return figure
 
 
@@ -128,22 +128,22 @@ def _within(width: float, text: str) -> str:
     return textwrap.fill(text, int(width / LETTER))
 
 
-def _scale_reported(wish: Wish) -> str:
-    sides = " x ".join(f"{1e3 * side:.4g}" for side in wish.room[:2])
-    return f"dashed: the room, {sides} mm" + (" across and along the travel" if wish.kind == "force" else "")
+def _scale_reported(request: Request) -> str:
+    sides = " x ".join(f"{1e3 * side:.4g}" for side in request.envelope[:2])
+    return f"Dashed: envelope, {sides} mm" + (" across and along the travel" if request.kind == "force" else "")
 
 
 def _drawn(proposal: Proposal) -> Any:
-    """Return what draws a proposal, and its own room."""
+    """Return what draws a proposal, and its own envelope."""
     record = family(proposal.family)
     result = record.analyze(by_own_model(proposal), Run())
     return import_module(str(record.draw)).moving(result), record.envelope(result)
 
 
-def _room_in_the_drawing(space: Any, wish: Wish) -> tuple[float, float]:
-    """Return width and height of the room as it lies in the family's drawings [m]."""
-    across, along = wish.room[:2]
-    if wish.kind == "torque":
+def _envelope_in_drawing(space: Any, request: Request) -> tuple[float, float]:
+    """Return width and height of the envelope as it lies in the family's drawings [m]."""
+    across, along = request.envelope[:2]
+    if request.kind == "torque":
         # what turns may lie either way: the long side where it is long itself
         long, short = max(across, along), min(across, along)
         width, height = (space.along, space.across) if space.sideways else (space.across, space.along)
@@ -152,7 +152,7 @@ def _room_in_the_drawing(space: Any, wish: Wish) -> tuple[float, float]:
 
 
 def _frame(ax: Axes, space: Any, size: tuple[float, float], view: tuple[float, float]) -> None:
-    """Draw the room around a mechanism, in the middle of a view."""
+    """Draw the envelope around a mechanism, in the middle of a view."""
     from matplotlib.patches import Rectangle
 
     own = (space.along, space.across) if space.sideways else (space.across, space.along)

@@ -23,8 +23,15 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.studies.suggest.misses_in_words import largest_force, outside, raised_out, too_short
-from cfmkit.studies.suggest.requirements_of_wish import LIVES, demanded, unjudged, windows_of
+from cfmkit.studies.suggest.misses_in_words import (
+    disqualifying,
+    largest_force,
+    outside,
+    raised_out,
+    too_short,
+    topic_of,
+)
+from cfmkit.studies.suggest.requirements_of_request import LIVES, demanded, unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
     MovedForYield,
@@ -36,8 +43,8 @@ from cfmkit.studies.suggest.yield_of_proposal import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from cfmkit.families.base import Room
-    from cfmkit.families.wishes import Candidate, Wish
+    from cfmkit.families.base import BoundingBox
+    from cfmkit.families.suggestion_request import Candidate, Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
@@ -48,7 +55,7 @@ OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
 ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
 
 TRIES = 3
-"""How often more is requested than what drawn parts did not have."""
+"""How often a higher yield is required than drawn parts had."""
 
 MOST_ASKED = 0.9975
 """For a larger share the drawn parts of the search are too few."""
@@ -59,7 +66,7 @@ CORRECTIONS = 2
 
 @dataclass(frozen=True)
 class ProposalJob:
-    """A candidate of a family that is to be made and judged against a wish before a deadline, in `time.time` [s].
+    """A candidate of a family that is to be made and judged against a request before a deadline, in `time.time` [s].
 
     `near`: what came of it, to be designed again with margins for the yield that is all it misses, or, where a finer
     model is `pending`, to be corrected and judged by that one.
@@ -67,7 +74,7 @@ class ProposalJob:
 
     family: str
     candidate: Candidate
-    wish: Wish
+    request: Request
     seed: int
     deadline: float | None = None
     near: Proposal | None = None
@@ -80,17 +87,18 @@ class Proposal:
     # family, variant: whose it is
     family: str
     variant: str
-    # the complete specification with the wish as its requirements; empty where nothing came of the candidate
+    # the complete specification with the request as its requirements; empty where nothing came of the candidate
     text: str = ""
-    missed: tuple[str, ...] = ()  # one sentence for every hard wish that it misses when it is analysed from its file
+    missed: tuple[str, ...] = ()  # one sentence for every hard request that it misses when it is analysed from its file
+    fails: tuple[str, ...] = ()  # what these sentences are about, in a word each: ``force``, ``stress``, ``size``
     message: str = ""  # why nothing came of it
     # in SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
-    # ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is wished), ``stiffening`` (by
-    # what share wide beams raise the mean that a planar solid has)
+    # ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is required),
+    # ``stiffening`` (by what share wide beams raise the mean that a planar solid has)
     numbers: Mapping[str, float | None] = field(default_factory=dict)
     notes: tuple[str, ...] = ()  # what a reader has to know: what was assumed, what no model here says
     movable: bool = False  # whether all that it misses is the yield, and a design with margins might have it
-    unjudged: tuple[str, ...] = ()  # what is wished and could not be judged, each with the reason
+    unjudged: tuple[str, ...] = ()  # what is required and could not be judged, each with the reason
     model: str = ""  # the model that judged it
     pending: str = ""  # the finest model of its family that can run it and did not yet; empty if it did
     warnings: tuple[str, ...] = ()  # names of what its analysis warns of, with the number that counts
@@ -109,7 +117,7 @@ class Proposal:
 
     @property
     def good(self) -> bool:
-        """Whether it does all that is wished, and all of it was judged by the finest model."""
+        """Whether it does all that is required, and all of it was judged by the finest model."""
         return self.settled and not self.unjudged
 
     @property
@@ -119,8 +127,17 @@ class Proposal:
         return (*not_run, *self.unjudged)
 
     @property
+    def verdict(self) -> str:
+        """``meets``, ``fails: stress, force`` or ``open: life``."""
+        if self.missed:
+            return f"fails: {', '.join(dict.fromkeys(self.fails))}"
+        topics = [text.partition(" not ")[0] for text in self.unjudged]
+        topics += [self.pending] if self.pending else []
+        return f"open: {', '.join(dict.fromkeys(topics))}" if topics else "meets"
+
+    @property
     def near(self) -> bool:
-        """Whether it misses exactly one wish."""
+        """Whether it misses exactly one request."""
         return bool(self.text) and len(self.missed) == 1
 
     @property
@@ -132,7 +149,8 @@ class Proposal:
         """Return it as plain lists and mappings."""
         return {
             "family": self.family, "variant": self.variant, "text": self.text, "missed": list(self.missed),
-            "message": self.message, "numbers": dict(self.numbers), "notes": list(self.notes), "movable": self.movable,
+            "fails": list(self.fails), "message": self.message, "numbers": dict(self.numbers),
+            "notes": list(self.notes), "movable": self.movable,
             "unjudged": list(self.unjudged), "model": self.model, "pending": self.pending,
             "warnings": list(self.warnings), "seconds": self.seconds, "own": self.own,
         }  # fmt: skip
@@ -140,7 +158,7 @@ class Proposal:
     @classmethod
     def of_record(cls, record: Mapping[str, Any]) -> Proposal:
         """Return what a record says."""
-        lists = {name: tuple(record[name]) for name in ("missed", "notes", "unjudged", "warnings")}
+        lists = {name: tuple(record[name]) for name in ("missed", "fails", "notes", "unjudged", "warnings")}
         return cls(**{**record, **lists})
 
 
@@ -160,7 +178,7 @@ def made(job: ProposalJob) -> Proposal:
         spec, reported = _designed(job, clock)
         if spec is None:
             return Proposal(job.family, candidate.variant, message=reported)
-        return judged(job.family, candidate.variant, spec, job.wish, job.seed, clock)
+        return judged(job.family, candidate.variant, spec, job.request, job.seed, clock)
     except (CfmError, np.linalg.LinAlgError) as problem:  # a shape no solver was made for is no proposal
         return Proposal(job.family, candidate.variant, message=" ".join(str(problem).split())[:300])
 
@@ -180,8 +198,8 @@ def _designed(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
     if clock.late():
         return None, OUT_OF_TIME
     if job.candidate.finish:
-        wish = replace(job.wish, reserve=job.candidate.reserve)
-        spec = function_named(job.candidate.finish)(spec, wish)
+        request = replace(job.request, reserve=job.candidate.reserve)
+        spec = function_named(job.candidate.finish)(spec, request)
     return spec, ""
 
 
@@ -213,10 +231,10 @@ def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     for _ in range(CORRECTIONS if correct else 1):
         if clock.late():
             break
-        made = function_named(correct)(spec, job.wish) if correct else spec.replace({FIDELITY: near.pending})
+        made = function_named(correct)(spec, job.request) if correct else spec.replace({FIDELITY: near.pending})
         if clock.late():
             break
-        found = judged(job.family, near.variant, made, job.wish, job.seed, clock, near)
+        found = judged(job.family, near.variant, made, job.request, job.seed, clock, near)
         if best is None or (found.text and len(found.missed) <= len(best.missed)):
             best = found
         if found.passes or not found.text:
@@ -226,21 +244,21 @@ def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
 
 
 def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
-    """Return a proposal designed again for the wished yield, or with what is missing of it."""
+    """Return a proposal designed again for the required yield, or with what is missing of it."""
     if clock.late():
         return Proposal(job.family, near.variant, message=OUT_OF_TIME)
 
     def judge(spec: Spec) -> Proposal:
-        return judged(job.family, near.variant, spec, job.wish, job.seed, clock)
+        return judged(job.family, near.variant, spec, job.request, job.seed, clock)
 
-    found = redesigned(near, job.candidate, job.wish, Run(job.seed, time_budget=clock.left()), judge)
+    found = redesigned(near, job.candidate, job.request, Run(job.seed, time_budget=clock.left()), judge)
     return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
 
 
 def redesigned(
-    near: Proposal, candidate: Candidate, wish: Wish, run: Run, judge: Callable[[Spec], Proposal]
+    near: Proposal, candidate: Candidate, request: Request, run: Run, judge: Callable[[Spec], Proposal]
 ) -> Proposal:
-    """Return a proposal whose made parts are good as often as wished, else the best found, with what is missing of it.
+    """Return a proposal of the required yield, else the best found, with what is missing of it.
 
     Parameters
     ----------
@@ -248,7 +266,7 @@ def redesigned(
         Which misses the yield alone.
     candidate : Candidate
         What it was made of.
-    wish : Wish
+    request : Request
         With a share of good parts.
     run : Run
         Seed, and how long it may take.
@@ -256,11 +274,11 @@ def redesigned(
         Analyses and judges a specification, drawn parts included.
     """
     clock = Clock.of(run.time_budget)
-    wanted = asked = float(wish.good_parts or 0.0)
+    wanted = asked = float(request.good_parts or 0.0)
     best, spec, last, obstacle = near, near.spec, None, ""
     for _ in range(TRIES):
         run = replace(run, time_budget=clock.left())
-        moved = None if clock.late() else moved_for_yield(candidate, spec, wish, asked, run)
+        moved = None if clock.late() else moved_for_yield(candidate, spec, request, asked, run)
         if moved is None:
             break
         last, there = moved, judge(moved.spec)
@@ -279,15 +297,15 @@ def redesigned(
 
 
 def _note(moved: MovedForYield) -> str:
-    shares = f"{100.0 * moved.began:.3g} % of parts were good before and {100.0 * moved.share:.3g} % are now"
-    return f"designed with margins for the yield: to first order {shares}"
+    before, now = (f"{100.0 * share:.3g} %" for share in (moved.began, moved.share))
+    return f"designed with margins: yield {before} before, {now} now (linear estimate)"
 
 
 def _tried(moved: MovedForYield | None, obstacle: str) -> str:
     """Return why margins did not help."""
     if moved is None:
         return "no value of the design may change to improve it"
-    reported = f"design margins cannot improve it further, and the tolerance of {moved.costliest} costs most"
+    reported = f"design margins cannot improve it further; largest contributor: {moved.costliest}"
     return f"{reported}; larger changes make it fail otherwise: {obstacle}" if obstacle else reported
 
 
@@ -301,14 +319,14 @@ def judged(
     name: str,
     variant: str,
     spec: Spec,
-    wish: Wish,
+    request: Request,
     seed: int = 0,
     clock: Clock = NEVER,
     near: Proposal | None = None,
 ) -> Proposal:
-    """Return a specification as a proposal: it is written with the wish as its requirements, read, analysed, judged.
+    """Return a specification as a proposal: it is written with the request as its requirements, read, analysed, judged.
 
-    Where a share of good parts is wished, the file says in its block `sensitivity` how they are made, and parts are
+    Where a share of good parts is required, the file says in its block `sensitivity` how they are made, and parts are
     drawn of what misses nothing else.
 
     Parameters
@@ -317,7 +335,7 @@ def judged(
         The family, and which of its mechanisms.
     spec : Spec
         With the model that is to judge it.
-    wish : Wish
+    request : Request
     seed : int
         Of random parts.
     clock : Clock
@@ -329,45 +347,52 @@ def judged(
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file
-    plain = spec_of(name, dump(made_as_wished(spec, wish).replace({"design": None, "name": called})))
+    plain = spec_of(name, dump(add_process_and_materials(spec, request).replace({"design": None, "name": called})))
     begun = time.perf_counter()
-    result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, wish)}))), Run())
+    result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, request)}))), Run())
     seconds = time.perf_counter() - begun
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
-    space: Room | None = record.envelope(result)
+    space: BoundingBox | None = record.envelope(result)
     result, values = sized(result, space), values_of_family(record.values)
-    wished = plain.replace({"requirements": demanded(wish, result, space, values)})
-    text = dump(with_made_parts(wished, wish, seed))
+    required = plain.replace({"requirements": demanded(request, result, space, values)})
+    text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
-    missed = [one.sentence for one in outcomes if not one.ok and one.metric not in ENVELOPE]
-    missed += outside(wish, space)
-    missed += too_short(wish, result)
+    misses = [
+        *((topic_of(one.metric), one.sentence) for one in outcomes if not one.ok and one.metric not in ENVELOPE),
+        *(("size", text) for text in outside(request, space)),
+        *(("travel", text) for text in too_short(request, result)),
+        *disqualifying(result),
+    ]
     pending = finest_of(name, written)
     pending = "" if pending == model_of(name, written) else pending
-    numbers, movable = numbers_of(result, space, wish), False
-    warnings = [one.name for one in result.warnings]
-    if "wide_beam" in warnings and not missed:
+    numbers, movable = numbers_of(result, space, request), False
+    warnings = {one.name: f"{one.name}: {one.short}" if one.short else one.name for one in result.warnings}
+    if "wide_beam" in warnings and not misses:
         coarser = written if near is None else written.replace({FIDELITY: near.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
-        warnings = [f"wide_beam {100.0 * raised:+.2g} %" if one == "wide_beam" else one for one in warnings]
+        warnings["wide_beam"] = f"wide_beam {100.0 * raised:+.2g} %"
         # what its finest model is still to correct may come down to the lower end of the band
-        missed += raised_out(wish, wish.low if pending else largest_force(wish, result), raised)
+        beyond = raised_out(request, request.low if pending else largest_force(request, result), raised)
+        misses += [("force", text) for text in beyond]
     if near is not None:
         numbers["yield"] = near.numbers.get("yield")
-        warnings += [f"yield by the {near.model} model"] if wish.good_parts is not None else []
-    elif wish.good_parts is not None and len(missed) <= 1:
-        parts: GoodParts = good_parts(replace(result, spec=written), wish, clock, draw=not missed)
+        if request.good_parts is not None:
+            warnings["yield"] = f"yield by the {near.model} model"
+    elif request.good_parts is not None and len(misses) <= 1:
+        parts: GoodParts = good_parts(replace(result, spec=written), request, clock, draw=not misses)
         if parts.late:
             return Proposal(name, variant, message=OUT_OF_TIME)
-        movable = parts.movable and not missed
-        missed += [parts.missed] if parts.missed else []
+        movable = parts.movable and not misses
+        misses += [("yield", parts.missed)] if parts.missed else []
         numbers["yield"] = parts.share
     return Proposal(
-        name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)), movable,
-        tuple(unjudged(wish, result)), model_of(name, written), pending, tuple(dict.fromkeys(warnings)),
-        seconds, near.model if near else "",
+        name, variant, text,
+        missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
+        notes=tuple(_notes(space, result)), movable=movable, unjudged=tuple(unjudged(request, result)),
+        model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
+        own=near.model if near else "",
     )  # fmt: skip
 
 
@@ -376,7 +401,7 @@ def model_of(name: str, spec: Spec) -> str:
     return spec.fidelity or next(iter(family(name).models))
 
 
-def made_as_wished(spec: Spec, wish: Wish) -> Spec:
+def add_process_and_materials(spec: Spec, request: Request) -> Spec:
     """Return a specification whose material is as stated, and whose part says by which process it is made if one is.
 
     Its inside corners are as round as before, or as round as the process makes them: a smaller radius has more stress.
@@ -386,16 +411,16 @@ def made_as_wished(spec: Spec, wish: Wish) -> Spec:
     for path, owner in owners.items():
         if (material := getattr(owner, "material", None)) is not None:
             block = material.model_dump(exclude_unset=True)
-            if (stated := wish.stated_material(block)) != block:
+            if (stated := request.stated_material(block)) != block:
                 spec = spec.replace({f"{path}.material": dict(stated)})
-    if wish.process is None:
+    if request.process is None:
         return spec
-    radius = PROCESSES[wish.process].least_radius
+    radius = PROCESSES[request.process].least_radius
     fillet = getattr(spec.at("mechanism"), "fillet", 0.0)
     changes: tuple[dict[str, Any], ...] = (
-        {"mechanism.part.process": wish.process, "mechanism.part.fillet": max(radius, fillet)},
-        {"mechanism.part.process": wish.process},
-        {"mechanism.plate.process": wish.process},
+        {"mechanism.part.process": request.process, "mechanism.part.fillet": max(radius, fillet)},
+        {"mechanism.part.process": request.process},
+        {"mechanism.plate.process": request.process},
     )
     for one in changes:
         try:
@@ -405,9 +430,9 @@ def made_as_wished(spec: Spec, wish: Wish) -> Spec:
     return spec
 
 
-def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, float | None]:
+def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> dict[str, float | None]:
     """Return what proposals are compared by, in SI."""
-    kind = wish.kind
+    kind = request.kind
     found = evaluate(result)
 
     def worst(name: str) -> float | None:
@@ -421,7 +446,7 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
     return {
         "mean": mean,
         "ripple": worst(f"{kind}_ripple"),
-        "hysteresis": None if lost is None or not mean else lost / (mean * wish.travel),
+        "hysteresis": None if lost is None or not mean else lost / (mean * request.travel),
         "safety_factor": _least_factor(found),
         "across": None if space is None else space.across,
         "along": None if space is None else space.along,
@@ -448,7 +473,7 @@ def _life(found: Mapping[str, Any]) -> float | None:
     return min(known, default=None)
 
 
-def _notes(space: Room | None, result: Result) -> Iterator[str]:
+def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     """Yield what a reader has to know: what was assumed, what rubs, what the analysis warns of."""
     if space is not None and space.assumed:
         yield space.assumed
@@ -457,7 +482,7 @@ def _notes(space: Room | None, result: Result) -> Iterator[str]:
     if rubs:
         yield f"friction assumed: {', '.join(rubs)}"
     elif getattr(mechanism, "pins", None) is not None:
-        yield "friction of pins and guide is not counted: wish for 'hysteresis' to have it judged"
+        yield "friction of pins and guide is not counted: require 'hysteresis' to have it judged"
     for finding in result.warnings:
         yield f"{finding.name}: {finding.message}"
 

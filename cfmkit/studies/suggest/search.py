@@ -1,4 +1,4 @@
-"""Collect candidates from every family, design them in rounds, and sort those that meet the wish.
+"""Collect candidates from every family, design them in rounds, and sort those that meet the requirements.
 
 A round takes the next candidates of every family that has not enough proposals yet; what the next round takes depends
 on what came of the ones before, never on what finished first. So the same seed gives the same proposals however many
@@ -23,21 +23,21 @@ from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import Unusable, family, names
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
-from cfmkit.families.wishes import FamilyOffer
+from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import until
 from cfmkit.studies.serial_and_cluster_executors import Lost, surviving
-from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.relaxed_requests import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
 
     from cfmkit.families.base import Family
-    from cfmkit.families.wishes import Candidate, Wish
+    from cfmkit.families.suggestion_request import Candidate, Request
     from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
 ENOUGH, ENOUGH_WITH_PARTS = 3, 2
@@ -98,12 +98,12 @@ class Answered:
 
 @dataclass(frozen=True)
 class Suggestions:
-    """Outcome of a wish."""
+    """Outcome of a request."""
 
-    wish: Wish
-    # those that do all that is wished, judged by the finest model of their family, the best first
+    request: Request
+    # those that do all that is required, judged by the finest model of their family, the best first
     proposals: tuple[Proposal, ...]
-    near: tuple[Proposal, ...]  # those that miss one wish, at most two a family
+    near: tuple[Proposal, ...]  # those that miss one request, at most two a family
     answers: tuple[Answered, ...]  # of every family that was asked
     # family -> why nothing came of candidates, each reason once
     failed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -114,18 +114,21 @@ class Suggestions:
 
     @property
     def listed(self) -> tuple[Proposal, ...]:
-        """Proposals that have a folder: what meets the wish, then what was not judged in full."""
+        """Proposals that have a folder: what meets the request, then what was not judged in full."""
         return (*self.proposals, *self.unjudged)
 
 
 def suggest(
-    wish: Wish, run: Run, prefer: Sequence[str] = ("size", "ripple", "parts", "stress"), reserve: float = 0.0
+    request: Request,
+    run: Run,
+    prefer: Sequence[str] = ("size", "ripple", "parts", "stress"),
+    reserve: float = 0.0,
 ) -> Suggestions:
-    """Return mechanisms that do what is wished, of every family that has any.
+    """Return mechanisms that do what is required, of every family that has any.
 
     Parameters
     ----------
-    wish : Wish
+    request : Request
         What is wanted.
     run : Run
         Seed, progress, time budget, executor and notes.
@@ -136,13 +139,13 @@ def suggest(
         come, and the search goes on.
     """
     times, bugs = _Times.of(run.time_budget, reserve), list[str]()
-    answers, unasked = _answers(wish, run, times.asking, bugs)
+    answers, unasked = _answers(request, run, times.asking, bugs)
     queues = {one.family: list(one.offer.candidates) for one in answers}
     making = _Making(run, times, sum(map(len, queues.values())), bugs)
-    turn, cut, enough = 0, unasked, ENOUGH if wish.good_parts is None else ENOUGH_WITH_PARTS
+    turn, cut, enough = 0, unasked, ENOUGH if request.good_parts is None else ENOUGH_WITH_PARTS
     while not making.late() and (batch := list(_next(queues, making.done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
         turn += 1
-        jobs = [ProposalJob(name, candidate, wish, run.seed, times.without) for name, candidate in batch]
+        jobs = [ProposalJob(name, candidate, request, run.seed, times.without) for name, candidate in batch]
         rest = (making.with_margins, making.for_finest)
         if not (making.all_of(jobs) and all(making.all_of(again(enough)) for again in rest)):
             cut = True
@@ -150,12 +153,12 @@ def suggest(
     done = making.done
     counts = {name: sum(one.family == name for one in done) for name in queues}
     if not cut and not any(one.passes for one in done):
-        answers = _with_nearest(answers, wish, run, times.without, bugs)
+        answers = _with_nearest(answers, request, run, times.without, bugs)
     passing = distinct([one for one in done if one.passes])
     return Suggestions(
-        wish,
+        request,
         tuple(ordered([one for one in passing if one.good], prefer)),
-        tuple(_near(done)),
+        tuple(_near(done, request)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
@@ -267,16 +270,16 @@ class _Making:
 
 
 def _with_nearest(
-    answers: list[Answered], wish: Wish, run: Run, deadline: float | None, bugs: list[str]
+    answers: list[Answered], request: Request, run: Run, deadline: float | None, bugs: list[str]
 ) -> list[Answered]:
-    """Return answers with the nearest wish that each family could meet, as far as the time allows."""
+    """Return answers with the nearest request that each family could meet, as far as the time allows."""
     names = [one.family for one in answers]
-    content = {"wish": repr(wish), "seed": run.seed, "code": code_stamp()}
+    content = {"suggest": repr(request), "seed": run.seed, "code": code_stamp()}
     keys = {name: stable_hash(content | {"nearest": name})[:32] for name in names}
     found = {name: record for name in names if (record := run.notes.find(keys[name])) is not None}
     left = [name for name in names if name not in found]
     clock = Clock(deadline)
-    work = partial(_nearest_of, wish, run.seed, clock)
+    work = partial(_nearest_of, request, run.seed, clock)
     for name, outcome in surviving_until(run, deadline, bugs)(work, iter(left), clock.late):
         if isinstance(outcome, dict) and not clock.late():
             found[name] = outcome
@@ -284,8 +287,8 @@ def _with_nearest(
     return [replace(one, nearest=found.get(one.family, {})) for one in answers]
 
 
-def _nearest_of(wish: Wish, seed: int, clock: Clock, name: str) -> dict[str, str]:
-    return nearest(wish, name, seed, clock)
+def _nearest_of(request: Request, seed: int, clock: Clock, name: str) -> dict[str, str]:
+    return nearest(request, name, seed, clock)
 
 
 def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
@@ -301,12 +304,12 @@ def _survived(job: ProposalJob, outcome: Proposal | Lost) -> Proposal:
     )
 
 
-def _answers(wish: Wish, run: Run, deadline: float | None, bugs: list[str]) -> tuple[list[Answered], bool]:
+def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]) -> tuple[list[Answered], bool]:
     """Return what the families have to say, in their order, and whether the time was up before all had."""
     asked = list(names())
     plain = Run(run.seed)
     executor = surviving_until(run, deadline, bugs)
-    found = dict(executor(partial(_asked, wish, plain), iter(asked), lambda: False))
+    found = dict(executor(partial(_asked, request, plain), iter(asked), lambda: False))
     answers, late = [], False
     for name in asked:
         outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED)
@@ -318,18 +321,22 @@ def _answers(wish: Wish, run: Run, deadline: float | None, bugs: list[str]) -> t
     return [one for one in answers if one.offer.candidates or one.offer.reason], late
 
 
-def _asked(wish: Wish, run: Run, name: str) -> FamilyOffer:
+def _asked(request: Request, run: Run, name: str) -> FamilyOffer:
     try:
         record = family(name)
     except Unusable:  # of another package; `families.skipped` says why
         return FamilyOffer()
     if record.propose is None:
         return FamilyOffer()
-    return offer_of(record, wish, run)
+    return offer_of(record, request, run)
 
 
-def offer_of(record: Family, wish: Wish, run: Run) -> FamilyOffer:
-    """Return what a family could do with a wish; elastic parts with a reserve of strength come first.
+OTHER = {"catalogue": "custom", "custom": "catalogue"}
+"""The springs that are not allowed where only the first ones are."""
+
+
+def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
+    """Return what a family could do with a request; elastic parts with a reserve of strength come first.
 
     Beams do not know the stress in fillets. Most parts that use all of their strength by beams use too much of it as
     solids; those with a reserve are tried first. Where the strength of a material is not known, parts of a small strain
@@ -338,11 +345,14 @@ def offer_of(record: Family, wish: Wish, run: Run) -> FamilyOffer:
     propose = function_named(str(record.propose))
     reserves = (1.0,) if record.elastic_parts is None else (RESERVE_FOR_FILLETS, 1.0)
     found: dict[tuple[str, str], Candidate] = {}
-    for one, reserve in product(wish.with_strengths, reserves):
+    for one, reserve in product(request.with_strengths, reserves):
         offer: FamilyOffer = propose(replace(one, reserve=reserve), run)
         for candidate in offer.candidates:
+            if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
+                continue
             found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
-    return FamilyOffer(tuple(found.values()), offer.reason)
+    reason = f"it needs {OTHER[request.springs]} springs" if offer.candidates and request.springs else ""
+    return FamilyOffer(tuple(found.values()), offer.reason if found else offer.reason or reason)
 
 
 def _next(
@@ -361,7 +371,8 @@ def _key(job: ProposalJob) -> str:
     candidate = job.candidate
     content = {
         "family": job.family, "variant": candidate.variant, "design": candidate.design, "finish": candidate.finish,
-        "spec": candidate.spec.model_dump(mode="json"), "wish": repr(job.wish), "seed": job.seed, "code": code_stamp(),
+        "spec": candidate.spec.model_dump(mode="json"), "suggest": repr(job.request), "seed": job.seed,
+        "code": code_stamp(),
         "again": job.near and job.near.text, "correct": candidate.correct, "reserve": candidate.reserve,
     }  # fmt: skip
     return stable_hash(content)[:32]
@@ -429,13 +440,25 @@ def measure(proposal: Proposal, name: str) -> float:
     return numbers.get(name, np.inf)
 
 
-def _near(done: Sequence[Proposal]) -> list[Proposal]:
-    """Return those that miss one wish, two of each family at most."""
+MAX_OVERSIZE = 1.5
+"""Sides over those of the envelope up to which a mechanism is an alternative."""
+
+
+def _near(done: Sequence[Proposal], request: Request) -> list[Proposal]:
+    """Return those that miss one requirement, and no side of the envelope by far; two of each family at most."""
     found: list[Proposal] = []
     for name in dict.fromkeys(one.family for one in done):
-        near = [one for one in done if one.family == name and one.near]
+        near = [one for one in done if one.family == name and one.near and _nearly_fits(one, request)]
         found += sorted(near, key=lambda one: measure(one, "ripple"))[:2]
     return found
+
+
+def _nearly_fits(proposal: Proposal, request: Request) -> bool:
+    sides = [float(proposal.numbers.get(name) or 0.0) for name in ("across", "along", "depth")]
+    given = [*request.envelope, np.inf][:3]
+    if request.kind == "torque":  # what turns may lie either way in the plane
+        sides[:2], given[:2] = sorted(sides[:2]), sorted(given[:2])
+    return all(side <= MAX_OVERSIZE * most for side, most in zip(sides, given, strict=True))
 
 
 def _failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:

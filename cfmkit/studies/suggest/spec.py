@@ -1,27 +1,30 @@
-"""What a wish file may say."""
+"""Block `suggest` of a specification."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfmkit.families.base import article
-from cfmkit.families.wishes import Wish
+from cfmkit.families.suggestion_request import Request, Springs
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
-from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec  # noqa: TC001 - read by pydantic
+from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor  # noqa: TC001 - pydantic
 from cfmkit.stock.processes import PROCESSES, ProcessName, why_not_made
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 
 MEAN = 0.025
-"""How far the mean may be from a force that is wished as a number; who wants less gives a band."""
+"""How far the mean may be from a force that is required as a number; who wants less gives a band."""
 
 RIPPLE = 0.05
-"""Ripple where none is wished."""
+"""Ripple where none is required."""
+
+SAFETY = 1.5
+"""Safety factor where none is required: usual for parts whose material and loads are known on average."""
 
 USUAL: dict[str, tuple[str, ...]] = {
     "fdm": ("pla", "petg", "abs"),
@@ -30,13 +33,15 @@ USUAL: dict[str, tuple[str, ...]] = {
     "wire-edm": ("aluminium-7075-t6", "titanium-6al-4v", "steel-1.4310"),
     "mill": ("pom", "aluminium-7075-t6"),
 }
-"""What is made by a process where the wish names no material."""
+"""What is made by a process where the request names no material."""
 
 Prefer = Literal["size", "ripple", "parts", "stress", "depth"]
 
 
-class WishBlock(Model):
-    """Wish for a mechanism. Force with travel, or torque with angle; every number is a hard limit."""
+class SuggestBlock(Model):
+    """Requirements of a mechanism. Force with travel, or torque with angle; every number is a hard limit."""
+
+    removed_keys: ClassVar[dict[str, str]] = {"room": "write 'envelope'"}
 
     force: PositiveForce | tuple[PositiveForce, PositiveForce] | None = Field(
         None, description="force to keep constant; or a band that contains every force: [19 N, 21 N]"
@@ -47,7 +52,7 @@ class WishBlock(Model):
     travel: PositiveLength | None = Field(None, description="over which the force is constant")
     angle: Annotated[Angle, Field(gt=0)] | None = Field(None, description="over which the torque is constant")
     ripple: Share = Field(RIPPLE, description="largest (max - min)/max over the travel, in each direction")
-    room: tuple[PositiveLength, ...] = Field(
+    envelope: tuple[PositiveLength, ...] = Field(
         min_length=2,
         max_length=3,
         description="box that it stays in, pressed or not, frame included: across the travel, along it, and the depth, "
@@ -63,13 +68,15 @@ class WishBlock(Model):
         None, description="lowest and highest force of the adjustment"
     )
     hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
+    springs: Springs | None = Field(None, description="helical springs that it may have; default: either")
+    safety: SafetyFactor = Field(SAFETY, description="least safety factor of stresses, against yield")
     cycles: Annotated[int, Field(ge=1)] | None = Field(
         None, description="required life in cycles; checked for materials with `fatigue` data"
     )
     made_well: Share | None = Field(
         None,
         alias="yield",
-        description="share of manufactured parts that must meet the whole wish, with the tolerances assumed for the "
+        description="share of manufactured parts that must meet all requirements, with the tolerances assumed for the "
         "process",
     )
     prefer: tuple[Prefer, ...] = Field(
@@ -84,7 +91,7 @@ class WishBlock(Model):
         return value
 
     @model_validator(mode="after")
-    def _is_one_wish(self) -> Self:
+    def _is_one_request(self) -> Self:
         if (self.force is None) == (self.torque is None):
             raise ValueError("give either 'force' (with 'travel') or 'torque' (with 'angle')")
         wanted, other = ("travel", "angle") if self.force is not None else ("angle", "travel")
@@ -99,17 +106,17 @@ class WishBlock(Model):
 
     @model_validator(mode="after")
     def _fits_itself(self) -> Self:
-        if self.travel is not None and self.travel >= self.room[1]:
+        if self.travel is not None and self.travel >= self.envelope[1]:
             reported = (
-                f"a travel of {format_short(self.travel, 'length')} does not fit into the second side of the room, "
+                f"a travel of {format_short(self.travel, 'length')} does not fit into the second side of the envelope, "
             )
-            refuse("Wish", {("travel",): reported + format_short(self.room[1], "length")})
+            refuse("SuggestBlock", {("travel",): reported + format_short(self.envelope[1], "length")})
         if self.adjustable is not None:
             if self.force is None:
-                refuse("Wish", {("adjustable",): "goes with 'force' only"})
+                refuse("SuggestBlock", {("adjustable",): "goes with 'force' only"})
             low, high = self.ends
             if not self.adjustable[0] <= high or not low <= self.adjustable[1]:
-                refuse("Wish", {("adjustable",): "the force wished is not in this range"})
+                refuse("SuggestBlock", {("adjustable",): "the force required is not in this range"})
         return self
 
     @model_validator(mode="after")
@@ -118,14 +125,14 @@ class WishBlock(Model):
             return self
         reasons = [why_not_made(self.process, one.name, one.modulus) for one in self._materials]
         if reported := "; ".join(dict.fromkeys(filter(None, reasons))):
-            refuse("Wish", {("process",): reported})
+            refuse("SuggestBlock", {("process",): reported})
         least = PROCESSES[self.process].least_feature
-        for number, side in enumerate(self.room):
+        for number, side in enumerate(self.envelope):
             if side < least * (1.0 - 1e-9):
                 name = ("first side", "second side", "depth")[number]
                 sizes = format_short(side, "length"), format_short(least, "length")
                 reported = f"the {name}, {sizes[0]}, is below the thinnest wall of {self.process}, {sizes[1]}"
-                refuse("Wish", {("room", number): reported})
+                refuse("SuggestBlock", {("envelope", number): reported})
         return self
 
     @model_validator(mode="after")
@@ -137,7 +144,7 @@ class WishBlock(Model):
             try:
                 type(fatigue).model_validate(fatigue.model_dump(exclude_unset=True) | {"cycles": float(self.cycles)})
             except ValidationError as error:
-                refuse("Wish", {("cycles",): error.errors()[0]["msg"].removeprefix("Value error, ")})
+                refuse("SuggestBlock", {("cycles",): error.errors()[0]["msg"].removeprefix("Value error, ")})
         return self
 
     @property
@@ -152,7 +159,7 @@ class WishBlock(Model):
         value: Any = self.force if self.force is not None else self.torque
         return value if isinstance(value, tuple) else (value * (1.0 - MEAN), value * (1.0 + MEAN))
 
-    def wish(self) -> Wish:
+    def request(self) -> Request:
         """Return the same as families know it."""
         value: Any = self.force if self.force is not None else self.torque
         thinnest = PROCESSES[self.process].least_feature if self.process else None
@@ -162,7 +169,7 @@ class WishBlock(Model):
             if self.cycles is not None and block.get("fatigue"):
                 block["fatigue"]["cycles"] = float(self.cycles)
         low, high = self.ends
-        return Wish(
+        return Request(
             kind="force" if self.force is not None else "torque",
             target=_middle(low, high) if isinstance(value, tuple) else value,
             low=low,
@@ -170,11 +177,13 @@ class WishBlock(Model):
             banded=isinstance(value, tuple),
             travel=float(self.travel if self.travel is not None else self.angle or 0.0),
             ripple=self.ripple,
-            room=self.room,
+            envelope=self.envelope,
             materials=blocks or tuple({"name": name} for name in usual),
             adjustable=self.adjustable,
             hysteresis=self.hysteresis,
             cycles=self.cycles,
+            springs=self.springs,
+            safety=self.safety,
             good_parts=self.made_well,
             process=self.process,
             **({} if thinnest is None else {"thinnest": thinnest}),
@@ -186,8 +195,10 @@ def _middle(low: float, high: float) -> float:
     return math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high)
 
 
-class WishFile(Model):
-    """A file with a wish."""
+class SuggestFile(Model):
+    """A file with a block `suggest`."""
+
+    removed_keys: ClassVar[dict[str, str]] = {"wish": "write 'suggest'"}
 
     cfmkit: Literal[1] = Field(1, description="schema version")
-    wish: WishBlock = Field(description="what is wanted")
+    suggest: SuggestBlock = Field(description="what is wanted")

@@ -1,10 +1,10 @@
-"""The share of a proposal's manufactured parts that would meet the wish, and values moved until it suffices.
+"""The share of a proposal's manufactured parts that would meet the requirements, and values moved until it suffices.
 
 The share is estimated to first order, then counted in random parts. Parts have the tolerances that are assumed of the
 process (`cfmkit.studies.parts.assumed_errors`) and are drawn as `cfmkit sensitivity` draws them of the block
 `sensitivity` that the proposal's file says, so that its answer is the same.
 
-A proposal whose made parts miss the wished yield alone is designed again: with margins, as by `design.yield`. What may
+A proposal that misses the required yield alone is designed again: with margins, as by `design.yield`. What may
 move is what the design of the family chooses, in the same ranges, under the tolerances that the file of the proposal
 states. To first order the search takes a moment; whether its estimate holds, parts say which are drawn of the new
 design as of any other proposal. Where it does not, more is requested.
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.families.wishes import Candidate, Wish
+    from cfmkit.families.suggestion_request import Candidate, Request
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.parts.assumed_errors import Assumed
@@ -62,7 +62,7 @@ class GoodParts:
 
     # of them that are good: of `N_DRAWN`, or to first order where `missed` says so; None if nothing is known
     share: float | None
-    missed: str = ""  # why that is not what is wished; empty where it is
+    missed: str = ""  # why that is not what is required; empty where it is
     late: bool = False  # whether the time ended it before anything was known
     movable: bool = False  # whether a design with margins might have what is missing
 
@@ -78,9 +78,9 @@ class MovedForYield:
     costliest: str  # the value whose tolerance costs most
 
 
-def with_made_parts(spec: Spec, wish: Wish, seed: int) -> Spec:
+def with_made_parts(spec: Spec, request: Request, seed: int) -> Spec:
     """Return a specification whose block `sensitivity` says how its parts are made; as it is where nobody knows."""
-    stated = tolerances(spec, wish.process) if wish.good_parts is not None else {}
+    stated = tolerances(spec, request.process) if request.good_parts is not None else {}
     if not stated:
         return spec
     parameters: dict[str, Any] = {
@@ -88,36 +88,36 @@ def with_made_parts(spec: Spec, wish: Wish, seed: int) -> Spec:
     }
     block = {
         "method": "tolerance", "parameters": parameters, "samples": N_DRAWN, "seed": seed,
-        "min_yield": f"{100.0 * float(wish.good_parts or 0.0):.12g} %",
+        "min_yield": f"{100.0 * float(request.good_parts or 0.0):.12g} %",
     }  # fmt: skip
     return spec.replace({"sensitivity": block})
 
 
-def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodParts:
+def good_parts(result: Result, request: Request, clock: Clock, draw: bool) -> GoodParts:
     """Return what becomes of the made parts of a mechanism.
 
     Parameters
     ----------
     result : Result
-        Its analysis, with the wish as its requirements and the block `sensitivity` of `with_made_parts`.
-    wish : Wish
+        Its analysis, with the request as its requirements and the block `sensitivity` of `with_made_parts`.
+    request : Request
         With a share of good parts.
     clock : Clock
         Late, no more parts are judged.
     draw : bool
         Whether to draw parts where the estimate of first order is good enough; else that is the answer.
     """
-    wanted = float(wish.good_parts or 0.0)
-    found = assumed(result.spec, wish.process)
+    wanted = float(request.good_parts or 0.0)
+    found = assumed(result.spec, request.process)
     if found is None or result.spec.sensitivity is None:
         return GoodParts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"
         )
     parts = Parts.of_block(result.spec, result.spec.sensitivity, N_DRAWN, result.spec.sensitivity.seed or 0)
     first = _first_order(result, parts)
-    most = 1.0 if first is None else _most(first, found, wish)
+    most = 1.0 if first is None else _most(first, found, request)
     if first is not None and first.good.value < wanted:
-        text = _reported(first.good.value, f"made by {found.process.name}, to first order", wanted)
+        text = _reported(first.good.value, f"made by {found.process.name}, linear estimate", wanted)
         return GoodParts(first.good.value, text + _cures(first, found, most, wanted), movable=most >= wanted)
     if not draw:
         return GoodParts(None if first is None else first.good.value)
@@ -125,7 +125,7 @@ def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodPart
     return replace(drawn, movable=first is not None and bool(drawn.missed) and most >= wanted)
 
 
-def _most(first: ExpectedShares, found: Assumed, wish: Wish) -> float:
+def _most(first: ExpectedShares, found: Assumed, request: Request) -> float:
     """Return the largest yield of any shape, by the modulus alone, which no shape makes any surer.
 
     A force that goes with a modulus between E0 and E1, all equally likely, is within [F0, F1] for a share of
@@ -134,7 +134,7 @@ def _most(first: ExpectedShares, found: Assumed, wish: Wish) -> float:
     if found.modulus is None or not first.proportional:
         return 1.0
     low, high = found.modulus
-    return min(1.0, (1.0 - wish.low / wish.high) * high / (high - low))
+    return min(1.0, (1.0 - request.low / request.high) * high / (high - low))
 
 
 def _cures(first: ExpectedShares, found: Assumed, most: float, wanted: float) -> str:
@@ -148,7 +148,7 @@ def _cures(first: ExpectedShares, found: Assumed, most: float, wanted: float) ->
     ends = " to ".join(format_short(end, "stress") for end in found.modulus)
     return (
         f"{text}; no shape exceeds {percent(most)}, because its force is proportional to the modulus of {ends}: "
-        "measure it on a coupon and state it as the wish's material, fit it to a measured part with 'cfmkit "
+        "measure it on a coupon and state it as material, fit it to a measured part with 'cfmkit "
         "calibrate', or trim the force of each part"
     )
 
@@ -186,7 +186,7 @@ def _reported(share: float, made: str, wanted: float) -> str:
     return f"yield {percent(share)} {made}, wanted at least {percent(wanted)}"
 
 
-def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, run: Run) -> MovedForYield | None:
+def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: float, run: Run) -> MovedForYield | None:
     """Return a proposal with the largest share of good parts that is found to first order, up to what is asked.
 
     Parameters
@@ -195,7 +195,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
         What it was made of: its block `design` says what may move.
     spec : Spec
         The proposal as it stands in its file, with requirements and the block `sensitivity`.
-    wish : Wish
+    request : Request
         Its thinnest leaf and its depth limit what moves.
     asked : float
         Share of good parts.
@@ -208,7 +208,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
         None if nothing may move, or the proposal cannot be followed at a few poses.
     """
     block = spec.sensitivity
-    free = _free(candidate, spec, wish)
+    free = _free(candidate, spec, request)
     nominal = family(spec.family).analyze(spec, Run())
     if not free or block is None or nominal.status is not Status.COMPLETE:
         return None
@@ -225,7 +225,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
     return MovedForYield(numbers.written(found, problem), found.began, found.share, numbers.costliest(found, problem))
 
 
-def _free(candidate: Candidate, spec: Spec, wish: Wish) -> dict[str, tuple[float, float]]:
+def _free(candidate: Candidate, spec: Spec, request: Request) -> dict[str, tuple[float, float]]:
     """Return what may move, and in which ranges [SI]."""
     choose = family(spec.family).free
     given = candidate.spec
@@ -236,7 +236,7 @@ def _free(candidate: Candidate, spec: Spec, wish: Wish) -> dict[str, tuple[float
         value: Any = spec.at(path)
         if isinstance(value, float):
             thin = path.endswith("thickness")
-            found[path] = around(value, low=wish.thinnest if thin else None, high=None if thin else wish.depth)
+            found[path] = around(value, low=request.thinnest if thin else None, high=None if thin else request.depth)
     # a value at the end of its range, as a leaf as thin as can be made, may still move away from it
     at = {path: float(spec.at(path)) for path in found}
     inside = {path: (min(low, at[path]), max(high, at[path])) for path, (low, high) in found.items()}

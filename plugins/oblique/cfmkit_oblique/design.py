@@ -24,48 +24,48 @@ LEAST, MOST = 0.01, 0.99
 @refusals_answered
 def design(spec: ObliqueSpec, run: Run) -> Design:
     """Return the shortest springs that keep the force within the tolerance over the range; the half span stays."""
-    wish, part = spec.design, spec.mechanism
-    if wish is None:
+    request, part = spec.design, spec.mechanism
+    if request is None:
         return Design(spec, Status.COMPLETE)
-    free = part.half_span / _ratio(wish, part.half_span)
+    free = part.half_span / _ratio(request, part.half_span)
     height = sqrt((free - part.half_span) * (free + part.half_span))
-    end = height + 0.5 * wish.range
+    end = height + 0.5 * request.range
     _coils_stay_apart(part, end)
-    vertical = wish.force / height
+    vertical = request.force / height
     changes: dict[str, object] = {
         "mechanism.oblique.stiffness": 0.5 * vertical * part.half_span / (free - part.half_span),
         "mechanism.oblique.free_length": free,
         "mechanism.vertical.stiffness": vertical,
-        "analysis.window": (height - 0.5 * wish.range, end),
+        "analysis.window": (height - 0.5 * request.range, end),
     }
     if spec.analysis.travel is not None:
         changes["analysis.travel"] = max(spec.analysis.travel, end)
     return Design(spec.replace(changes), Status.COMPLETE)
 
 
-def _ratio(wish: ObliqueDesign, half_span: float) -> float:
+def _ratio(request: ObliqueDesign, half_span: float) -> float:
     """Return the largest a over L0 that keeps the force within the tolerance."""
-    reach = 0.5 * wish.range / half_span
-    if departure(LEAST, reach) > wish.tolerance:
-        reported = f"a range of {mm(wish.range)} needs springs of more than {mm(half_span / LEAST)}"
-        raise Infeasible(finding("no_room", reported), {"design.range": _range(LEAST, wish, half_span)})
+    reach = 0.5 * request.range / half_span
+    if departure(LEAST, reach) > request.tolerance:
+        reported = f"a range of {mm(request.range)} needs springs of more than {mm(half_span / LEAST)}"
+        raise Infeasible(finding("no_room", reported), {"design.range": _range(LEAST, request, half_span)})
     ratio = MOST
-    if departure(MOST, reach) > wish.tolerance:
-        ratio = bracketed_root(lambda g: departure(g, reach) - wish.tolerance, LEAST, MOST)
+    if departure(MOST, reach) > request.tolerance:
+        ratio = bracketed_root(lambda g: departure(g, reach) - request.tolerance, LEAST, MOST)
     height = half_span * sqrt(1.0 / ratio**2 - 1.0)
-    if wish.height_max is not None and height > wish.height_max:
-        reported = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(wish.height_max)}"
-        flattest = half_span / hypot(half_span, wish.height_max)
-        nearer = {"design.range": _range(flattest, wish, half_span)} if flattest <= MOST else {}
+    if request.height_max is not None and height > request.height_max:
+        reported = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(request.height_max)}"
+        flattest = half_span / hypot(half_span, request.height_max)
+        nearer = {"design.range": _range(flattest, request, half_span)} if flattest <= MOST else {}
         raise Infeasible(finding("no_room", reported), {"design.height_max": at_least(height)} | nearer)
     return ratio
 
 
-def _range(ratio: float, wish: ObliqueDesign, half_span: float) -> str:
+def _range(ratio: float, request: ObliqueDesign, half_span: float) -> str:
     """Return the largest range that springs of some a over L0 have within the tolerance."""
     # the departure at e is above e - 1 times this, which bounds the root
     factor = ratio / ((1.0 - ratio) * sqrt(1.0 - ratio**2))
-    fits = bracketed_root(lambda e: departure(ratio, e) - wish.tolerance, 0.0, 2.0 + wish.tolerance / factor)
+    fits = bracketed_root(lambda e: departure(ratio, e) - request.tolerance, 0.0, 2.0 + request.tolerance / factor)
     return at_most(2.0 * half_span * fits)
 
 

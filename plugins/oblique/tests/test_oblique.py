@@ -108,8 +108,8 @@ def test_the_soft_range_ends_where_the_slope_is_that_of_the_vertical_spring():
 
 @given(st.floats(1e-3, 1e3), st.floats(1e-3, 0.3), st.floats(1e-3, 0.3))
 def test_a_design_keeps_its_force_within_the_tolerance_over_the_range(force, share, tolerance):
-    wish = {"force": force, "range": share * 0.1, "tolerance": tolerance}
-    found = design(springs(design=wish, mechanism__vertical__free_length=100.0), Run())
+    request = {"force": force, "range": share * 0.1, "tolerance": tolerance}
+    found = design(springs(design=request, mechanism__vertical__free_length=100.0), Run())
     assert found.status is Status.COMPLETE, found.message
     solution = Solution(found.spec)
     low, high = found.spec.analysis.window

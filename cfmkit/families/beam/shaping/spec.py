@@ -1,4 +1,4 @@
-"""What the block `design.optimise` of a beam mechanism may say."""
+"""Block `design.optimise` of a beam mechanism."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Box(Model):
 
 
 class FreeNode(Model):
-    """Where a node may go: along x, along y, or both; without either both, within the envelope."""
+    """Range of a free node: along x, along y, or both; without either both, within the envelope."""
 
     x: Range | None = Field(None, description="[left, right]; default: the envelope, if `y` is left out, too")
     y: Range | None = Field(None, description="[bottom, top]; default: the envelope, if `x` is left out, too")
@@ -63,7 +63,7 @@ class ForceWanted(Model):
 
 
 class ShapeLimits(Model):
-    """What every shape must keep to. The stress limit is the mechanism's: yield strength over safety factor."""
+    """Limits of every shape. The stress limit is the mechanism's: yield strength over safety factor."""
 
     stress: bool = Field(True, description="whether the bending stress is limited, at every pose from rest on")
     envelope: Box | None = Field(None, description="where centre lines must lie before loading")
@@ -81,7 +81,7 @@ class ShapeLimits(Model):
 
 
 class Tolerances(Model):
-    """What the audit lets vary: standard deviations."""
+    """Tolerances of the audit: standard deviations."""
 
     nodes: Annotated[Length, Field(ge=0)] = Field(1e-4, description="of the coordinates of free nodes")
     coefficients: Annotated[Angle, Field(ge=0)] = Field(0.02, description="of the shape coefficients c1, c2, ...")

@@ -1,4 +1,4 @@
-"""What is to be shaped: the network, what may vary, the window, and what must hold."""
+"""Task of a shape design: the network, what may vary, the window, and what must hold."""
 
 from __future__ import annotations
 

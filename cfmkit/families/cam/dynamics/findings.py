@@ -1,4 +1,4 @@
-"""What is wrong with a motion of a cam mechanism: each failure mode, found and put into numbers."""
+"""Warnings about a motion of a cam mechanism."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def runs_on_corner(parts: Build) -> Finding:
     """Return what to say about a motion on the corner that the nine-coordinate model cannot describe."""
     above = max(side.stretches[-1].span[0] for side in (parts.machine.right, parts.machine.left))
     return finding(
-        "contact_not_single_valued",
+        "undercut",
         "on the corner of the cam the contact is not a function of its height, as the nine-coordinate model needs: "
         f"start above {mm(above)} ('analysis.dynamics.slider_position'), or use 'analysis.dynamics.method: inverse'",
         INVERSE,

@@ -1,4 +1,4 @@
-"""What moves: two sides, each with its roller's curve, a slider and springs; and how the slider is moved.
+"""Moving parts: two sides, each with its roller's curve, a slider and springs; and how the slider is moved.
 
 One side of the mechanism: the curve of its roller's centre, and which place belongs to a position of the slider. The
 curve has two kinds of pieces: the line at a constant distance from the roller path, and, where the cam is undercut, a

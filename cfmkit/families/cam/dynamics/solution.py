@@ -1,4 +1,4 @@
-"""What is known of a cam mechanism that went through a motion."""
+"""Solution of a cam mechanism in motion."""
 
 from __future__ import annotations
 

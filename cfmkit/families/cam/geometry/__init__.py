@@ -1,1 +1,1 @@
-"""Where the rollers of a cam run: profile slope, roller path, cut flank, and tracks on it as designed and as built."""
+"""Cam and rollers: profile slope, roller path, cut flank, and tracks on it as designed and as built."""

@@ -267,7 +267,7 @@ class Track:
 
     @property
     def kind(self) -> tuple[Any, ...] | None:
-        """What tracks side by side have in common; None if the path's height is no formula."""
+        """Common kind of tracks side by side; None if the path's height is no formula."""
         law, begins = self.profile.path.law, (self.corner_end > self.start, self.start > self.dead_point)
         if type(law) is not SlopeLaw or law.friction or self.profile.path.method != "quadrature":
             return None

@@ -1,4 +1,4 @@
-"""What a specification may say about a cam as it is cut: its numbers, its curve of forces, its measured points."""
+"""Specification of a cam as it is cut: its numbers, its curve of forces, its measured points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the user of a printed slider-crank must know, with the numbers that decide."""
+"""Warnings about printed slider-cranks."""
 
 from __future__ import annotations
 

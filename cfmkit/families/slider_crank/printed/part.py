@@ -1,4 +1,4 @@
-"""Where the material of a printed slider-crank is: one leg as made, with its exact edges, and while it is pressed.
+"""Geometry of a printed slider-crank: one leg as made, with its exact edges, and while it is pressed.
 
 Flexures, strip and distances of pins are exact. What is around them is a sensible choice: pads behind the clamped
 end and at the slider, links wider than any flexure.

@@ -1,4 +1,4 @@
-"""What a specification may say about flexures, the strip, their material and how they are made and designed."""
+"""Specification of flexures, the strip, their material and how they are made and designed."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class StripSpec(Model):
 
 
 class Printed(RoundedCorners, Model):
-    """What makes a slider-crank one piece: lumped flexures or a strip, and their material."""
+    """Slider-crank in one piece: lumped flexures or a strip, and their material."""
 
     removed_keys: ClassVar[dict[str, str]] = {
         "process": "write 'part: {process: {position: ..., least_feature: ...}}' for its 'layer' and 'thinnest'"
@@ -129,7 +129,7 @@ class Printed(RoundedCorners, Model):
 
     @property
     def resolved(self) -> tuple[float | None, float | None]:
-        """What the process resolves in the plane, and the thinnest wall that it makes [m]; None if not stated."""
+        """Resolution of the process in the plane, and its thinnest wall [m]; None if not stated."""
         position = thinnest = None
         if self.part is not None and self.part.process is not None:
             stated = self.part.process
@@ -195,7 +195,7 @@ class StripDesign(Model):
 
 
 class PrintedDesign(Model):
-    """What `cfmkit design` makes of the springs."""
+    """Design of flexures or a strip from springs."""
 
     flexures: FlexureDesign | None = Field(None, description="size the flexures for the springs' rates")
     beam: StripDesign | None = Field(None, description="shape a strip for the force")
@@ -208,7 +208,7 @@ class PrintedDesign(Model):
 
 
 class PrintedAnalysis(Analysis):
-    """How flexures and strips are computed."""
+    """Analysis of flexures and strips."""
 
     removed_keys: ClassVar[dict[str, str]] = {
         "recheck": "for a second opinion on force and stress write 'fidelity: solid', the part as a planar solid"

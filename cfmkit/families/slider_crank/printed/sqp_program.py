@@ -1,4 +1,4 @@
-"""What is optimised: a strip that holds a force over the longest travel, or the flattest force over a given one.
+"""Optimisation problem: a strip that holds a force over the longest travel, or the flattest force over a given one.
 
 The force is computed at Chebyshev points of the root of the travel, where it is smooth down to the steep start, and
 interpolated between them, so that the band is kept everywhere and not at a few points. The stress is looked at along

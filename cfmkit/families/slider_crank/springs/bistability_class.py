@@ -1,4 +1,4 @@
-"""What kind of stiffness a curve has, many curves at once, and where one kind turns into another.
+"""Stability class of many curves at once, and the boundaries between classes.
 
 Walking away from the unloaded position, the effort rises from zero. If it falls again by more than it had
 risen, the mechanism has another equilibrium; how far it falls, as a fraction of the peak

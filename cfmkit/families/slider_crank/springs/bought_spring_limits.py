@@ -1,4 +1,4 @@
-"""What bought springs at the joints cannot do, whatever their rates: stand without a guide, or turn on a thick pin."""
+"""Limits of bought springs at the joints, whatever their rates: stand without a guide, or turn on a thick pin."""
 
 from __future__ import annotations
 

@@ -104,9 +104,9 @@ def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
     elif solution.drive == "torque" and low < stretched < high and abs(stretched - start) > 1e-9:
         middle = key(solution, "stretched", stretched)
     else:
-        middle = key(solution, "half way", 0.5 * (low + high))
+        middle = key(solution, "mid-travel", 0.5 * (low + high))
     far = high if abs(high - start) >= abs(low - start) else low
-    last = key(solution, "last", far) if stable is None else key(solution, "second stable", stable.motion)
+    last = key(solution, "end", far) if stable is None else key(solution, "second stable", stable.motion)
     return first, middle, last
 
 

@@ -1,4 +1,4 @@
-"""What is wrong, or surprising, about solved slider-cranks with springs: predicate and sentence of each finding.
+"""Warnings about solved slider-cranks with springs: predicate and sentence of each finding.
 
 Predicates take the solution of any number of mechanisms, sentences that of one.
 """

@@ -1,4 +1,4 @@
-"""Where the material of a slider-crank with springs is over its motion: links with eyes at their pins, and springs."""
+"""Geometry of a slider-crank with springs over its motion: links with eyes at their pins, and springs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a specification may say about springs at the joints, their limits, and their design."""
+"""Specification of springs at the joints, their limits, and their design."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Bought(SpringSupport):
 
     @property
     def kind(self) -> Kind:
-        """What it is loaded by."""
+        """Kind of its load."""
         return self.loaded or "extension" if self.at == "slider" else "torsion"
 
     @property
@@ -143,7 +143,7 @@ class Links(Model):
 
 
 class Limits(Model):
-    """How far each spring may be moved from the unloaded position, either way."""
+    """Largest deflection of each spring from the unloaded position, either way."""
 
     pivot: PositiveAngle | None = Field(None, description="rotation at the pivot")
     crank_pin: PositiveAngle | None = Field(None, description="rotation at the crank pin")
@@ -161,7 +161,7 @@ class MaxRates(Model):
 
 
 class SpringDesign(DesignBlock):
-    """What the springs are to keep constant, and what may be chosen for it."""
+    """Targets and choices of a design of springs."""
 
     torque: Torque | None = Field(
         None, description="target at the crank, all legs together; negative: towards smaller angles"
@@ -338,18 +338,18 @@ class SpringDesign(DesignBlock):
 
     @property
     def drive(self) -> Literal["torque", "force"]:
-        """What is wanted: a torque at the crank or a force at the slider."""
+        """Drive: a torque at the crank or a force at the slider."""
         curved = self.target is not None and self.target.kind == "torque"
         return "torque" if self.torque is not None or curved else "force"
 
     @property
     def window(self) -> tuple[float, float] | None:
-        """Where the target is wanted [rad or m]; None: as wide as possible."""
+        """Window of the target [rad or m]; None: as wide as possible."""
         return self.angle if self.drive == "torque" else self.travel
 
     @property
     def within(self) -> tuple[float, float] | None:
-        """Where the widest window is looked for [rad or m]; None: everywhere."""
+        """Range in which the widest window is searched [rad or m]; None: everywhere."""
         return self.angle_within if self.drive == "torque" else self.travel_within
 
     @property
@@ -359,7 +359,7 @@ class SpringDesign(DesignBlock):
 
     @property
     def size(self) -> float:
-        """What is wanted, of a curve the largest magnitude in its window [N m or N]."""
+        """Target, of a curve its largest magnitude in the window [N m or N]."""
         if self.curve is not None and self.window is not None:
             return self.curve.largest(*self.window)
         return self.torque or self.force or 0.0

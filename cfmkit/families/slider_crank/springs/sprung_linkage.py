@@ -81,7 +81,7 @@ class Assembly(ShortRepr):
 
     @property
     def also_stacked(self) -> tuple[str, ...]:
-        """What of it is stacked beside its fields (`cfmkit.families.rows.stacked`)."""
+        """Attributes that are stacked beside its fields (`cfmkit.families.rows.stacked`)."""
         return ("path",) if self.drive == "force" else ()
 
     @cached_property

@@ -210,7 +210,7 @@ class ProposedStructure:
 
     name: str
     variant: str  # what two Vs and a diamond are called with it
-    turn: int  # the order in which variants are tried, see `proposals_for_wish.TURNS`
+    turn: int  # the order in which variants are tried, see `proposals.TURNS`
     changes: Callable[[Any], dict[str, Any]]  # from the block as designed: keys of it -> values
 
 

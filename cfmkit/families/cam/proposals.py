@@ -1,0 +1,253 @@
+"""From a request to cams worth designing: closed forms of size, ripple, undercut and springs over many proportions.
+
+With D = x - x0 the travel is s = D^2/(2A), the springs are stretched by 2D and add up to K = F/(4A) [SS, eq. 1].
+Friction makes F/F0 = 1 +- mu (1 + f^2) A/D with the path's slope f = D/A + tan a; the roller fits the path's start if
+its radius is below 1/(cos^3 a0/A + 1/l).
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
+from cfmkit.families.cam.part import count_of, depth_of
+from cfmkit.families.cam.spec import CamSpec
+from cfmkit.families.cam.springs_spec import Springs
+from cfmkit.families.findings import mm
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer, called
+from cfmkit.specs.units import Place
+from cfmkit.stock.material_and_part_spec import MaterialSpec
+from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.suggestion_request import Request
+
+FRICTION = 0.002
+"""Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
+
+SLIDING = 0.1
+"""Friction of the plain slider pin, of the springs' hooks and of the guide where none is stated and hysteresis is
+required: greased steel; assumed."""
+
+PIN_SHARE = 0.25
+"""Diameter of the slider pin and of the pins that springs hook on, over that of a roller: assumed."""
+
+DRAWN = 60_000
+"""Proportions that are looked at."""
+
+OFFERED = 16
+"""Designs that are worth trying."""
+
+TAB, TOP, HOLE = 0.06, 0.02, 0.0066
+"""Height of the plate's tab and of its margin above the flanks over that of the envelope; largest fixing hole [m]."""
+
+PLATE_MIN, LOAD = 0.002, 4.5
+"""Thinnest plate [m]; largest force between roller and cam over the mechanism's, as in [SS]'s, where it is 4.1."""
+
+ROLLER_MIN = 0.0015
+"""Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
+
+COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
+"""Numbers of springs that are tried."""
+
+SPARE_SHARE, SPARE_LENGTH = 0.03, 0.3e-3
+"""Of the travel, and [m]: beyond the window where made parts have to be good; holes that lie 0.05 mm off move the end
+of the travel by a few times as much."""
+
+RESERVE, FLAT_RESERVE = 0.97, 0.9
+"""Shares of envelope and ripple that closed forms may use: they leave out the plate's margins, and friction squared."""
+
+
+def propose(request: Request, run: Run) -> FamilyOffer:
+    """Return cams that the closed forms say are worth designing, the smallest and the flattest first."""
+    if request.kind == "torque":
+        return FamilyOffer(reason="a cam with rollers gives a force at its slider, no torque")
+    if request.adjustable is not None:
+        return FamilyOffer(reason="the force of a cam is fixed by its springs and cannot be adjusted")
+    draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
+    found = _sized(request, draw)
+    fitting = found["fits"] & found["flat"] & found["lossless"]
+    if not fitting.any():
+        return _out_of_reach(request, found)
+    chosen = _spread(found, np.flatnonzero(fitting))
+    candidates: list[Candidate] = []
+    for index in chosen:
+        made = _candidate(request, {name: float(values[index]) for name, values in found.items()})
+        candidates += [made, _from_catalogue(made)] if made else []
+        if len(candidates) >= OFFERED:
+            break
+    if not candidates:
+        depth = "" if request.depth is None else f" within a depth of {mm(request.depth)}"
+        return FamilyOffer(reason=f"no steel spring of this force and stretch fits between the rollers{depth}")
+    return FamilyOffer(tuple(candidates))
+
+
+def _sized(request: Request, draw: FloatArray) -> dict[str, Any]:
+    """Return sizes and measures of many proportions, by name: lengths [m], ratios, and which fit."""
+    across, along = request.envelope[:2]
+    longest = max(across, along)
+    brace = longest * 10.0 ** (-1.3 * draw[0])
+    start = brace * (0.02 + 0.9 * draw[1])
+    constant = brace * 10.0 ** (-2.0 + 2.0 * draw[2])
+    roller = np.minimum(start, brace) * (0.04 + 0.9 * draw[3])
+    run_in = request.travel * 10.0 ** (-2.3 + 2.0 * draw[4])
+    stroke = run_in + request.travel + spare_stroke(request)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        end = start + np.sqrt(2.0 * constant * stroke)
+        rise = np.sqrt(brace**2 - start**2)
+        radius = 1.0 / ((rise / brace) ** 3 / constant + 1.0 / brace)
+        places = np.linspace(0.0, 1.0, 9)[:, None] * request.travel + run_in
+        stretch = np.sqrt(2.0 * constant * places)
+        x = start + stretch
+        slope = stretch / constant + x / np.sqrt(brace**2 - x**2)
+        loss = FRICTION * (1.0 + slope**2) * constant / stretch
+        ripple = 1.0 - (1.0 + loss.min(axis=0)) / (1.0 + loss.max(axis=0))
+        down = 1.0 - (1.0 - loss.max(axis=0)) / (1.0 - loss.min(axis=0))
+    tab = TAB * along
+    width = 2.0 * (end + roller)
+    height = stroke + rise + roller + np.maximum(roller, tab)
+    there = (end < 0.97 * brace) & (roller > ROLLER_MIN) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
+    ripple = np.where(there, np.maximum(ripple, down), np.inf)
+    hysteresis = np.where(there, 2.0 * loss.mean(axis=0), np.inf)
+    return {
+        "brace": brace, "start": start, "constant": constant, "roller": roller, "run_in": run_in, "end": end,
+        "width": width, "height": height, "ripple": ripple, "hysteresis": hysteresis, "loss": loss.mean(axis=0),
+        "there": there,
+        "fits": there & (width < RESERVE * across) & (height < RESERVE * along),
+        "flat": there & (ripple < FLAT_RESERVE * request.ripple) & (loss.max(axis=0) < 0.2),
+        "lossless": there & (hysteresis < RESERVE * (request.hysteresis or np.inf)),
+    }  # fmt: skip
+
+
+def spare_stroke(request: Request) -> float:
+    """Return how much longer than the travel a contour is cut [m]: half of made parts end before their own stroke."""
+    return 0.0 if request.good_parts is None else SPARE_SHARE * request.travel + SPARE_LENGTH
+
+
+def _spread(found: dict[str, Any], fitting: Any) -> list[int]:
+    """Return designs that fit, by turns the smallest, the flattest and those with the softest springs."""
+    size = (found["width"] * found["height"])[fitting]
+    soft = (found["end"] - found["start"])[fitting] / found["start"][fitting]
+    orders = [
+        fitting[np.argsort(key)] for key in (size, found["ripple"][fitting], soft, size * found["ripple"][fitting])
+    ]
+    return list(dict.fromkeys(int(order[k]) for k in range(min(60, len(fitting))) for order in orders))
+
+
+def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
+    """Return a design with springs that exist and a plate that bears the rollers; None if the depth is too small."""
+    total = request.target / (4.0 * size["constant"])
+    stretch = 2.0 * (size["end"] - size["start"])
+    for block in request.materials or ({"name": "steel-s235"},):
+        material = MaterialSpec.model_validate(dict(block))
+        if material.yield_strength is None:
+            continue
+        modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
+        bearable = YIELD_PRESSURE * material.yield_strength / request.safety
+        thick = max(PLATE_MIN, 1.1 * LOAD * request.target * modulus / (np.pi * size["roller"] * bearable**2))
+        depths = {}
+        for count in COUNTS:
+            springs = Springs(stiffness=total / count, count=count)
+            depth = depth_of(thick, springs, stretch, size["start"])
+            if depth is not None and depth <= (request.depth or sum(request.envelope)):
+                depths[count] = depth
+        if depths:
+            # as few springs as there is room for; without a depth they may be as deep as the envelope is wide
+            modest = [count for count, depth in depths.items() if request.depth or depth <= max(request.envelope)]
+            count = modest[0] if modest else min(depths, key=lambda one: depths[one])
+            return _written(request, size, dict(block), thick, count, total)
+    return None
+
+
+def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
+    """Return a designed cam whose springs have wire, coil and turns: the slimmest that fit between the rollers.
+
+    They are those that its depth counts with (`part.depth_of`).
+    """
+    from cfmkit.families.cam.model import analyze
+    from cfmkit.families.run_control import Run
+
+    springs, solution = spec.mechanism.springs, analyze(spec, Run()).state
+    if springs.wound is not None or solution is None:
+        return spec
+    stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
+    coil = extension_spring(springs.total / count_of(springs), stretch, length)
+    if coil is None:
+        return spec
+    return spec.replace({f"mechanism.springs.{key}": value for key, value in as_stated(coil).items()})
+
+
+def _from_catalogue(made: Candidate) -> Candidate:
+    """Return the same proportions with springs of the generic series; from these the force constant follows."""
+    spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
+    return replace(
+        made,
+        variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
+        spec=spec,
+        finish="",
+        springs="catalogue",
+    )
+
+
+def _written(
+    request: Request, size: dict[str, float], material: dict[str, Any], thick: float, count: int, total: float
+) -> Candidate:
+    along = request.envelope[1]
+    begin = float(f"{size['run_in']:.6g}")
+    stroke = begin + request.travel
+    longer = stroke + spare_stroke(request)
+    mechanism = {
+        "brace_length": size["brace"],
+        "rest_half_width": size["start"],
+        "roller_radius": size["roller"],
+        "springs": {"stiffness": total / count, "count": count},
+        "rolling_friction": FRICTION,
+        "profile": {"force_constant": size["constant"], "stroke": longer},
+        "plate": {
+            "base_height": TAB * along,
+            "top_margin": min(TOP * along, 0.5 * size["roller"]),
+            "hole_diameter": min(HOLE, 0.4 * TAB * along),
+        },
+        "contact": {"width": thick, "material": material},
+    }
+    if request.hysteresis is not None:
+        mechanism |= {
+            "pins": {"diameter": PIN_SHARE * 2.0 * size["roller"], "friction": SLIDING},
+            "guide": {"friction": SLIDING},
+        }
+    data = {
+        "family": "cam",
+        "name": "suggested",
+        "mechanism": mechanism,
+        "design": {"force": request.target, "stroke": longer},
+        "analysis": {"window": (Place(begin, "length"), Place(stroke, "length"))},
+    }
+    spec = CamSpec.model_validate(data)
+    area = size["width"] * size["height"] / (request.envelope[0] * request.envelope[1])
+    variant = called(f"{count} spring{'s' if count > 1 else ''}", request, material)
+    promise = area + size["ripple"] / request.ripple
+    return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise, springs="custom")
+
+
+def _out_of_reach(request: Request, found: dict[str, Any]) -> FamilyOffer:
+    """Return why no proportions fit."""
+    if not found["there"].any():
+        return FamilyOffer(reason="no cam of this travel has a path that its roller can follow within such an envelope")
+    flat = found["flat"] & found["lossless"]
+    if not flat.any():
+        return FamilyOffer(reason="with the friction of the rollers, ripple or loss is larger than required")
+    scale = (
+        np.maximum(found["width"] / request.envelope[0], found["height"] / request.envelope[1])[flat].min() / RESERVE
+    )
+    need = " x ".join(mm(side * float(scale)) for side in request.envelope[:2])
+    return FamilyOffer(reason=f"the rollers, the braces and the slider's travel need an envelope of about {need}")

@@ -1,0 +1,413 @@
+"""From a request to slider-cranks worth designing: kept proportions at the size that travel and envelope allow.
+
+Lengths scale with one factor: angles, and the shape of the curve, stay. For a strip the stress decides the thickness
+and the force the width, for flexures likewise; both are left to the family's own design. Linkages with springs at their
+joints are those of `sprung_linkage_proposals`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.findings import mm
+from cfmkit.families.flattest_window import flattest
+from cfmkit.families.slider_crank.printed.outline import drawing
+from cfmkit.families.slider_crank.printed.part import PAD
+from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
+from cfmkit.families.slider_crank.sprung_linkage_proposals import (
+    Proportions,
+    largest_first,
+    overfilled,
+    pushed_analysis,
+    pushed_linkage,
+    turned_linkages,
+)
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer, called
+from cfmkit.specs.units import Place, format_short
+from cfmkit.stock.material_and_part_spec import MaterialSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.suggestion_request import Request
+
+
+PUSHED = (
+    Proportions(100.0 / 54.0, 60.0 / 54.0, 0.542, 38.0 / 54.0),  # Bilancia, Geraci, Berselli 2019
+    Proportions(1.6, 1.0, 0.56, 0.8),
+    Proportions(2.4, 1.1, 0.43, 0.6),
+)
+"""For a force at the slider: the published lengths, and two linkages beside them, shorter and longer."""
+
+STARTS = (0.04, 0.1)
+"""Where the travel begins, over its length: before that the force of an elastic part comes up from zero."""
+
+SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
+"""Sizes that are tried, over the largest that the envelope allows."""
+
+FULL_PADS = 0.054
+"""Crank from which on the pads of a printed part are as large as usual [m], that of Bilancia, Geraci, Berselli 2019;
+those of smaller parts are smaller in proportion."""
+
+ROUNDED_BOX = 1.0 - 1e-4
+"""Share of the envelope that the largest part takes: sizes are rounded, and its outline is known to a few digits."""
+
+PAIR_GAP = (0.1, 4e-3)
+"""Between the parts of a mirrored pair: a share of one's height, and a length [m], as they are drawn."""
+
+DOUBT = 3.0
+"""So much wider than there is room for a part may seem: the estimate is of one proportion and one run-in."""
+
+FLEXURES_WIDER = 8.0
+"""About how much wider than a strip flexures of a tenth of its free length have to be."""
+
+NODES = 5
+"""Thicknesses of a tapered strip: more of them take longer and are hardly flatter."""
+
+LATER = 10.0
+"""Promise of what takes seconds to design, where everything else takes a part of one."""
+
+FLEXURE = 0.2
+"""Length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019."""
+
+THICKEST, THICKEST_TAPERED = 0.1, 0.05
+"""Largest thickness of a strip, and of a tapered one, over the crank's length: thicker ones hardly bend as lines do."""
+
+OFFERED = 24
+
+HERE = "cfmkit.families.slider_crank.proposals"
+PART, CORRECT = f"{HERE}:part", f"{HERE}:correct"
+"""What finishes the parts of one piece, and what corrects them by their solids."""
+
+FARTHER = 1.1
+"""How far a solid is followed, over its travel, to look for a flatter window."""
+
+
+def propose(request: Request, run: Run) -> FamilyOffer:
+    """Return linkages that fit the envelope, to be given springs, flexures or a strip by the family's design."""
+    return turned_linkages(request) if request.kind == "torque" else _of_force(request)
+
+
+def _of_force(request: Request) -> FamilyOffer:
+    if request.adjustable is not None:
+        return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
+    tried = [one for lengths in PUSHED for one in _pushed(request, lengths)]
+    if found := [one for one in tried if isinstance(one, Candidate)]:
+        return FamilyOffer(tuple(_varied(found)))
+    reasons = []
+    fits = [largest_printed(request.envelope, lengths) for lengths in PUSHED]
+    wide = min((strip_width(request, block, one) for one in fits for block in _materials(request)), default=0.0)
+    if wide > DOUBT * (request.depth or max(request.envelope)):
+        reasons.append(f"a strip would have to be about {mm(wide)} wide")
+    largest = max(fits)
+    if not _can_be_cut(request, THICKEST * largest):
+        text = f"strips are made {mm(request.thinnest)} thick at least, too thick for a crank of {mm(largest)}"
+        reasons.append(f"{text}, the longest that fits")
+    if most := max((one for one in tried if isinstance(one, float)), default=0.0):
+        told = format_short(most, "force", 2)
+        reasons.append(f"springs of steel wire that fit at the pins hold at most {told} over this travel")
+    elif not reasons and (reason := overfilled(request)) is not None:
+        reasons.append(reason)
+    if reasons:
+        return FamilyOffer(reason="; ".join(reasons))
+    crank = request.travel * (1.0 + STARTS[0]) / PUSHED[0].reach
+    need = _printed_box(PUSHED[0], crank) if request.depth is not None else _pinned_box(PUSHED[0], crank)
+    return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
+
+
+def _pinned_box(lengths: Proportions, crank: float) -> tuple[float, float]:
+    """Return the envelope that a linkage with pins needs across and along the slider's path [m]."""
+    across = max(lengths.offset, math.sin(lengths.unloaded)) + 2.0 * EYE_SHARE
+    return across * crank, (lengths.stretched + 2.0 * EYE_SHARE) * crank
+
+
+def _printed_box(lengths: Proportions, crank: float) -> tuple[float, float]:
+    """Return the envelope that a strip with its pads needs across and along the slider's path [m]; it moves within."""
+    small, large = _boxes_as_drawn(lengths)
+    slope, beyond = (large - small) / FULL_PADS, crank - FULL_PADS
+    across, along = small * crank / FULL_PADS if beyond <= 0.0 else small + slope * beyond
+    return float(across), float(along)
+
+
+@cache
+def _boxes_as_drawn(lengths: Proportions) -> FloatArray:
+    """Return the box of the outline of a strip, across and along the slider's path, for two cranks, (2, 2) [m]."""
+    boxes = []
+    for crank in (FULL_PADS, 2.0 * FULL_PADS):
+        beam = {"width": crank, "thickness": 0.01 * crank}
+        mechanism = {**_mechanism(lengths, crank), "material": {"name": "pom"}, "beam": beam}
+        analysis = {"drive": "force", "fidelity": "beam"}
+        drawn = drawing(
+            SliderCrankSpec.model_validate({"family": "slider-crank", "mechanism": mechanism, "analysis": analysis})
+        )
+        extents = np.array([contour.extents for contour in drawn.contours if contour.layer == "cut"])
+        along, across = extents[:, 2:].max(axis=0) - extents[:, :2].min(axis=0)
+        boxes.append([across, along])
+    return np.array(boxes)
+
+
+def largest_printed(envelope: Sequence[float], lengths: Proportions) -> float:
+    """Return the crank's length of the largest strip whose outline fits the first two sides of an envelope [m]."""
+    small, large = _boxes_as_drawn(lengths)
+    wide = np.array(envelope[:2]) * ROUNDED_BOX
+    in_proportion = FULL_PADS * float((wide / small).min())
+    if in_proportion <= FULL_PADS:
+        return in_proportion
+    return FULL_PADS * (1.0 + float(((wide - small) / (large - small)).min()))
+
+
+def _pushed(request: Request, lengths: Proportions) -> list[Candidate | float]:
+    """Return parts and linkages of some proportions at all sizes that fit.
+
+    Or the largest force that springs at pins can hold, where that is less than what is required [N].
+    """
+    printed = largest_printed(request.envelope, lengths)
+    pinned = min(
+        request.envelope[0] / (lengths.offset + 2 * EYE_SHARE),
+        request.envelope[1] / (lengths.stretched + 2 * EYE_SHARE),
+    )
+    pins = overfilled(request) is None
+    found: list[Candidate | float] = []
+    for size in SIZES:
+        for start in STARTS:
+            travel = start * request.travel, (1.0 + start) * request.travel * (1.0 + 1e-6)
+            if travel[1] <= lengths.reach * size * printed:
+                found += _parts(request, lengths, size * printed, travel, (size in SIZES[:2], start == STARTS[-1]))
+            pair = size * pair_size(request, lengths)
+            if travel[1] <= lengths.reach * pair:
+                found += _pairs(request, lengths, pair, travel)
+            if travel[1] <= lengths.reach * size * pinned and pins and start == STARTS[0]:
+                found.append(pushed_linkage(request, lengths, size * pinned, travel[0]))
+    return found
+
+
+def _parts(
+    request: Request, lengths: Proportions, crank: float, travel: tuple[float, float], more: tuple[bool, bool]
+) -> list[Candidate]:
+    """Return the parts of one size that are not much wider than there is room for; `more`: large ones, late starts."""
+    deep = request.depth or max(request.envelope)
+    found = []
+    for block in _materials(request):
+        wide = strip_width(request, block, crank)
+        if wide <= DOUBT * deep and _can_be_cut(request, THICKEST * crank):
+            found.append(_strip(request, block, lengths, crank, travel))
+        if more[0] and FLEXURES_WIDER * wide <= DOUBT * deep:
+            found.append(_flexures(request, block, lengths, crank, travel))
+        if all(more) and wide <= DOUBT * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
+            found.append(_tapered(request, block, lengths, crank, travel))
+    return found
+
+
+def _can_be_cut(request: Request, thickest: float) -> bool:
+    """Return True if strips up to a thickness, and as wide as there is room for, can be as thin as they are made."""
+    return request.thinnest <= min(thickest, request.depth or math.inf)
+
+
+def pair_size(request: Request, lengths: Proportions) -> float:
+    """Return the crank's length of the largest mirrored pair that fits the envelope [m]: two heights and a gap."""
+    one = (request.envelope[0] - PAIR_GAP[1]) / (2.0 + PAIR_GAP[0])
+    return largest_printed((one, request.envelope[1]), lengths) if one > 0.0 else 0.0
+
+
+def _pairs(request: Request, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
+    """Return mirrored pairs of strips, each half as wide as one strip; the guide of the slider carries nothing."""
+    found = []
+    for block in _materials(request):
+        wide = 0.5 * strip_width(request, block, crank)
+        if wide <= DOUBT * (request.depth or max(request.envelope)) and _can_be_cut(request, THICKEST * crank):
+            plain = _strip(request, block, lengths, crank, travel)
+            spec = plain.spec.replace({"mechanism.copies": "mirrored"})
+            found.append(replace(plain, variant=plain.variant.replace("strip", "pair of strips"), spec=spec))
+    return found
+
+
+def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
+    """Return about how wide a strip has to be [m]: scaled from one of ABS, 1.5 N over 34 mm with a crank of 54 mm.
+
+    The curvature is as the travel over the square of the crank's length; the stress gives the thickness, and the force
+    is as width, modulus, cube of the thickness and curvature over the length.
+    """
+    material = MaterialSpec.model_validate(block)
+    strength = material.allowable(1.0)
+    if strength is None:
+        return math.inf
+    size, way = crank / 0.054, request.travel / 0.034
+    stiffer = material.modulus / 1.8e9
+    thicker = strength / 42.5e6 / stiffer * size**2 / way
+    return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * way)
+
+
+def _varied(found: list[Candidate]) -> list[Candidate]:
+    """Return as many candidates as are offered, of different kinds by turns; what takes long to design comes last."""
+    kinds = list(dict.fromkeys(one.variant for one in found))
+    rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
+    longest = max(map(len, rows))
+    by_turns = [row[k] for k in range(longest) for row in rows if k < len(row)]
+    # cut before what takes long goes to the end, or none of that would be left
+    return sorted(by_turns[:OFFERED], key=lambda one: one.promise >= LATER)
+
+
+def _materials(request: Request) -> list[dict[str, Any]]:
+    return [dict(block) for block in request.materials] or [{"name": "pom"}]
+
+
+def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
+    """Return the linkage of a printed part, and its pads where they are smaller than usual."""
+    small = crank / FULL_PADS
+    pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD)}}
+    return {
+        "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
+        "unloaded_angle": lengths.unloaded, **pads,
+    }  # fmt: skip
+
+
+def _strip(
+    request: Request,
+    material: dict[str, Any],
+    lengths: Proportions,
+    crank: float,
+    travel: tuple[float, float],
+) -> Candidate:
+    """Return a strip of one thickness, to be sized by stress and force."""
+    thick, wide = (request.thinnest, THICKEST * crank), (request.thinnest, request.depth or crank)
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / request.strength_used,
+            "beam": {"width": wide[1], "thickness": 0.02 * crank},
+        },
+        "design": {
+            "force": request.target, "travel": travel,
+            "beam": {"shape": "uniform", "goal": "ripple", "width": wide, "thickness": thick},
+        },
+        "analysis": pushed_analysis(travel),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate(
+        called("strip", request, material),
+        spec,
+        True,
+        PART,
+        largest_first(crank, request),
+        correct=CORRECT,
+    )
+
+
+def _tapered(
+    request: Request,
+    material: dict[str, Any],
+    lengths: Proportions,
+    crank: float,
+    travel: tuple[float, float],
+) -> Candidate:
+    """Return a strip of varying thickness, to be searched for the flattest force."""
+    plain = _strip(request, material, lengths, crank, travel)
+    thick = (max(request.thinnest, 0.005 * crank), THICKEST_TAPERED * crank)
+    wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
+    shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
+    spec = plain.spec.replace({"design.beam": shape})
+    promise = LATER + abs(crank / request.envelope[1] - 0.35)
+    return Candidate(called("tapered strip", request, material), spec, True, plain.finish, promise, correct=CORRECT)
+
+
+def _flexures(
+    request: Request,
+    material: dict[str, Any],
+    lengths: Proportions,
+    crank: float,
+    travel: tuple[float, float],
+) -> Candidate:
+    """Return a chain of links and flexures: first the springs for the force, then flexures of that stiffness."""
+    scale = crank / 0.054
+    rate = request.target / 1.5 * scale
+    long = FLEXURE * crank
+    thick = 0.09 * long
+    one = {"length": long, "thickness": thick, "width": 2.0 * thick}
+    # rates per rad grow with force times length; those of Bilancia et al. 2019 are for 1.5 N at 54 mm
+    springs = {"pivot": 0.028303 * rate, "crank_pin": 0.035379 * rate, "slider_pin": 0.035379 * rate}
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / request.strength_used,
+            "springs": springs,
+            "flexures": {"pivot": one, "crank_pin": one, "slider_pin": one},
+        },
+        "design": {"force": request.target, "travel": (0.0, travel[1]), "flexures": {}},
+        "analysis": pushed_analysis(travel),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate(
+        called("flexures", request, material),
+        spec,
+        True,
+        PART,
+        largest_first(crank, request),
+        correct=CORRECT,
+    )
+
+
+def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
+    """Return a part over its flattest window, with the thicknesses and the widths that it needs as a solid.
+
+    The force is linear in the widths, the stress falls nearly as the thickness.
+    """
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.slider_crank.printed.model import analyze
+    from cfmkit.families.slider_crank.printed.plane_fem_analysis import analyze as solve_solid
+
+    request = aim_below_stiffening(spec, request, analyze)
+    solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
+    _, end = solid.analysis.travel or (0.0, 0.0)
+    result = solve_solid(solid.replace({"analysis.travel": (0.0, FARTHER * end), "analysis.window": None}), Run())
+    found, material = flattest(result, request.travel), solid.mechanism.material
+    if found is None or material is None:
+        return solid
+    curve, allowed = result.curve, request.strength_used * (material.allowable(1.0) or np.inf)
+    mean = float(np.interp(np.linspace(*found, 101), curve.motion, curve.effort).mean())
+    stress = np.maximum.accumulate(curve.extra["max_stress"].values)
+    thinner = min(1.0, 0.99 * allowed / float(np.interp(found[1], curve.motion, stress)))
+    window = tuple(Place(place, "length") for place in found)
+    changes: dict[str, Any] = {"analysis.travel": (0.0, found[1]), "analysis.window": window}
+    return solid.replace(changes | _scaled(solid, thinner, request.target / (mean * thinner**3)))
+
+
+def _scaled(spec: SliderCrankSpec, thinner: float, wider: float) -> dict[str, Any]:
+    """Return the thicknesses and widths of a strip, or of flexures, times two factors, by their paths."""
+    strip = spec.mechanism.beam
+    if strip is not None and spec.piece == "beam":
+        thick = strip.thickness
+        many = tuple(thinner * one for one in thick) if isinstance(thick, tuple) else thinner * thick
+        return {"mechanism.beam.thickness": many, "mechanism.beam.width": wider * strip.width}
+    names = "pivot", "crank_pin", "slider_pin"
+    sizes: dict[str, Any] = {name: getattr(spec.mechanism.flexures, name) for name in names}
+    thicknesses = {f"mechanism.flexures.{name}.thickness": thinner * one.thickness for name, one in sizes.items()}
+    return thicknesses | {f"mechanism.flexures.{name}.width": wider * one.width for name, one in sizes.items()}
+
+
+def part(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
+    """Return a designed part whose widths, in which force is linear, give exactly the mean that is required."""
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.slider_crank.printed.model import analyze
+
+    made = spec.replace({"design": None, "requirements": (), "mechanism.safety_factor": 1.0})
+    result = analyze(made, Run())
+    if not result.curves:
+        return made
+    low, high = (float(end) for end in made.analysis.window or (0.0, 0.0))
+    inside = (result.curve.motion >= low) & (result.curve.motion <= high)
+    mean = float(np.mean(result.curve.effort[inside])) if inside.any() else 0.0
+    if not mean > 0.0:
+        return made
+    factor = request.target / mean
+    return made.replace(_scaled(made, 1.0, factor))

@@ -1,0 +1,436 @@
+"""Linkages with springs of steel wire at their joints that may do what is required: for a torque, or for a force.
+
+Kept proportions at the size that the envelope allows; lengths scale with one factor, the angles stay. Which springs
+hold the effort best, of those that can be wound and have their place, `flattest_springs_that_fit` says; they are custom
+springs within the envelope.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import SolutionError
+from cfmkit.families.findings import deg, mm, percent
+from cfmkit.families.slider_crank.flattest_springs_that_fit import STILL, SprungMotion, flattest_springs, largest_effort
+from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
+from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear
+from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
+from cfmkit.families.slider_crank.springs.part import PLATES, height_of
+from cfmkit.families.slider_crank.springs.solution import grid_over
+from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer
+from cfmkit.specs.units import Place, format_short
+from cfmkit.stock.material_and_part_spec import MaterialSpec
+from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, tensile_strength
+from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring, shortest_torsion_spring, torsion_spring
+from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
+
+if TYPE_CHECKING:
+    from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
+    from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
+    from cfmkit.families.suggestion_request import MaterialBlock, Request
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """A linkage over its crank's length, and its envelope as far as it is known."""
+
+    # stretched, offset: position of the stretched slider, and height of its way, over the crank's length
+    stretched: float
+    offset: float
+    unloaded: float  # crank angle with all springs relaxed [rad]
+    reach: float  # largest travel that is of use, over the crank's length
+
+
+TURNED = (
+    (1.0, 5.0, 0.3, -5.0),
+    (1.0, 5.0, 0.3, -9.0),
+    (1.0, 2.5, 0.0, -8.0),
+    (1.0, 3.0, 0.3, -15.0),
+    (1.0, 2.0, 0.5, -25.0),
+    (1.0, 1.65, 0.5, -88.0),
+    (1.0, 3.7, 0.0, -122.0),
+    (1.0, 10.0, 0.0, -82.5),
+)
+"""For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019. The
+last three are the flattest of some thousands of random linkages over 40 to 90 deg: their springs are wound up first."""
+
+WOUND_UP = -math.radians(60.0)
+"""Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
+
+SHRUNK = (0.99, 0.8)
+"""Sizes of linkages for a torque over the largest that fits the envelope; smaller ones leave room for wider springs."""
+
+ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
+"""What round wire in bending holds at most, over its volume [J/m^3]."""
+
+STRONG = 4.0
+"""Torque that springs can hold by the bound over the one required, above which more of it says nothing."""
+
+FLAT, HOPELESS = 0.45, 0.25
+"""Deviation over the ripple required that is flat enough: up to it springs for a torque are left out, and those for a
+force stay in the first window and the envelope; and the largest deviation that is worth a look."""
+
+WEAK = 0.9
+"""Of the torque required: linkages whose springs hold less by the bound are not designed; it knows some places only."""
+
+LINK_SHARES = (1.0 / 12.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.5, 1.0 / 4.5)
+"""Thickness of links with springs at their pins over the depth required: three quarters to a third are left for the
+springs."""
+
+SLIDING = 0.1
+"""Friction of plain pins and of a plain guide where none is stated: greased steel, or dry POM on steel; assumed."""
+
+PIN_IN_COIL = 0.9
+"""Largest diameter of a pin over the inner one of a torsion spring around it, wound up: makers leave a tenth."""
+
+FINISH = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
+"""What finishes linkages with springs at their pins."""
+
+
+def turned_linkages(request: Request) -> FamilyOffer:
+    """Return linkages for a torque at their crank, those whose springs can hold most of it first; or why none can."""
+    if (reason := overfilled(request)) is not None:
+        return FamilyOffer(reason=reason)
+    found = [_turned(request, size, one) for size in SHRUNK for one in TURNED]
+    candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
+    if candidates:
+        return FamilyOffer(tuple(candidates))
+    return FamilyOffer(reason=_too_weak(request, max(one for one in found if isinstance(one, float))))
+
+
+def _too_weak(request: Request, most: float) -> str:
+    """Return what is wrong where no springs hold the torque."""
+    if not most > 0.0:
+        return (
+            f"no springs turn a crank in one direction over {deg(request.travel)}: it would pass the stretched or "
+            "folded position"
+        )
+    reported = format_short(most, "torque", 2)
+    return f"springs of steel wire that fit at the pins hold at most {reported} over this angle"
+
+
+def overfilled(request: Request) -> str | None:
+    """Return what is wrong where springs at pins would fill more than the envelope, taken as deep as it is wide."""
+    wire = request.target * request.travel / ENERGY
+    deep = wire / (request.envelope[0] * request.envelope[1])
+    if deep <= (request.depth or max(request.envelope[:2])):
+        return None
+    return f"the wire of steel springs for this work would fill the envelope to a depth of {mm(deep)}"
+
+
+def _turned(request: Request, share: float, linkage: tuple[float, float, float, float]) -> Candidate | float:
+    """Return a linkage that turns as required around its stretched position, a share of what fits the envelope.
+
+    Or the largest torque that springs can hold, where that is less than what is required [N m].
+    """
+    crank, coupler, offset, unloaded = linkage
+    low = math.radians(unloaded)
+    within = _within(request, low)
+    angles = np.linspace(low, within[1], 181)
+    y = crank * np.sin(angles)
+    inside = coupler**2 - (offset - y) ** 2
+    if (inside <= 0.0).any():
+        return 0.0
+    x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
+    sides = np.ptp(x) + 2.0 * EYE_SHARE * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * EYE_SHARE * crank
+    size = share * min(max(request.envelope[:2]) / max(sides), min(request.envelope[:2]) / min(sides))
+    link = Linkage(crank * size, coupler * size, offset * size)
+    most = largest_effort(_turning(request, link, low))
+    if most < WEAK * request.low:
+        return most
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
+            "unloaded_angle": low, "springs": {},
+        },
+        "analysis": {"angle": (low, within[1]), "points": 961},
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate(
+        "springs at pins", spec, finish=FINISH, promise=-min(most / request.target, STRONG), springs="custom"
+    )
+
+
+def _within(request: Request, unloaded: float) -> tuple[float, float]:
+    """Return between which crank angles a torque may be held [rad]."""
+    if unloaded > WOUND_UP:
+        return unloaded, unloaded + max(3.0 * request.travel, math.radians(20.0))
+    return 0.0, max(1.6 * request.travel, math.radians(60.0))
+
+
+def _turning(request: Request, link: Linkage, unloaded: float, sheet: float | None = None) -> SprungMotion:
+    """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
+    low, high = _within(request, unloaded)
+    ends = low, min(high, unloaded + math.pi)
+    return _sprung(request, Assembly(link, unloaded, np.zeros(len(JOINTS))), ends, min(link.crank, link.coupler), sheet)
+
+
+def _sprung(
+    request: Request, assembly: Assembly, ends: tuple[float, float], widest: float, sheet: float | None = None
+) -> SprungMotion:
+    """Return what springs have to do where the effort may be held between two ends of the motion."""
+    deep = _depth_of_springs(request, sheets_of_links(request)[0] if sheet is None else sheet)
+    return SprungMotion(assembly, *ends, request.travel, widest, deep, shared=request.depth is not None)
+
+
+def _depth_of_springs(request: Request, sheet: float) -> float:
+    """Return how far springs may stand out from links of a sheet [m], on both sides of them together [m]."""
+    return max(request.envelope[:2]) if request.depth is None else request.depth - PLATES * sheet
+
+
+def _pushing(spec: SliderCrankSpec, request: Request, sheet: float | None = None) -> list[SprungMotion]:
+    """Return what springs have to do at the pins of a linkage that is pushed, what is wanted most first.
+
+    A window at the beginning of the travel: there the springs turn least. Torsion springs that stay in the envelope
+    even where there are two of the widest, then those that stand beside each other.
+    """
+    assembly = assemble(spec)
+    link = assembly.linkage
+    # between which travels a force may be held, by the analysis of the candidate
+    first, last = (float(end) for end in spec.analysis.window or (0.0, 0.0))
+    ends = assembly.units(np.array([0.0, last]))
+    high = max(link.offset, *(link.crank * np.sin(ends.angle)))
+    beside = min(link.crank, link.coupler)
+    inside = min(beside, request.envelope[0] - high, request.envelope[1] - float(ends.position[0]))
+    windows = (first, first + request.travel), (first, last)
+    return [
+        _sprung(request, assembly, window, wide, sheet) for wide in (inside, beside) for window in windows if wide > 0.0
+    ]
+
+
+def sheets_of_links(request: Request) -> tuple[float, ...]:
+    """Return of which sheets links may be that have springs at their pins, the thinnest first [m].
+
+    Shares of the depth required; where depth does not matter, shares of the envelope's shorter side.
+    """
+    deep = 0.5 * min(request.envelope[:2]) if request.depth is None else request.depth
+    return tuple(dict.fromkeys(max(share * deep, request.thinnest) for share in LINK_SHARES))
+
+
+def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
+    """Return a linkage with the springs that hold the torque or the force best, and with links that bear them.
+
+    The window is as long as is required. The thinnest links that bear the springs' loads are taken: thicker ones leave
+    less depth for the springs.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If no springs that fit come near it, or no links bear them.
+    """
+    sprung, reason, least = None, "", 0.0
+    materials = request.materials or ({"name": "steel-s235"},)
+    for sheet in sheets_of_links(request):
+        if sheet < least:
+            continue
+        if sprung is None or request.depth is not None:  # where depth does not matter, the same springs fit
+            try:
+                sprung = _with_springs(spec.replace({"mechanism.part.sheet": sheet}), request, sheet)
+            except SolutionError as problem:
+                raise SolutionError(reason or str(problem)) from None
+        sprung = sprung.replace({"mechanism.part.sheet": sheet})
+        for block in materials:
+            linked = with_links(sprung, request, block)
+            if linked is not None:
+                return linked
+        least = min(_least_sheet(sprung, request, block) for block in materials)
+        reason = f"links neither bear the loads of the springs nor stay straight under them: {mm(least)} thick at least"
+    raise SolutionError(reason)
+
+
+def _with_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> SliderCrankSpec:
+    """Return a linkage with the springs that hold the torque or the force best, wound beside links of a sheet [m]."""
+    held = _torque_held(spec, request, sheet) if request.kind == "torque" else _force_held(spec, request, sheet)
+    if held is None or held.deviation > HOPELESS:
+        off = "" if held is None else f" nearer than {percent(held.deviation)}"
+        raise SolutionError(f"no springs of steel wire that fit at the pins hold this {request.kind}{off}")
+    name, dimension = ("angle", "angle") if request.kind == "torque" else ("travel", "length")
+    start = float(spec.mechanism.unloaded_angle or 0.0) if request.kind == "torque" else 0.0
+    window = held.begin, held.begin + request.travel * (1.0 + 1e-6)
+    # the motion is up to the window's end: what the linkage could do beyond it needs no room
+    motion = min(start, window[0]), window[1]
+    sprung = spec.replace(
+        {
+            "mechanism.springs": dict(zip(JOINTS, held.rates.tolist(), strict=True)),
+            "analysis.window": tuple(Place(end, dimension) for end in window),
+            f"analysis.{name}": motion,
+            f"analysis.reference_{name}": 0.5 * sum(window),
+        }
+    )
+    return wound(sprung, request)
+
+
+def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) -> SliderCrankSpec | None:
+    """Return a linkage whose links and pins bear its springs, of a material; None if there are none of its sheet.
+
+    Where hysteresis is required, pins and guide rub.
+    """
+    material, sheet = MaterialSpec.model_validate(dict(block)), spec.mechanism.part.sheet  # type: ignore[union-attr]
+    allowable = material.allowable(1.0)
+    if allowable is None or sheet is None:
+        return None
+    loads = _loads(spec)
+    widest = min((_hole_of_coil(spec, name, loads_of) for name, loads_of in _turns_of(spec).items()), default=np.inf)
+    link = links_that_bear(loads, sheet, material.modulus, request.strength_used * allowable, request.thinnest, widest)
+    if link is None:
+        return None
+    changes: dict[str, Any] = {
+        "mechanism.material": dict(block), "mechanism.links.width": link.width, "mechanism.pins.diameter": link.hole,
+    }  # fmt: skip
+    if request.hysteresis is not None:
+        changes |= {"mechanism.pins.friction": SLIDING, "mechanism.guide.friction": SLIDING}
+    return spec.replace(changes)
+
+
+def _loads(spec: SliderCrankSpec) -> LinkLoads:
+    """Return what acts on the links over the motion of the analysis."""
+    assembly = assemble(spec)
+    low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
+    return link_loads(assembly, grid_over(assembly.drive, low, high), spec.mechanism.sets)
+
+
+def _least_sheet(spec: SliderCrankSpec, request: Request, block: MaterialBlock) -> float:
+    """Return how thick links of a material have to be at least, if they are as wide as they may be [m]."""
+    material = MaterialSpec.model_validate(dict(block))
+    allowable = material.allowable(1.0)
+    return (
+        math.inf
+        if allowable is None
+        else least_sheet(_loads(spec), material.modulus, request.strength_used * allowable)
+    )
+
+
+def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
+    """Return how far each torsion spring that is bought turns from where it is relaxed [rad]."""
+    assembly = assemble(spec)
+    low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
+    turns = MotionExtremes(assembly, low, high).largest_turns[:, 0]
+    bought = {one.at for one in spec.mechanism.springs.bought}
+    return {name: float(turn) for name, turn in zip(JOINTS[:3], turns, strict=False) if name in bought}
+
+
+def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
+    """Return the largest pin that the torsion spring of a joint still turns around when wound up by a turn [m]."""
+    return min(
+        PIN_IN_COIL * (coil.coil * coil.turns / (coil.turns + turn / (2.0 * math.pi)) - coil.wire)
+        for coil in spec.mechanism.springs.coils_at(name)
+    )
+
+
+def _torque_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
+    unloaded = float(spec.mechanism.unloaded_angle or 0.0)
+    turning = _turning(request, linkage_of(spec.mechanism), unloaded, sheet)
+    return flattest_springs(turning, request.target, FLAT * request.ripple)
+
+
+def _force_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
+    """Return the springs of the first motion that are flat enough, else the flattest of all; none is left out."""
+    best: HeldEffort | None = None
+    for motion in _pushing(spec, request, sheet):
+        held = flattest_springs(motion, request.target, 0.0)
+        if held is not None and (best is None or held.deviation < best.deviation):
+            best = held
+        if best is not None and best.deviation <= FLAT * request.ripple:
+            break
+    return best
+
+
+def wound(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
+    """Return a designed linkage with springs wound to measure of steel wire, which bear its motion.
+
+    A torsion spring is no wider than the crank, or the coupler, is long, so that those of two pins stand beside each
+    other, and no deeper than the longer side of the envelope, or than what the links and those on their other side
+    leave of its depth.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If there is no such spring for a joint.
+    """
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.slider_crank.springs.model import analyze
+
+    solution = analyze(spec.replace({"design": None, "requirements": ()}), Run()).state
+    if solution is None:
+        return spec
+    link, (high, low) = solution.assembly.linkage, (turns[:, 0] for turns in solution.extremes.turns)
+    # a spring at the slider lies beside the coupler and is stretched by a slider that leaves the pivot
+    rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
+    widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates
+    turns = {JOINTS[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
+    pulled = JOINTS[3] not in turns or low[3] > -STILL * turns[JOINTS[3]][1]
+    part, pin = spec.mechanism.part, spec.mechanism.pins.diameter if spec.mechanism.pins else 0.0
+    deep = room = _depth_of_springs(request, (part.sheet if part else None) or 0.0)
+    if request.depth is not None and "pivot" in turns:
+        # that of the pivot is on the other side of the links: first it takes as little as it can
+        least = shortest_torsion_spring(*turns["pivot"], widest, pin)
+        deep = room - (0.0 if least is None else least.body_length_wound_up(turns["pivot"][1]))
+    bought: dict[str, Wound] = {}
+    for name in sorted(turns, key="pivot".__eq__):
+        if name == "pivot" and request.depth is not None:
+            deep = room - max((height_of(other, coil, turns[other][1]) for other, coil in bought.items()), default=0.0)
+        if name == "slider":
+            coil = extension_spring(*turns[name], rest if pulled else 0.0)
+        else:
+            coil = torsion_spring(*turns[name], deep, pin)
+        if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
+            raise SolutionError(_no_spring(name, turns[name], coil))
+        bought[name] = coil
+    return spec.replace({"mechanism.springs.bought": tuple({"at": name, **as_stated(bought[name])} for name in turns)})
+
+
+def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:
+    dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
+    reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
+    wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
+    return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {reported}{wide}"
+
+
+def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: float) -> Candidate | float:
+    """Return a linkage with springs at its pins, for a force from some travel on.
+
+    Or the largest force that springs can hold, where that is less than what is required [N].
+    """
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
+            "unloaded_offset": 4e-4, "springs": {},
+        },
+        "analysis": pushed_analysis((first, lengths.reach * crank)),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    most = 0.0
+    for motion in _pushing(spec, request):
+        most = max(most, largest_effort(motion))
+        if most >= WEAK * request.low:  # what more there is does not matter
+            break
+    else:
+        return most
+    return Candidate("springs at pins", spec, finish=FINISH, promise=largest_first(crank, request), springs="custom")
+
+
+def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:
+    """Return the block `analysis` of a slider that is pushed up to the end of a window of its travel [m]."""
+    return {
+        "drive": "force", "travel": (0.0, travel[1]), "window": tuple(Place(end, "length") for end in travel),
+        "points": 241,
+    }  # fmt: skip
+
+
+def largest_first(crank: float, request: Request) -> float:
+    """Return how soon a size is tried: the largest first, which is the flattest and needs the least depth."""
+    return -crank / request.envelope[1]

@@ -1,0 +1,39 @@
+"""Indices of sensitivity: one value a parameter, with its interval; not stated where a sample has no value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Index:
+    """One index of every parameter, with its interval; NaN where it cannot be stated."""
+
+    name: str
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+Analysis = tuple[Index, ...]
+
+
+def unstated_indices(names: tuple[str, ...], count: int) -> Analysis:
+    """Return indices of so many parameters that are not stated."""
+    gap = np.full(count, np.nan)
+    return tuple(Index(name, gap, gap, gap) for name in names)
+
+
+def analyze_complete(
+    outputs: FloatArray, analyze: Callable[[FloatArray], Analysis], names: tuple[str, ...], count: int
+) -> Analysis:
+    """Return the indices of one output; not stated where one of its samples failed, whose output is NaN."""
+    return unstated_indices(names, count) if np.isnan(outputs).any() else analyze(outputs)

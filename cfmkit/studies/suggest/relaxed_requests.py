@@ -1,0 +1,194 @@
+"""The nearest requests that a family can meet: one key is relaxed until a mechanism of the family meets all.
+
+The scaling laws of the family say from where on it has candidates. These are made and judged as for any other request;
+as long as none is good, the key is relaxed further. Only what a mechanism was found for is named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from cfmkit.families import family
+from cfmkit.families.base import function_named
+from cfmkit.families.findings import percent
+from cfmkit.families.run_control import Run
+from cfmkit.specs.units import format_short, read_quantity
+from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, made
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from cfmkit.designing.run_many_starts import Clock
+    from cfmkit.families.suggestion_request import Candidate, Request
+
+    Relaxed = tuple[Request, str]
+    Relaxation = Callable[[Request, float], Relaxed | None]
+
+STEPS = (1.0, 1.15, 1.5, 2.5, 6.0, 20.0)
+"""Factors at which a request is relaxed for a family; one that is farther off is not near."""
+
+HALVINGS = 3
+"""Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
+
+FURTHER = (1.02, 1.1, 1.3, 1.7, 2.5)
+"""Beyond the first candidates: laws leave out pads, margins, and what stretches."""
+
+TRIED = 3
+"""Candidates that are made of each relaxed request."""
+
+LARGEST = 0.5
+"""Ripple and hysteresis above which nobody would speak of a constant force."""
+
+NAMED = 2
+"""Keys that are named, those first that have to be relaxed least."""
+
+
+def nearest(request: Request, name: str, seed: int, clock: Clock) -> dict[str, str]:
+    """Return keys of a request -> values with which, the other keys as they are, a family has a mechanism for it."""
+    edges = []
+    for key, relaxation in _relaxations(request).items():
+        factor = _first_offer(request, (name, seed), relaxation, clock)
+        if factor is not None:
+            edges.append((factor, key, relaxation))
+    found: dict[str, str] = {}
+    for factor, key, relaxation in sorted(edges, key=lambda one: one[0]):
+        reported = None if len(found) == NAMED else _met(request, name, (relaxation, factor), seed, clock)
+        if reported is not None:
+            found[key] = reported
+    return found
+
+
+def _relaxations(request: Request) -> dict[str, Relaxation]:
+    """Return what may be relaxed of a request, by key."""
+    found: dict[str, Relaxation] = {"envelope": _larger, request.kind: _weaker}
+    found["travel" if request.kind == "force" else "angle"] = _shorter
+    found["ripple"] = _rippled
+    if request.safety > 1.0:
+        found["safety"] = _less_safe
+    if request.hysteresis is not None:
+        found["hysteresis"] = _lossy
+    if request.adjustable is not None:
+        found["adjustable"] = _less_adjustable
+    return found
+
+
+def _offered(request: Request, name: str, seed: int) -> Sequence[Candidate]:
+    propose = family(name).propose
+    if not propose:
+        return ()
+    asked = request.with_strengths[-1]
+    candidates: Sequence[Candidate] = function_named(propose)(asked, Run(seed)).candidates
+    return candidates
+
+
+def _first_offer(request: Request, asked: tuple[str, int], relaxation: Relaxation, clock: Clock) -> float | None:
+    """Return the smallest factor with which a family has candidates; None if it has none."""
+
+    def offers(factor: float) -> bool:
+        relaxed = relaxation(request, factor)
+        return relaxed is not None and bool(_offered(relaxed[0], *asked))
+
+    below = 1.0
+    for factor in STEPS:
+        if clock.late():
+            return None
+        if offers(factor):
+            break
+        below = factor
+    else:
+        return None
+    for _ in range(HALVINGS if factor > 1.0 else 0):
+        middle = (below * factor) ** 0.5
+        below, factor = (below, middle) if offers(middle) else (middle, factor)
+    return factor
+
+
+def _met(request: Request, name: str, relaxed_by: tuple[Relaxation, float], seed: int, clock: Clock) -> str | None:
+    """Return the value of a key with which one of a family's first candidates is good; None if none is."""
+    relaxation, first = relaxed_by
+    for more in FURTHER:
+        relaxed = relaxation(request, first * more)
+        if relaxed is None:
+            return None
+        # the sides that were just enough by the laws may be too little: then all of them
+        choices = [_only_needed(request, (name, seed), relaxed), relaxed] if relaxation is _larger else [relaxed]
+        for asked, reported in {text: (one, text) for one, text in choices}.values():
+            for candidate in _offered(asked, name, seed)[:TRIED]:
+                if clock.late():
+                    return None
+                if made(ProposalJob(name, candidate, asked, seed, clock.deadline)).passes:
+                    return reported
+    return None
+
+
+def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> Relaxed:
+    """Return a relaxed envelope of which those sides are as they were that need not be larger."""
+    for side in reversed(range(len(request.envelope))):
+        sides = tuple(
+            old if k == side else new
+            for k, (old, new) in enumerate(zip(request.envelope, relaxed[0].envelope, strict=True))
+        )
+        if request.travel >= sides[1] and request.kind == "force":
+            continue
+        fewer = _in_envelope(request, sides)
+        if _offered(fewer[0], *asked):
+            relaxed = fewer
+    return relaxed
+
+
+def _written(value: float, dimension: str, digits: int = 3) -> tuple[float, str]:
+    """Return a value as a reader of its text has it, and the text."""
+    text = format_short(value, dimension, digits)
+    return read_quantity(text, dimension), text
+
+
+def _in_envelope(request: Request, sides: Sequence[float]) -> Relaxed:
+    # a side that stays is as it was, to its last digit
+    pairs = [
+        _written(side, "length", 12 if side == old else 4) for side, old in zip(sides, request.envelope, strict=True)
+    ]
+    return replace(request, envelope=tuple(side for side, _ in pairs)), " x ".join(text for _, text in pairs)
+
+
+def _larger(request: Request, factor: float) -> Relaxed:
+    return _in_envelope(request, [factor * side for side in request.envelope])
+
+
+def _weaker(request: Request, factor: float) -> Relaxed | None:
+    if request.adjustable is not None:
+        return None
+    digits = 6 if request.banded else 3
+    pairs = [_written(value / factor, request.kind, digits) for value in (request.low, request.target, request.high)]
+    (low, first), (target, middle), (high, last) = pairs
+    if request.banded:
+        return replace(request, low=low, target=request.target * low / request.low, high=high), f"[{first}, {last}]"
+    low, high = target * request.low / request.target, target * request.high / request.target
+    return replace(request, target=target, low=low, high=high), middle
+
+
+def _shorter(request: Request, factor: float) -> Relaxed:
+    travel, text = _written(request.travel / factor, "length" if request.kind == "force" else "angle")
+    return replace(request, travel=travel), text
+
+
+def _rippled(request: Request, factor: float) -> Relaxed | None:
+    text = percent(factor * request.ripple)
+    return (replace(request, ripple=share), text) if (share := read_quantity(text, "ratio")) < LARGEST else None
+
+
+def _less_safe(request: Request, factor: float) -> Relaxed | None:
+    text = f"{request.safety / factor:.3g}"
+    return (replace(request, safety=float(text)), text) if float(text) >= 1.0 else None
+
+
+def _lossy(request: Request, factor: float) -> Relaxed | None:
+    text = percent(factor * (request.hysteresis or 0.0))
+    return (replace(request, hysteresis=share), text) if (share := read_quantity(text, "ratio")) < LARGEST else None
+
+
+def _less_adjustable(request: Request, factor: float) -> Relaxed | None:
+    assert request.adjustable is not None
+    pairs = [_written(request.target + (end - request.target) / factor, "force", 4) for end in request.adjustable]
+    (low, first), (high, last) = pairs
+    return (replace(request, adjustable=(low, high)), f"[{first}, {last}]") if low < high else None

@@ -1,0 +1,197 @@
+"""Requirements that a proposal's file keeps, and those that no model here can judge.
+
+Every number of a request becomes a requirement on a metric, so that `cfmkit analyze` of the file says the same as the
+search. What a request asks for and nothing is known of, as the life of a material without fatigue data, is no
+requirement: the proposal says that it was not judged, and does not meet the request. A yield is that of many
+parts: it stands in the block `sensitivity`, as `min_yield`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.families.base import ENVELOPE
+from cfmkit.metrics import evaluate
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from cfmkit.families.base import BoundingBox
+    from cfmkit.families.suggestion_request import Request
+    from cfmkit.metrics import Definition
+    from cfmkit.results import Quantity, Result
+    from cfmkit.specs.spec import Spec
+
+ADJUSTED = 0.025
+"""How far the mean may be from an end of the adjustment: as far as from a force that is required as a number."""
+
+STRAIGHT_LINKS = "1 %"
+"""Largest elastic turn of a link over that of its spring: models of links take them for rigid."""
+
+LIVES = ("fatigue_life", "spring_life")
+"""Metrics that say how many cycles the material, and bought springs, last."""
+
+
+def windows_of(spec: Spec, request: Request) -> tuple[dict[str, Any], ...]:
+    """Return a requirement over the motion in which a part has to bear its stress.
+
+    Solids are solved at the ends of the windows of all requirements: with this one they are those of the finished file.
+    """
+    return ({"metric": "safety_factor", "min": f"{request.safety:.12g}", "over": pressed(request, spec)},)
+
+
+def demanded(
+    request: Request, result: Result, space: BoundingBox | None, values: Iterable[Definition]
+) -> tuple[dict[str, Any], ...]:
+    """Return the requirements that say what is required of a mechanism, over the window of its analysis.
+
+    Parameters
+    ----------
+    request : Request
+    result : Result
+        An analysis of the mechanism: only what it has metrics for is required.
+    space : BoundingBox or None
+        The box that it stays in.
+    values : iterable of Definition
+        Of the scalar results of its family.
+    """
+    found = evaluate(result, None, None, values)
+    return (
+        *_of_effort(request),
+        *_of_stress(request, result, found),
+        *_of_box(request, space),
+        *_of_loss(request, result),
+        *_of_lives(request, result, found),
+        *_of_adjustment(request, found),
+    )
+
+
+def unjudged(request: Request, result: Result) -> Iterator[str]:
+    """Yield what is required and no model here can judge, each with the reason."""
+    found = evaluate(result)
+    if request.hysteresis is not None and "unload" not in result.curve.branches:
+        yield f"hysteresis not judged: no loss factor is known of {_material(result)}"
+    if request.cycles is not None:
+        yield from _unknown_lives(result, found)
+    if request.adjustable is not None and "adjusted_force_min" not in found:
+        yield "adjustment not judged: the model does not know its ends"
+    names = {one.name for one in result.warnings}
+    if "sharp_corners" in names:
+        yield "stress not judged: inside corners are sharp"
+    if "mesh_coarse" in names:
+        yield "force and stress not judged: the mesh is too coarse"
+    if _bends(result) and result.allowable_stress is None:
+        yield f"stress not judged: no strength is known of {_material(result)}"
+    contact = getattr(result.spec.at("mechanism"), "contact", None)
+    if contact is not None and contact.material.yield_strength is None:
+        yield f"contact pressure not judged: no strength is known of {_material(result)}"
+
+
+def pressed(request: Request, spec: Spec) -> tuple[str, str]:
+    """Return over what a mechanism has to bear its stress: all it does; of made parts from half of the run-in on.
+
+    A made part begins and ends a little before or after the perfect one: a metric over all that this does has no value.
+    """
+    window: Any = spec.at("analysis.window")
+    if request.good_parts is None or window is None or request.kind == "torque":
+        return "0 %", "100 %"
+    return format_short(0.5 * float(window[0]), "length", 12), format_short(float(window[1]), "length", 12)
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:.12g} %"
+
+
+def _known(found: Mapping[str, Quantity], name: str) -> float | None:
+    return found[name].value if name in found else None
+
+
+def _of_effort(request: Request) -> Iterator[dict[str, Any]]:
+    yield {"metric": f"{request.kind}_ripple", "max": _share(request.ripple)}
+    low, high = (format_short(value, request.kind, 12) for value in (request.low, request.high))
+    if request.banded:
+        yield {"metric": f"{request.kind}_min", "min": low}
+        yield {"metric": f"{request.kind}_max", "max": high}
+    else:
+        yield {"metric": f"{request.kind}_mean", "min": low, "max": high}
+
+
+def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+    least = f"{request.safety:.12g}"
+    if _known(found, "safety_factor") is not None:
+        yield {"metric": "safety_factor", "min": least, "over": pressed(request, result.spec)}
+    if _known(found, "link_safety_factor") is not None:
+        yield {"metric": "link_safety_factor", "min": least}
+        yield {"metric": "link_turn_share_max", "max": STRAIGHT_LINKS}
+
+
+def _of_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, Any]]:
+    if space is None:
+        return
+    width, height, depth = space.sides
+    across, along = request.envelope[:2]
+    given = (along, across) if space.sideways else (across, along)
+    if request.kind == "torque":  # what turns may lie either way in the plane
+        given = (max(given), min(given)) if width >= height else (min(given), max(given))
+    sides = [*given, *((request.depth,) if request.depth is not None and depth is not None else ())]
+    for name, most in zip(ENVELOPE, sides, strict=False):
+        yield {"metric": name, "max": format_short(most, "length", 12)}
+
+
+def _of_loss(request: Request, result: Result) -> Iterator[dict[str, Any]]:
+    if request.hysteresis is not None and "unload" in result.curve.branches:
+        lost = request.hysteresis * request.target * request.travel
+        yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
+
+
+def _of_lives(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+    if request.cycles is None:
+        return
+    if _bends(result) and "fatigue_life" in found:
+        yield {"metric": "fatigue_life", "min": f"{request.cycles}", "over": pressed(request, result.spec)}
+    if _known(found, "spring_life") is not None:
+        yield {"metric": "spring_life", "min": f"{request.cycles}"}
+
+
+def _unknown_lives(result: Result, found: Mapping[str, Quantity]) -> Iterator[str]:
+    wired = "wire_stress_max" in found or _has_springs(result.spec)
+    links = "link_safety_factor" in found
+    if (_bends(result) or links) and getattr(_block(result.spec), "fatigue", None) is None:
+        yield f"life not judged: no S-N data for {_material(result)}"
+    elif _bends(result) and "fatigue_life" not in found:
+        yield "life not judged: no model of the fatigue of its contact"
+    if wired and _known(found, "spring_life") is None:
+        yield "life not judged: no S-N data for the wire of its springs"
+    if not (_bends(result) or links or wired):
+        yield "life not judged: no stress of its parts is modelled"
+
+
+def _bends(result: Result) -> bool:
+    """Return True if the model knows the stress of a part that bends."""
+    return "max_stress" in result.curve.extra
+
+
+def _has_springs(spec: Spec) -> bool:
+    """Return True if a mechanism is driven by bought springs."""
+    springs = getattr(spec.at("mechanism"), "springs", None)
+    return springs is not None and any(getattr(springs, name, None) for name in ("stiffness", "rates", "wound"))
+
+
+def _block(spec: Spec) -> Any:
+    """Return the material of a mechanism, or of its contact."""
+    mechanism = spec.at("mechanism")
+    return getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
+
+
+def _material(result: Result) -> str:
+    return getattr(_block(result.spec), "name", None) or "its material"
+
+
+def _of_adjustment(request: Request, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
+    if request.adjustable is None or "adjusted_force_min" not in found:
+        return
+    low, high = request.adjustable
+    yield {"metric": "adjusted_force_min", "max": format_short(low * (1.0 + ADJUSTED), "force", 12)}
+    yield {"metric": "adjusted_force_max", "min": format_short(high * (1.0 - ADJUSTED), "force", 12)}
+    yield {"metric": "adjusted_ripple_max", "max": _share(request.ripple)}
