@@ -21,7 +21,6 @@ from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
-from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import hermite
 
@@ -42,7 +41,6 @@ FAR = 2.0  # times a step's motion by which a gap must be open at both ends for 
 STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
-NOT_LOCATED = "where {names} {what} was not found near {{place}}"
 
 
 class ContactChange(NamedTuple):
@@ -143,20 +141,21 @@ class PieceOfPath:
         """Return an equilibrium without the forces of open contacts."""
         return at._replace(x=at.x[self.kept], rate=at.rate[self.kept])
 
-    def _spread(self, values: Any) -> Any:
+    def spread(self, values: Any) -> Any:
+        """Return values of the own unknowns among those of all, zero for the others."""
         found = np.zeros((len(self.kept), *np.shape(values)[1:]))
         found[self.kept] = values
         return found
 
     def grow(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium with the forces of all contacts."""
-        return at._replace(x=self._spread(at.x), rate=self._spread(at.rate))
+        return at._replace(x=self.spread(at.x), rate=self.spread(at.rate))
 
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
         near = None if event.near is None else self.grow(event.near)
-        modes = None if event.modes is None else self._spread(event.modes)
+        modes = None if event.modes is None else self.spread(event.modes)
         return replace(event, near=near, modes=modes, within=within)
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
@@ -202,7 +201,7 @@ class PieceOfPath:
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
         whole, kept, n_samples = self.whole, self.kept, FEWEST_SAMPLES + 1
-        x, rate = (self._spread(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
+        x, rate = (self.spread(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
         drive = np.array([at.drive for at in states])
         width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
         moved = np.abs(chord[:, whole.motions]).max(axis=1)
@@ -236,101 +235,7 @@ class PieceOfPath:
         gap = measure(mesh, contact, self.whole.values(at.x, at.drive))
         return float(gap.gradient @ moved[gap.unknowns])
 
-    # -- changes -------------------------------------------------------------------------------------------------------
-    def find_change_before_end(
-        self, previous: PathEquilibrium | None, stop: PathStop
-    ) -> ContactChange | PathStop | None:
-        """Return the first change between the last point and the end of a piece that ends early; None without any."""
-        if previous is None or stop.end in (WhyStopped.COMPLETE, WhyStopped.FULL) or stop.drive == previous.drive:
-            return None
-        near = self.shrink(previous)
-        last = correct(self.own, near.x + (stop.drive - near.drive) * near.rate, stop.drive)
-        if last is None or largest_motion(self.own, last.x - near.x) > self.options.largest_motion:
-            return None
-        return self.find_change(previous, self.grow(last))
-
-    def find_change(self, first: PathEquilibrium, last: PathEquilibrium) -> ContactChange | PathStop | None:
-        """Return the first change of a contact between two points of the piece; None if there is none."""
-        step = StepBetween(self, first, last)
-        if step.is_far:
-            return None
-        values = step.values
-        rounding = self.roundings(values)
-        dips = (values < -rounding[:, None])[:, 1:]
-        if not dips.any():
-            return None
-        if not dips[:, -1].any():  # only the guess says so: see whether the equilibrium does
-            at = step.solve(float(step.shares[1:][dips.any(axis=0).argmax()]))
-            if at is None:
-                return None
-            return self.find_change_at_end(first, self.grow(at), rounding)
-        rows, others = np.flatnonzero(dips.any(axis=1)).tolist(), list[int]()
-        touching = [row for row in rows if self._is_beside_change(row, rows)]
-        found = [self._locate(step, number) for number in rows if number not in touching]
-        changes = [change for _, change in found if isinstance(change, ContactChange)]
-        # a contact that parts, or moves, brings the side beside it into the obstacle: nothing else touches by that
-        for row in touching:
-            there = [self.row_value(change.at, row) for change in changes if change.piece is None]
-            if not changes or min(there, default=0.0) < -rounding[row]:
-                others.append(row)
-        found += [self._locate(step, number) for number in others]
-        known = [change for _, change in found if isinstance(change, ContactChange)]
-        if not known:
-            stops = [change for _, change in found if change is not None]
-            missing = found[0][0]
-            what, names = ("ends" if missing in self.closed else "begins"), self.say(missing)
-            return stops[0] if stops else PathStop(
-                WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=names, what=what))  # fmt: skip
-
-        def share(change: ContactChange) -> float:
-            return step.share_of(change.at if change.piece is None else change.piece.carry(change.at, self))
-
-        return min(known, key=share)
-
-    def _is_beside_change(self, row: int, rows: list[int]) -> bool:
-        """Return True if a row is a side that touches where another of its contacts changes, too."""
-        count = len(self.whole.mesh.contacts)
-        if row < count or self.sides.all[row - count].kind != "touch":
-            return False
-        item = self.sides.all[row - count].item
-        return any(other >= count and other != row and self.sides.all[other - count].item is item for other in rows)
-
-    def find_change_at_end(
-        self, first: PathEquilibrium, last: PathEquilibrium, rounding: FloatArray
-    ) -> ContactChange | PathStop | None:
-        """Return the first change up to a point that may violate a condition; None if it does not."""
-        values = self.values(last.x[None], np.array([last.drive]))[:, 0]
-        return self.find_change(first, last) if (values < -rounding).any() else None
-
-    def _locate(self, step: StepBetween, number: int) -> tuple[int, ContactChange | PathStop | None]:
-        """Return where a contact changes within a step: where its gap and its force are both zero."""
-        from cfmkit.elastica.contact.side_changes import locate_side_change
-
-        if number >= len(self.whole.mesh.contacts):
-            return number, locate_side_change(self, step, number)
-        contact = self.whole.mesh.contacts[number].number
-        share = step.crossing(number)
-        if share is None:
-            return number, None
-        guess, drive = step.at(share)
-        kind: Literal["begins", "ends"] = "ends" if number in self.closed else "begins"
-        both = self.with_closed(self.closed | {number})
-        x = guess[both.kept]
-        border = np.zeros(len(x) + 1)
-        border[int(both.kept[: self._slot(number)].sum())] = 1.0
-        state = both.own.equations.solve(x, drive, border, 0.0)
-        if state is not None and np.isfinite(state.rate).all():
-            free = both._spread(state.free)
-            free[self._slot(number)] = 0.0
-            at = step.first._replace(x=free, drive=float(state.way), effort=np.nan, stiffness=np.nan)
-            if step.contains(at, guess):
-                return number, ContactChange(kind, number, at, step.first.unstable, step.first.unstable, contact)
-        at_bracket = step.bisect(number)
-        if at_bracket is None:
-            return number, None
-        return number, ContactChange(kind, number, at_bracket, step.first.unstable, step.first.unstable, contact)
-
-    def _slot(self, number: int) -> int:
+    def slot(self, number: int) -> int:
         """Return the number of a contact's force among the free unknowns of the whole problem."""
         return int(np.searchsorted(self.whole.mesh.free, self.whole.mesh.contacts[number].unknown))
 

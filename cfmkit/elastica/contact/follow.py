@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.changes import FORCE_ROUNDING, ContactChange, PieceOfPath
+from cfmkit.elastica.contact.first_change import find_change, find_change_before_end
 from cfmkit.elastica.contact.side_changes import enter_side_change
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.folds import pass_fold
@@ -173,7 +174,7 @@ def _follow_part(
             waiting.append(part.grow_event(item))
             continue
         if isinstance(item, PathStop):
-            found = part.find_change_before_end(previous, item)
+            found = find_change_before_end(part, previous, item)
             if found is None:
                 yield from waiting
                 return item
@@ -181,7 +182,7 @@ def _follow_part(
         else:
             at, step = part.grow(item.at), item.at.drive
             quiet = previous is None or part.own.is_quiet_before(item.at)
-            found = None if quiet or previous is None else part.find_change(previous, at)
+            found = None if quiet or previous is None else find_change(part, previous, at)
         if found is not None:
             assert previous is not None
             if isinstance(found, PathStop):

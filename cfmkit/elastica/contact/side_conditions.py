@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.side_gaps import SideGaps, Stage
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.beam_fits import beam_end_at
@@ -187,7 +187,7 @@ class SideConditions:
         mesh, item = self.mesh, one.item
         own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
         element, side = (own[-1], 1) if one.last else (own[0], 0)
-        moved, fitted = mesh.with_places(z).elements, mesh.fits[item.beam]
+        moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]
         inside, at = float(mesh.elements.cuts[element].mean()), np.array([float(side)])
         slopes = shape_functions(mesh.degree, at)[1][0]
         columns = [3, 7, *range(8, mesh.degree + 7)]
@@ -218,7 +218,7 @@ class SideConditions:
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""
         mesh, item = self.mesh, contact.item
-        moved, fitted = mesh.with_places(z).elements, mesh.fits[item.beam]  # type: ignore[union-attr]
+        moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]  # type: ignore[union-attr]
         inside = float(mesh.elements.cuts[contact.element].mean())
         columns = [3, 7, *range(8, mesh.degree + 7)]
         total = np.zeros(len(z))

@@ -11,7 +11,7 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
 from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.section import Taper
@@ -57,7 +57,7 @@ class Stage(NamedTuple):
 
 def side_states(mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> SideStates:
     """Return the states at fractions (k,) of elements (m,) in n states (n, size); contacts stand at their places."""
-    moved = mesh.with_places(z)
+    moved = with_places(mesh, z)
     whole, rule, at = moved.elements, basis(mesh.degree), _matrices(mesh.degree, tuple(fractions.tolist()))
     fields = energy.fields(moved, z, *stage)
     rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
@@ -236,7 +236,7 @@ class SideGaps:
 
     def _measure_at(self, z: FloatArray, stage: Stage, element: int, fraction: FloatArray) -> _Beside:
         """Return gap, slope and parameter at one place of an element in each of n states."""
-        moved = self.mesh.with_places(z)
+        moved = with_places(self.mesh, z)
         e, rule, count = moved.elements, basis(self.mesh.degree), len(z)
         fields = energy.fields(moved, z, *stage)
         speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / rule.weights
@@ -292,7 +292,7 @@ def carry(
     found = np.zeros(new.size, z.dtype)
     for name, place in new.nodes.items():
         found[new.attachments.unknowns[place]] = z[old.attachments.unknowns[old.nodes[name]]]
-    moved = old.with_places(z).elements
+    moved = with_places(old, z).elements
     cuts = moved.cuts if moved.moved_cuts is None else moved.moved_cuts
     fresh = new.elements.cuts
     if places is not None and new.moving is not None:

@@ -27,6 +27,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
@@ -52,7 +53,7 @@ class Equilibria:
     def __post_init__(self) -> None:
         """Move the elements to the places of contacts, which each point has for itself."""
         if self.mesh.moving is not None:
-            object.__setattr__(self, "mesh", self.mesh.with_places(self.z))
+            object.__setattr__(self, "mesh", with_places(self.mesh, self.z))
 
     @cached_property
     def residual(self) -> FloatArray:

@@ -10,7 +10,7 @@ too.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,7 +26,6 @@ from cfmkit.elastica.mechanics.element_cuts import (
     turns_little,
 )
 from cfmkit.elastica.mechanics.element_tables import element_tables
-from cfmkit.elastica.mechanics.moving_elements import move_elements
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
@@ -166,10 +165,6 @@ class Discretisation:
             cuts[name].append(end)
         return cuts
 
-    def with_places(self, z: Any) -> Discretisation:
-        """Return the arrays with contacts at their places in states (..., size): tables of elements are (..., e, q)."""
-        return self if self.moving is None else replace(self, elements=move_elements(self, z))
-
     @property
     def n_motions(self) -> int:
         """Number of unknowns that are motions; forces come behind them."""
@@ -284,7 +279,9 @@ class _ArrayBuilder:
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
             self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension, contacts,
-            join_cut_laws(laws, elements.beam, contacts) if flanks else None,
+            join_cut_laws(laws, elements.beam, [(one.item.beam, one.slide) for one in contacts if one.slide >= 0])  # type: ignore[union-attr]
+            if flanks
+            else None,
         )  # fmt: skip
 
     def _flank_contacts(

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import ContactAt
     from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.beam_fits import BeamFits
 
@@ -71,19 +70,18 @@ def find_moving_cuts(beam: Beam, fitted: Fit, places: Sequence[float]) -> CutLaw
     return CutLaw(np.concatenate(fixed), np.concatenate(shares))
 
 
-def join_cut_laws(laws: Mapping[str, CutLaw], beams: tuple[str, ...], contacts: tuple[ContactAt, ...]) -> MovingCuts:
-    """Return the moving ends of the elements of all beams."""
-    slides = [one for one in contacts if one.slide >= 0]
+def join_cut_laws(laws: Mapping[str, CutLaw], beams: tuple[str, ...], sides: Sequence[tuple[str, int]]) -> MovingCuts:
+    """Return the moving ends of the elements of all beams; `sides` are the beam and the unknown place of each contact."""
     rows, fixed, shares = [], [], []
     for name, law in laws.items():
-        mine = [k for k, one in enumerate(slides) if one.item.beam == name]  # type: ignore[union-attr]
+        mine = [k for k, (beam, _) in enumerate(sides) if beam == name]
         own = [number for number, beam in enumerate(beams) if beam == name]
-        spread = np.zeros((len(law.fixed), len(slides)))
+        spread = np.zeros((len(law.fixed), len(sides)))
         spread[:, mine] = law.shares
         rows += own
         fixed.append(np.stack([law.fixed[:-1], law.fixed[1:]], axis=1))
         shares.append(np.stack([spread[:-1], spread[1:]], axis=1))
-    return MovingCuts(np.array(rows), np.concatenate(fixed), np.concatenate(shares), [one.slide for one in slides])
+    return MovingCuts(np.array(rows), np.concatenate(fixed), np.concatenate(shares), [unknown for _, unknown in sides])
 
 
 def is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:

@@ -6,6 +6,7 @@ The bending moment has a kink where a contact presses: there an element ends, so
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,11 @@ def moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
     if floor.any():
         found["axial"] = found["axial"] + floor[:, None]
     return found | {"moved_cuts": cuts}
+
+
+def with_places(mesh: Discretisation, z: Any) -> Discretisation:
+    """Return the arrays with contacts at their places in states (..., size): tables of elements are (..., e, q)."""
+    return mesh if mesh.moving is None else replace(mesh, elements=move_elements(mesh, z))
 
 
 def move_elements(mesh: Discretisation, z: Any) -> BeamElements:

@@ -13,6 +13,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.results.path import largest_force
 from cfmkit.results import ROUND_OFF
@@ -106,7 +107,7 @@ def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatA
     found = np.zeros((len(names) + len(mesh.springs), len(path)))
     beam = np.array([names.index(name) for name in mesh.elements.beam])
     for k, (state, at) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
-        own, _ = energy.element_gradients(mesh.with_places(state), state, at, 1.0)
+        own, _ = energy.element_gradients(with_places(mesh, state), state, at, 1.0)
         np.add.at(found[:, k], beam, (own * z[k][mesh.elements.unknowns]).sum(axis=1))
         for number, spring in enumerate(mesh.springs):
             part = TERMS[type(spring.item)](mesh, spring, state, 1.0, at)
