@@ -80,40 +80,50 @@ class PieceOfPath:
         """Places at which sides touch."""
         cuts = self.whole.mesh.elements.cuts
         return tuple(
-            FlankPlace(one.number, float(cuts[one.element, 1]), one.laid)
-            for one in self.whole.mesh.contacts
-            if one.slide >= 0
+            FlankPlace(contact.number, float(cuts[contact.element, 1]), contact.laid)
+            for contact in self.whole.mesh.contacts
+            if contact.slide >= 0
         )
+
+    def sides_of(self, beam: str) -> list[int]:
+        """Return the numbers in the arrays of the contacts of the side of a beam, in order along it."""
+        sides: Any = [(k, contact) for k, contact in enumerate(self.whole.mesh.contacts) if contact.slide >= 0]
+        return [k for k, contact in sides if contact.item.beam == beam]
 
     def with_flanks(self, flanks: Sequence[FlankPlace], closed: frozenset[int]) -> PieceOfPath:
         """Return the problem in which sides touch at other places, and nodes as said."""
         assert self.whole.remesh is not None
         network = self.whole.mesh.fits.network
         beams = list(network.beams)
-        order = sorted(flanks, key=lambda one: (beams.index(network.contacts[one.number].beam), one.parameter))  # type: ignore[union-attr]
+
+        def place(flank: FlankPlace) -> tuple[int, float]:
+            item: Any = network.contacts[flank.number]
+            return beams.index(item.beam), flank.parameter
+
+        order = sorted(flanks, key=place)
         mesh = self.whole.remesh(tuple(order))
-        sides = [k for k, one in enumerate(mesh.contacts) if one.slide >= 0]
+        sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
         nodes = [k for k in closed if self.whole.mesh.contacts[k].slide < 0]
         return PieceOfPath(replace(self.whole, mesh=mesh), frozenset([*nodes, *sides]), self.options)
 
     def carry(self, at: PathEquilibrium, beyond: PieceOfPath) -> PathEquilibrium:
         """Return an equilibrium in the unknowns of another piece, but for forces and places of sides."""
         z, old, new = self.whole.values(at.x, at.drive), self.whole.mesh, beyond.whole.mesh
-        moved = carry(old, z, Stage.of(self.whole, np.array([at.drive])), new)
-        kept = {(one.number, k): one for k, one in self._numbered(old)}
-        for k, one in self._numbered(new):
-            same = kept.get((one.number, k))
-            if same is not None and one.slide >= 0:
-                moved[one.unknown] = z[same.unknown]
+        moved = carry(old, z, Stage.from_problem(self.whole, np.array([at.drive])), new)
+        kept = {(contact.number, k): contact for k, contact in self._enumerate_contacts(old)}
+        for k, contact in self._enumerate_contacts(new):
+            same = kept.get((contact.number, k))
+            if same is not None and contact.slide >= 0:
+                moved[contact.unknown] = z[same.unknown]
         return at._replace(x=moved[new.free], rate=np.zeros(len(new.free)))
 
     @staticmethod
-    def _numbered(mesh: Discretisation) -> Iterator[tuple[int, ContactAt]]:
+    def _enumerate_contacts(mesh: Discretisation) -> Iterator[tuple[int, ContactAt]]:
         """Yield each contact with its place among those of the same item."""
         seen: dict[int, int] = {}
-        for one in mesh.contacts:
-            seen[one.number] = seen.get(one.number, -1) + 1
-            yield seen[one.number], one
+        for contact in mesh.contacts:
+            seen[contact.number] = seen.get(contact.number, -1) + 1
+            yield seen[contact.number], contact
 
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts."""
@@ -128,24 +138,24 @@ class PieceOfPath:
 
     def say_all(self, number: int) -> str:
         """Return what a contact and those that are closed with it are called, where they block the drive together."""
-        others = [self.say(other) for other in sorted(self.closed - {number})]
+        others = [self.say(index) for index in sorted(self.closed - {number})]
         return " with ".join([self.say(number), *others[:2]])
 
     # -- unknowns ------------------------------------------------------------------------------------------------------
     @cached_property
-    def kept(self) -> Any:
+    def own_mask(self) -> Any:
         """Which free unknowns of the whole are those of the own problem."""
         return np.isin(self.whole.mesh.free, self.own.mesh.free)
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium without the forces of open contacts."""
-        return at._replace(x=at.x[self.kept], rate=at.rate[self.kept])
+        return at._replace(x=at.x[self.own_mask], rate=at.rate[self.own_mask])
 
     def spread(self, values: Any) -> Any:
         """Return values of the own unknowns among those of all, zero for the others."""
-        found = np.zeros((len(self.kept), *np.shape(values)[1:]))
-        found[self.kept] = values
-        return found
+        spread_values = np.zeros((len(self.own_mask), *np.shape(values)[1:]))
+        spread_values[self.own_mask] = values
+        return spread_values
 
     def grow(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium with the forces of all contacts."""
@@ -154,15 +164,15 @@ class PieceOfPath:
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
-        near = None if event.near is None else self.grow(event.near)
+        start = None if event.near is None else self.grow(event.near)
         modes = None if event.modes is None else self.spread(event.modes)
-        return replace(event, near=near, modes=modes, within=within)
+        return replace(event, near=start, modes=modes, within=within)
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
         """Return True if forces are as large as where a structure locks, between two points that nearly coincide."""
         forces = (np.abs(at.x) / self.whole.unit)[~self.whole.motions]
-        near = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
-        return bool(near and forces.max(initial=0.0) > LOCKED_FORCE)
+        start = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
+        return bool(start and forces.max(initial=0.0) > LOCKED_FORCE)
 
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
@@ -173,11 +183,11 @@ class PieceOfPath:
         mesh, way = self.whole.mesh, drives[:, None]
         z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
         z[:, mesh.free] = x
-        found = np.empty((len(mesh.contacts) + len(self.sides.all), len(z)))
+        spread_values = np.empty((len(mesh.contacts) + len(self.sides.all), len(z)))
         for number, contact in enumerate(mesh.contacts):
-            found[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
-        found[len(mesh.contacts) :] = self.sides.values(z, Stage.of(self.whole, drives))
-        return found
+            spread_values[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
+        spread_values[len(mesh.contacts) :] = self.sides.values(z, Stage.from_problem(self.whole, drives))
+        return spread_values
 
     def row_value(self, at: PathEquilibrium, number: int) -> float:
         """Return one row of `values` at an equilibrium."""
@@ -185,7 +195,7 @@ class PieceOfPath:
         z = self.whole.values(at.x, at.drive)[None]
         if number >= len(mesh.contacts):
             condition = self.sides.all[number - len(mesh.contacts)]
-            return float(self.sides.value(condition, z, Stage.of(self.whole, drives))[0])
+            return float(self.sides.value(condition, z, Stage.from_problem(self.whole, drives))[0])
         contact = mesh.contacts[number]
         return float(z[0, contact.unknown] if number in self.closed else gaps(mesh, contact, z)[0])
 
@@ -194,13 +204,13 @@ class PieceOfPath:
         closed = np.isin(np.arange(len(values)), list(self.closed))
         largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
         shape = -1, *(1,) * (values.ndim - 2)
-        found = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
-        found[len(self.whole.mesh.contacts) :] = self.sides.roundings.reshape(shape)
-        return found
+        spread_values = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
+        spread_values[len(self.whole.mesh.contacts) :] = self.sides.roundings.reshape(shape)
+        return spread_values
 
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
-        whole, kept, n_samples = self.whole, self.kept, FEWEST_SAMPLES + 1
+        whole, kept, n_samples = self.whole, self.own_mask, FEWEST_SAMPLES + 1
         x, rate = (self.spread(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
         drive = np.array([at.drive for at in states])
         width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
@@ -241,8 +251,8 @@ class PieceOfPath:
 
     def slot_in_own(self, number: int, slide: bool = False) -> int:
         """Return the number of a contact's force, or place, among the free unknowns of the own problem."""
-        one = self.whole.mesh.contacts[number]
-        return int(np.searchsorted(self.own.mesh.free, one.slide if slide else one.unknown))
+        contact = self.whole.mesh.contacts[number]
+        return int(np.searchsorted(self.own.mesh.free, contact.slide if slide else contact.unknown))
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,8 +332,8 @@ class StepBetween:
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.at(share)
-        at = correct(self.part.own, x[self.part.kept], drive)
-        if at is None or largest_motion(self.part.own, at.x - x[self.part.kept]) > MAX_MISS * self.moved + 1e-9:
+        at = correct(self.part.own, x[self.part.own_mask], drive)
+        if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
 
@@ -348,8 +358,8 @@ class StepBetween:
 
     def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
         """Return True if an equilibrium lies within the step, near a guess."""
-        near = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
-        return near and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
+        start = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
+        return start and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
 
     def bisect(self, number: int) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at which force or gap vanishes, by its drive alone; None if lost."""
@@ -364,13 +374,13 @@ class StepBetween:
             return part.row_value(part.grow(at), number)
 
         try:
-            known = self.values[number]
-            behind = np.flatnonzero(known[1:] < -part.roundings(self.values)[number])
-            end = int(behind[0]) + 1 if len(behind) else len(known) - 1
+            row_values = self.values[number]
+            behind = np.flatnonzero(row_values[1:] < -part.roundings(self.values)[number])
+            end = int(behind[0]) + 1 if len(behind) else len(row_values) - 1
             begin = next((k for k in range(end - 1, -1, -1) if value(float(self.shares[k])) > 0), None)
             if begin is None:
                 return self.first
-            last = next((k for k in range(end, len(known)) if value(float(self.shares[k])) <= 0), None)
+            last = next((k for k in range(end, len(row_values)) if value(float(self.shares[k])) <= 0), None)
             if last is None:
                 return None
             share = float(brentq(value, self.shares[begin], self.shares[last], xtol=1e-15, rtol=1e-14))

@@ -31,13 +31,13 @@ def with_closed(mesh: Discretisation, closed: frozenset[int]) -> Discretisation:
     """Return the arrays of a network in which some contacts are closed, by their numbers, and all others open."""
     if not closed:
         return without_contacts(mesh)
-    contacts = tuple(one._replace(closed=number in closed) for number, one in enumerate(mesh.contacts))
-    held = [one.unknown for one in contacts if not one.closed]
+    contacts = tuple(contact._replace(closed=number in closed) for number, contact in enumerate(mesh.contacts))
+    held = [contact.unknown for contact in contacts if not contact.closed]
     return replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
 
 
 def _first_contact(mesh: Discretisation) -> int:
-    return min(one.unknown for one in mesh.contacts)
+    return min(contact.unknown for contact in mesh.contacts)
 
 
 class GapBounds:
@@ -49,12 +49,12 @@ class GapBounds:
     def __init__(self, mesh: Discretisation) -> None:
         """Begin without any."""
         self.mesh = mesh
-        places = [one.place for one in mesh.contacts]
+        places = [contact.place for contact in mesh.contacts]
         self.places = np.array(places)
-        self.forces = np.array([one.unknown for one in mesh.contacts])
-        self.turning = np.array([one.item.turns for one in mesh.contacts])
+        self.forces = np.array([contact.unknown for contact in mesh.contacts])
+        self.turning = np.array([contact.item.turns for contact in mesh.contacts])
         self.turns = mesh.attachments.unknowns[places, 3]
-        self.judged = np.array([one.closed is None for one in mesh.contacts])
+        self.judged = np.array([contact.closed is None for contact in mesh.contacts])
         self.at = np.zeros((len(places), 2))  # where each gap was measured: place, or rotation
         self.gap = np.full(len(places), -np.inf)
 
@@ -105,12 +105,12 @@ class ContactEquations(NumpyEquations):
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
-        found = np.array(self.plain.gradients(z, drive))
+        whole_gradients = np.array(self.plain.gradients(z, drive))
         for contact in self.mesh.contacts:
             for number in np.flatnonzero(z[:, contact.unknown]).tolist():
                 term = press(self.mesh, contact, z[number])
-                found[number, term.unknowns] += term.gradient
-        return found
+                whole_gradients[number, term.unknowns] += term.gradient
+        return whole_gradients
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -130,21 +130,21 @@ class ContactEquations(NumpyEquations):
         """
         count, mesh = self.plain.n, self.mesh
         idle = ~np.asarray(free)[:, count:].any(axis=1)
-        if not idle.any() or any(one.closed for one in mesh.contacts):
+        if not idle.any() or any(contact.closed for contact in mesh.contacts):
             return super().solve_each(free, way, tolerance, quick)
         rows, pad = np.flatnonzero(idle), ((0, 0), (0, self.n - count))
         easy = self.plain.solve_each(free[rows, :count], way[rows], tolerance, quick)
         z = np.array([self.values(*pair) for pair in zip(np.pad(easy.free, pad), way[rows], strict=True)])
-        judged = [one for one in mesh.contacts if one.closed is None]
-        good = easy.converged & np.all([gaps(mesh, one, z) >= 0 for one in judged], axis=0)
+        judged = [contact for contact in mesh.contacts if contact.closed is None]
+        good = easy.converged & np.all([gaps(mesh, contact, z) >= 0 for contact in judged], axis=0)
         left = np.setdiff1d(np.arange(len(free)), rows[good])
-        found = super().solve_each(free[left], way[left], tolerance, quick)
+        whole_gradients = super().solve_each(free[left], way[left], tolerance, quick)
         whole = SolvedStates(
             np.ones(len(free), bool), np.zeros((len(free), self.n)), np.zeros((len(free), self.n)),
             np.zeros(len(free), np.int64), np.zeros(len(free)),
         )  # fmt: skip
         padded = easy._replace(free=np.pad(easy.free, pad), rate=np.pad(easy.rate, pad))
-        for total, some, other in zip(whole, padded, found, strict=True):
+        for total, some, other in zip(whole, padded, whole_gradients, strict=True):
             total[rows[good]], total[left] = some[good], other
         return whole
 
@@ -164,9 +164,9 @@ class ContactEquations(NumpyEquations):
                 continue
             term = press(mesh, contact, z)
             slots = self.slots[term.unknowns]
-            own = slots >= 0
-            rows = slots[own]
-            residual[rows] += term.gradient[own]
-            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(own, own)]
-            change[rows] += term.hessian[own] @ moved[term.unknowns]
+            inside = slots >= 0
+            rows = slots[inside]
+            residual[rows] += term.gradient[inside]
+            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(inside, inside)]
+            change[rows] += term.hessian[inside] @ moved[term.unknowns]
         return LinearEquations(residual, tangent, change)

@@ -95,9 +95,9 @@ def _locate(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | 
     guess, drive = step.at(share)
     kind: Literal["begins", "ends"] = "ends" if row in piece.closed else "begins"
     both = piece.with_closed(piece.closed | {row})
-    x = guess[both.kept]
+    x = guess[both.own_mask]
     border = np.zeros(len(x) + 1)
-    border[int(both.kept[: piece.slot(row)].sum())] = 1.0
+    border[int(both.own_mask[: piece.slot(row)].sum())] = 1.0
     state = both.own.equations.solve(x, drive, border, 0.0)
     if state is not None and np.isfinite(state.rate).all():
         free = both.spread(state.free)

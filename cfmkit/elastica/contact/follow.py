@@ -36,7 +36,7 @@ FIRST_ARC = 0.1  # of the step before, behind a limit point at a change
 SHORTEST_STEP = 1e-6  # share of the range
 BLOCKED = "the drive is blocked by {names} at {{place}}"
 SNAPS = "the drive cannot go on at {{place}}, where {names} {what}: a limit point; follow it by through_folds"
-BUCKLES = "stability is lost at {place}, where a part that an obstacle holds buckles away from it"
+BUCKLES_AWAY = "stability is lost at {place}, where a part that an obstacle holds buckles away from it"
 LOSES = "stability is lost at {{place}}, where {names} {what}"
 
 
@@ -190,7 +190,7 @@ def _follow_part(
                 if lost is None:
                     return found
                 yield from waiting  # the way on from there goes through an obstacle
-                return PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES)
+                return PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES_AWAY)
             sense = 1.0 if step >= previous.drive else -1.0
             place = found.at.drive
             yield from (event for event in waiting if (place - event.drive) * sense > 0)

@@ -45,48 +45,50 @@ def join_pieces(
     """Return one network of elements for all pieces, and the states on it, (n, size)."""
     beams = list(pieces[0].mesh.fits.network.beams)
     network = pieces[0].mesh.fits.network
-    own = [[_slot(piece.mesh, one) for one in piece.mesh.contacts if one.slide >= 0] for piece in pieces]
+    sequences = [
+        [_slot(piece.mesh, contact) for contact in piece.mesh.contacts if contact.slide >= 0] for piece in pieces
+    ]
     slots: list[_Slot] = []
     for beam in beams:
         common: list[_Slot] = []
-        for sequence in own:
+        for sequence in sequences:
             mine = [slot for slot in sequence if network.contacts[slot.number].beam == beam]  # type: ignore[union-attr]
             common = _common(common, mine)
         slots += common
-    places = _places(pieces, own, slots)
+    places = _places(pieces, sequences, slots)
     if not len(slots):
         return pieces[0].mesh, np.concatenate([piece.z for piece in pieces])
     mesh = remesh(tuple(FlankPlace(slot.number, place) for slot, place in zip(slots, places[0].tolist(), strict=True)))
     states, count = np.zeros((len(places), mesh.size)), 0
-    sides = [one for one in mesh.contacts if one.slide >= 0]
-    for piece, sequence in zip(pieces, own, strict=True):
-        used = _embed(sequence, slots)
-        before = [one for one in piece.mesh.contacts if one.slide >= 0]
+    sides = [contact for contact in mesh.contacts if contact.slide >= 0]
+    for piece, sequence in zip(pieces, sequences, strict=True):
+        used = _match_slots(sequence, slots)
+        before = [contact for contact in piece.mesh.contacts if contact.slide >= 0]
         for z, drive in zip(piece.z, piece.drive.tolist(), strict=True):
-            found = carry(piece.mesh, z, Stage(np.array([drive])), mesh, places[count])
-            for one, slot in zip(before, used, strict=True):
-                found[sides[slot].unknown] = max(float(z[one.unknown]), 0.0)
-                found[sides[slot].flag] = one.laid
-            states[count] = found
+            joined = carry(piece.mesh, z, Stage(np.array([drive])), mesh, places[count])
+            for contact, slot in zip(before, used, strict=True):
+                joined[sides[slot].unknown] = max(float(z[contact.unknown]), 0.0)
+                joined[sides[slot].flag] = contact.laid
+            states[count] = joined
             count += 1
-    return mesh, _corrected(mesh, states, np.concatenate([piece.drive for piece in pieces]))
+    return mesh, _correct_states(mesh, states, np.concatenate([piece.drive for piece in pieces]))
 
 
-def _corrected(mesh: Discretisation, states: FloatArray, drives: FloatArray) -> FloatArray:
+def _correct_states(mesh: Discretisation, states: FloatArray, drives: FloatArray) -> FloatArray:
     """Return states as equilibria of the elements that they are on now."""
     guess = states[:, mesh.free]
     solved = equations(mesh).solve_each(guess, drives)
     motions = mesh.free < mesh.n_motions
-    near = solved.converged & (np.abs(solved.free - guess)[:, motions].max(axis=1, initial=0.0) < SAME_POINT)
-    found = states.copy()
-    found[:, mesh.free] = np.where(near[:, None], solved.free, guess)
-    return found
+    close = solved.converged & (np.abs(solved.free - guess)[:, motions].max(axis=1, initial=0.0) < SAME_POINT)
+    joined = states.copy()
+    joined[:, mesh.free] = np.where(close[:, None], solved.free, guess)
+    return joined
 
 
-def _slot(mesh: Discretisation, one: Any) -> _Slot:
-    name = one.item.beam
+def _slot(mesh: Discretisation, contact: Any) -> _Slot:
+    name = contact.item.beam
     marks = smooth_marks(mesh.fits.network.beams[name], mesh.fits[name])
-    return _Slot(one.number, int(np.searchsorted(marks, mesh.elements.cuts[one.element, 1])))
+    return _Slot(contact.number, int(np.searchsorted(marks, mesh.elements.cuts[contact.element, 1])))
 
 
 def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
@@ -100,61 +102,67 @@ def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
                 best[i, j] = [first[i], *best[i + 1, j + 1]]
             else:
                 ways = [first[i], *best[i + 1, j]], [second[j], *best[i, j + 1]]
-                best[i, j] = min(ways, key=lambda way: (len(way), [slot.part for slot in way]))
+                best[i, j] = min(
+                    ways, key=lambda sequence_tail: (len(sequence_tail), [slot.part for slot in sequence_tail])
+                )
     return best[0, 0]
 
 
-def _embed(sequence: list[_Slot], slots: list[_Slot]) -> list[int]:
+def _match_slots(sequence: list[_Slot], slots: list[_Slot]) -> list[int]:
     """Return which slots a sequence of contacts has."""
-    found, at = list[int](), 0
+    joined, at = list[int](), 0
     for slot in sequence:
         at = slots.index(slot, at)
-        found.append(at)
+        joined.append(at)
         at += 1
-    return found
+    return joined
 
 
-def _places(pieces: Sequence[StatesOfPiece], own: list[list[_Slot]], slots: list[_Slot]) -> FloatArray:
+def _places(pieces: Sequence[StatesOfPiece], sequences: list[list[_Slot]], slots: list[_Slot]) -> FloatArray:
     """Return the place of every slot in every state, (n, slots)."""
     total = sum(len(piece.drive) for piece in pieces)
-    known = np.full((total, len(slots)), np.nan)
+    closed_places = np.full((total, len(slots)), np.nan)
     count = 0
-    for piece, sequence in zip(pieces, own, strict=True):
+    for piece, sequence in zip(pieces, sequences, strict=True):
         rows = slice(count, count + len(piece.drive))
-        for one, slot in zip(
-            (one for one in piece.mesh.contacts if one.slide >= 0), _embed(sequence, slots), strict=True
+        for contact, slot in zip(
+            (contact for contact in piece.mesh.contacts if contact.slide >= 0),
+            _match_slots(sequence, slots),
+            strict=True,
         ):
-            known[rows, slot] = piece.z[:, one.slide]
+            closed_places[rows, slot] = piece.z[:, contact.slide]
         count += len(piece.drive)
-    found = known.copy()
+    joined = closed_places.copy()
     for slot in range(len(slots)):
-        at = np.flatnonzero(np.isfinite(known[:, slot]))
-        found[:, slot] = np.interp(np.arange(total), at, known[at, slot])
+        at = np.flatnonzero(np.isfinite(closed_places[:, slot]))
+        joined[:, slot] = np.interp(np.arange(total), at, closed_places[at, slot])
     network, fits = pieces[0].mesh.fits.network, pieces[0].mesh.fits
     for beam in network.beams:
         mine = [k for k, slot in enumerate(slots) if network.contacts[slot.number].beam == beam]  # type: ignore[union-attr]
         if mine:
             marks = smooth_marks(network.beams[beam], fits[beam])
             for row in range(total):
-                found[row, mine] = _between(known[row, mine], found[row, mine], [slots[k].part for k in mine], marks)
-    return found
+                joined[row, mine] = _place_between(
+                    closed_places[row, mine], joined[row, mine], [slots[k].part for k in mine], marks
+                )
+    return joined
 
 
-def _between(known: FloatArray, wanted: FloatArray, parts: list[int], marks: list[float]) -> FloatArray:
+def _place_between(closed_places: FloatArray, wanted: FloatArray, parts: list[int], marks: list[float]) -> FloatArray:
     """Return places of slots along a beam in ascending order: known ones as they are, others near wanted places."""
-    found, k = wanted.copy(), 0
-    while k < len(known):
-        if np.isfinite(known[k]):
+    joined, k = wanted.copy(), 0
+    while k < len(closed_places):
+        if np.isfinite(closed_places[k]):
             k += 1
             continue
         end = k
-        while end < len(known) and not np.isfinite(known[end]) and parts[end] == parts[k]:
+        while end < len(closed_places) and not np.isfinite(closed_places[end]) and parts[end] == parts[k]:
             end += 1
         low, high = marks[parts[k] - 1], marks[parts[k]]
-        low = max([low, *found[:k].tolist()])
-        high = min([high, *(value for value in known[end:].tolist() if np.isfinite(value))])
-        ends = np.concatenate([[low], found[k:end], [high]])
+        low = max([low, *joined[:k].tolist()])
+        high = min([high, *(value for value in closed_places[end:].tolist() if np.isfinite(value))])
+        ends = np.concatenate([[low], joined[k:end], [high]])
         if not (np.diff(ends) > FEWEST_APART * (high - low)).all():
-            found[k:end] = low + (high - low) * np.arange(1, end - k + 1) / (end - k + 1)
+            joined[k:end] = low + (high - low) * np.arange(1, end - k + 1) / (end - k + 1)
         k = end
-    return found
+    return joined

@@ -1,4 +1,4 @@
-"""Where contacts of the sides of beams begin, end, move from and to the ends of beams, part and join.
+"""Changes of contacts of the sides of beams: they begin, end, move from and to the ends of beams, part and join.
 
 Each change is located by its own equations: a contact that begins has no force and no gap; one that moves from the end
 of a beam into it, or back, is tangent there; one that parts has a gap whose curvature vanishes.
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
-from cfmkit.elastica.contact.side_conditions import NEW_PLACE, ROUNDINGS
+from cfmkit.elastica.contact.side_conditions import NEW_PLACE, ROUNDING_OF_KIND
 from cfmkit.elastica.contact.side_gaps import Stage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.contact import BeamOnObstacle
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
-BESIDE = 0.05  # of a step, by which a located change may lie beside it
-N_SECANTS, EXACT = 12, 1e-13
+BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
+N_SECANTS, ZERO_LEVEL = 12, 1e-13
 RATE_STEP = 1e-6  # motion by which rates of conditions are differentiated
 FROM_ROOT, BESIDE_ROOT = 1e-3, 1e-2  # of a beam from a clamped end on the obstacle: what lies there first; a point
 NO_TENSION = 1e-9  # share of a force along an obstacle that is none
-STRAIGHT = 1e-9  # turn of an unloaded beam that is none [rad]
-LIES = "{names} begins to lie on it along a length at {{place}}: {why}"
-REACHES = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
-PINCHES = "two contacts of beam {beam!r} meet at {{place}}"
+STRAIGHT_TURN = 1e-9  # turn of an unloaded beam that is none [rad]
+BEGINS_TO_LIE = "{names} begins to lie on it along a length at {{place}}: {why}"
+REACHES_MARK = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
+CONTACTS_MEET = "two contacts of beam {beam!r} meet at {{place}}"
 NO_WAY = "no equilibrium was found behind the change of the contact of {names} at {{place}}"
 
 
@@ -50,7 +50,7 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     if at is None:
         return None
     if condition.kind == "pinch":
-        return PathStop(WhyStopped.LOST, at.drive, PINCHES.format(beam=condition.item.beam))
+        return PathStop(WhyStopped.LOST, at.drive, CONTACTS_MEET.format(beam=condition.item.beam))
     number = _side_number(piece, condition)
     if condition.kind in ("wraps", "pulls"):
         number = condition.number if condition.kind == "wraps" else number
@@ -60,18 +60,18 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
         kind: Literal["moves", "spreads"] = "moves" if condition.kind == "tangent" else "spreads"
         return ContactChange(kind, condition.number, at, unstable, unstable, number, condition)
     if condition.kind == "end" and condition.mark in (0.0, 1.0) and condition.last in piece.sides.roots(condition.item):
-        beyond = piece.with_flanks(_without(piece, condition.number), piece.closed - {condition.number})
+        beyond = piece.with_flanks(_remaining_places(piece, condition.number), piece.closed - {condition.number})
         begin, wanted = piece.carry(at, beyond), ("wraps", condition.last)
     elif condition.kind == "end":
-        onto = _onto_node(piece, condition)
+        onto = _move_onto_node(piece, condition)
         if onto is None:
-            return PathStop(WhyStopped.LOST, at.drive, REACHES.format(
+            return PathStop(WhyStopped.LOST, at.drive, REACHES_MARK.format(
                 names=piece.say(condition.number), mark=_mark(piece, condition)))  # fmt: skip
         beyond = onto
-        begin, wanted = _with_force(piece, at, beyond, condition.number), ("tangent", condition.last)
+        begin, wanted = _pass_force_on(piece, at, beyond, condition.number), ("tangent", condition.last)
     else:
-        beyond = _joined(piece, condition, at)
-        begin, wanted = _with_force(piece, at, beyond, condition.number, condition.number + 1), ("spreads", False)
+        beyond = _join_contacts(piece, condition, at)
+        begin, wanted = _pass_force_on(piece, at, beyond, condition.number, condition.number + 1), ("spreads", False)
     exact = _zero_of(beyond, begin, _find(beyond, condition, wanted))
     if exact is None:
         return None
@@ -99,7 +99,7 @@ def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: Si
     x, drive = step.at(share)
     guess = step.first._replace(x=x, drive=float(drive))
     for _ in range(2):
-        stage = Stage.of(piece.whole, np.array([guess.drive]))
+        stage = Stage.from_problem(piece.whole, np.array([guess.drive]))
         least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
         between = _contact_around(piece, condition, least.parameter)
         if between is not None:
@@ -110,15 +110,15 @@ def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: Si
         if 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
             flanks = [*piece.flanks, FlankPlace(condition.number, least.parameter)]
             beyond = piece.with_flanks(flanks, piece.closed)
-            near = beyond.shrink(piece.carry(guess, beyond))
+            begin_guess = beyond.shrink(piece.carry(guess, beyond))
             number = _new_side(piece, beyond, condition.number, least.parameter)
-            border = np.zeros(len(near.x) + 1)
+            border = np.zeros(len(begin_guess.x) + 1)
             border[beyond.slot_in_own(number)] = 1.0
-            state = beyond.own.equations.solve(near.x, near.drive, border, 0.0)
+            state = beyond.own.equations.solve(begin_guess.x, begin_guess.drive, border, 0.0)
             if state is not None and np.isfinite(state.rate).all():
-                at = beyond.grow(near._replace(x=state.free, drive=float(state.way), rate=state.rate))
+                at = beyond.grow(begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate))
                 back = beyond.carry(at, piece)
-                if -BESIDE <= step.share_of(back) <= 1 + BESIDE:
+                if -BESIDE_SHARE <= step.share_of(back) <= 1 + BESIDE_SHARE:
                     return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
                                          condition.number, condition, beyond)  # fmt: skip
         elif _pads_at(piece, condition, least.parameter):  # it is the node that begins to touch
@@ -133,16 +133,18 @@ def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: Si
 def _new_side(piece: PieceOfPath, beyond: PieceOfPath, number: int, parameter: float) -> int:
     """Return the number in the arrays of a contact at a place."""
     mesh = beyond.whole.mesh
-    sides = [k for k, one in enumerate(mesh.contacts) if one.slide >= 0 and one.number == number]
+    sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0 and contact.number == number]
     return min(sides, key=lambda k: abs(mesh.elements.cuts[mesh.contacts[k].element, 1] - parameter))
 
 
-def _onto_node(piece: PieceOfPath, condition: SideCondition) -> PieceOfPath | None:
+def _move_onto_node(piece: PieceOfPath, condition: SideCondition) -> PieceOfPath | None:
     """Return the piece in which the node at the end of a beam touches instead of its side; None if none may."""
     pads = _pads_at(piece, condition, 1.0 if condition.last else 0.0)
     if not pads or condition.mark not in (0.0, 1.0):
         return None
-    return piece.with_flanks(_without(piece, condition.number), (piece.closed - {condition.number}) | {pads[0]})
+    return piece.with_flanks(
+        _remaining_places(piece, condition.number), (piece.closed - {condition.number}) | {pads[0]}
+    )
 
 
 def _pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[int]:
@@ -152,28 +154,34 @@ def _pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[i
     node = beam.end if end > 0.5 else beam.start
     return [
         k
-        for k, one in enumerate(mesh.contacts)
-        if isinstance(one.item, NodeOnObstacle) and one.item.name == condition.item.name and one.item.node == node
+        for k, contact in enumerate(mesh.contacts)
+        if isinstance(contact.item, NodeOnObstacle)
+        and contact.item.name == condition.item.name
+        and contact.item.node == node
     ]
 
 
-def _without(piece: PieceOfPath, *numbers: int) -> list[FlankPlace]:
+def _remaining_places(piece: PieceOfPath, *numbers: int) -> list[FlankPlace]:
     """Return the places at which sides touch but for some contacts, and what lay on an obstacle beside these."""
     mesh = piece.whole.mesh
     return [
-        FlankPlace(one.number, float(mesh.elements.cuts[one.element, 1]), 0 if k + one.laid in numbers else one.laid)
-        for k, one in enumerate(mesh.contacts)
-        if one.slide >= 0 and k not in numbers
+        FlankPlace(
+            contact.number,
+            float(mesh.elements.cuts[contact.element, 1]),
+            0 if k + contact.laid in numbers else contact.laid,
+        )
+        for k, contact in enumerate(mesh.contacts)
+        if contact.slide >= 0 and k not in numbers
     ]
 
 
-def _relaid(piece: PieceOfPath, number: int, laid: int) -> PieceOfPath:
+def _lay_anew(piece: PieceOfPath, number: int, laid: int) -> PieceOfPath:
     """Return the piece in which the side beside a contact lies on its obstacle, or does not."""
     mesh = piece.whole.mesh
     return piece.with_flanks([
-        FlankPlace(one.number, float(mesh.elements.cuts[one.element, 1]), laid if k == number else one.laid)
-        for k, one in enumerate(mesh.contacts)
-        if one.slide >= 0
+        FlankPlace(contact.number, float(mesh.elements.cuts[contact.element, 1]), laid if k == number else contact.laid)
+        for k, contact in enumerate(mesh.contacts)
+        if contact.slide >= 0
     ], piece.closed)  # fmt: skip
 
 
@@ -184,9 +192,10 @@ def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: flo
     straight wall.
     """
     mesh, item = piece.whole.mesh, condition.item
-    sides = [(k, one) for k, one in enumerate(mesh.contacts) if one.slide >= 0 and one.item.beam == item.beam]  # type: ignore[union-attr]
-    before = [k for k, one in sides if mesh.elements.cuts[one.element, 1] < parameter]
-    after = [k for k, one in sides if mesh.elements.cuts[one.element, 1] > parameter]
+    of_beam = piece.sides_of(item.beam)
+    sides = [(k, mesh.contacts[k]) for k in of_beam]
+    before = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] < parameter]
+    after = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] > parameter]
     roots = piece.sides.roots(item)
     if not _may_lie(piece, item, parameter):
         return None
@@ -202,10 +211,10 @@ def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: flo
 
 def _may_lie(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> bool:
     """Return True if a side takes on another curvature where it lies on an obstacle."""
-    return bool(len(item.outline.radius)) or abs(_unloaded_bend(piece, item, parameter)) > STRAIGHT
+    return bool(len(item.outline.radius)) or abs(_measure_unloaded_bend(piece, item, parameter)) > STRAIGHT_TURN
 
 
-def _unloaded_bend(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> float:
+def _measure_unloaded_bend(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> float:
     """Return the curvature of an unloaded beam by its parameter [rad]."""
     fitted = piece.whole.mesh.fits[item.beam]
     sides = [float(np.real(fitted.angle(parameter + step, parameter))) for step in (PLACE_STEP, -PLACE_STEP)]
@@ -236,32 +245,37 @@ def _cannot_lie(piece: PieceOfPath, item: BeamOnObstacle) -> str:
     return ""
 
 
-def _joined(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath:
+def _join_contacts(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath:
     """Return the piece in which two contacts are one."""
     z, mesh = piece.whole.values(at.x, at.drive), piece.whole.mesh
     pair = mesh.contacts[condition.number], mesh.contacts[condition.number + 1]
-    middle = 0.5 * float(sum(z[one.slide] for one in pair))
-    flanks = [*_without(piece, condition.number, condition.number + 1), FlankPlace(pair[0].number, middle)]
+    middle = 0.5 * float(sum(z[contact.slide] for contact in pair))
+    flanks = [*_remaining_places(piece, condition.number, condition.number + 1), FlankPlace(pair[0].number, middle)]
     return piece.with_flanks(flanks, piece.closed)
 
 
-def _with_force(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath, *numbers: int) -> PathEquilibrium:
+def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath, *numbers: int) -> PathEquilibrium:
     """Return a guess in another piece, whose new contact bears the forces of some that are left."""
     mesh, z = beyond.whole.mesh, piece.whole.values(at.x, at.drive)
-    near = piece.carry(at, beyond)
+    begin_guess = piece.carry(at, beyond)
     force = sum(float(z[piece.whole.mesh.contacts[k].unknown]) for k in numbers)
-    full = beyond.whole.values(near.x, near.drive)
-    idle = [one.unknown for k, one in enumerate(mesh.contacts) if k in beyond.closed and full[one.unknown] == 0.0]
+    full = beyond.whole.values(begin_guess.x, begin_guess.drive)
+    idle = [
+        contact.unknown
+        for k, contact in enumerate(mesh.contacts)
+        if k in beyond.closed and full[contact.unknown] == 0.0
+    ]
     full[idle] = force / max(len(idle), 1)
-    return near._replace(x=full[mesh.free])
+    return begin_guess._replace(x=full[mesh.free])
 
 
 def _find(beyond: PieceOfPath, condition: SideCondition, wanted: tuple[str, bool]) -> int:
     """Return the row of a condition on the same side."""
     kind, last = wanted
-    return len(beyond.whole.mesh.contacts) + next(
-        k for k, one in enumerate(beyond.sides.all)
-        if one.kind == kind and one.item is condition.item and (kind not in ("tangent", "wraps") or one.last == last)
+    count = len(beyond.whole.mesh.contacts)
+    return count + next(
+        k for k, contact in enumerate(beyond.sides.all)
+        if contact.kind == kind and contact.item is condition.item and (kind not in ("tangent", "wraps") or contact.last == last)
     )  # fmt: skip
 
 
@@ -276,7 +290,7 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
         value = piece.row_value(whole, row)
         drives.append(at.drive)
         values.append(value)
-        if abs(value) < EXACT:
+        if abs(value) < ZERO_LEVEL:
             return whole
         slope = (
             (values[-1] - values[-2]) / (drives[-1] - drives[-2]) if len(values) > 1 else row_rate(piece, whole, row)
@@ -286,10 +300,10 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
         goal = at.drive - value / slope
         if goal == at.drive or (len(values) > 3 and abs(value) >= abs(values[-2])):
             return whole
-        found = piece.own.solve(at.x + (goal - at.drive) * at.rate, goal)
-        if found is None:
+        solved = piece.own.solve(at.x + (goal - at.drive) * at.rate, goal)
+        if solved is None:
             return None
-        at = found
+        at = solved
     return piece.grow(at)
 
 
@@ -311,25 +325,25 @@ def enter_side_change(
         curved = condition.kind == "wraps" or _may_lie(piece, condition.item, 0.5)
         if why and curved:
             names = f"beam {condition.item.beam!r} on {condition.item.name!r}"
-            return PathStop(WhyStopped.LOST, change.at.drive, LIES.format(names=names, why=why))
+            return PathStop(WhyStopped.LOST, change.at.drive, BEGINS_TO_LIE.format(names=names, why=why))
     lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
                     if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
     if condition is None:  # a contact of a side ends
         item = piece.whole.mesh.contacts[change.number]
-        beyond = piece.with_flanks(_without(piece, change.number), piece.closed - {change.number})
-        near = beyond.shrink(piece.carry(change.at, beyond))
-        at = beyond.own.solve(near.x, near.drive)
+        beyond = piece.with_flanks(_remaining_places(piece, change.number), piece.closed - {change.number})
+        begin_guess = beyond.shrink(piece.carry(change.at, beyond))
+        at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
             return lost
         row = len(beyond.whole.mesh.contacts) + next(
-            k for k, one in enumerate(beyond.sides.all) if one.kind == "touch" and one.number == item.number
+            k for k, contact in enumerate(beyond.sides.all) if contact.kind == "touch" and contact.number == item.number
         )
         whole = beyond.grow(at)
         grows = row_rate(beyond, whole, row)
     elif change.piece is not None:  # begins, moves onto a node, joins another
         beyond = change.piece
-        near = beyond.shrink(change.at)
-        at = beyond.own.solve(near.x, near.drive)
+        begin_guess = beyond.shrink(change.at)
+        at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
             return lost
         whole = beyond.grow(at)
@@ -342,7 +356,7 @@ def enter_side_change(
                 wanted = ("wraps" if rooted else "tangent", condition.last)
             grows = row_rate(beyond, whole, _find(beyond, condition, wanted))
     else:
-        ways = {"tangent": _into_beam, "spreads": _apart, "wraps": _from_root}
+        ways = {"tangent": _move_into_beam, "spreads": _part_contact, "wraps": _lie_from_root}
         part = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
         if part is None:
             return lost
@@ -354,64 +368,64 @@ def enter_side_change(
 Entered = tuple[PieceOfPath, "PathEquilibrium", float]
 
 
-def _into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None:
+def _move_into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None:
     """Return the piece in which a side touches instead of the node at its end, and how the way from there grows."""
     condition: Any = change.condition
     place = 1 - NEW_PLACE if condition.last else NEW_PLACE
     beyond = piece.with_flanks([*piece.flanks, FlankPlace(change.contact, place)], piece.closed - {change.number})
     number = _new_side(piece, beyond, change.contact, place)
-    begin = _with_force(piece, change.at, beyond, change.number)
+    begin = _pass_force_on(piece, change.at, beyond, change.number)
     slide = beyond.slot_in_own(number, slide=True)
-    at = _at_level(beyond, begin, {slide: 1.0}, place)
+    at = _solve_at_level(beyond, begin, {slide: 1.0}, place)
     if at is None:
         return None
     return beyond, beyond.grow(at), float(at.rate[slide]) * (-1.0 if condition.last else 1.0)
 
 
-def _apart(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
+def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
     """Return the piece in which a contact has parted into two, and how the way between them grows."""
     mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
-    own = mesh.contacts[change.number]
-    item: Any = own.item
-    middle = float(z[own.slide])
-    x, y, turn, _ = mesh.attachments.unknowns[own.place]
+    side_contact = mesh.contacts[change.number]
+    item: Any = side_contact.item
+    middle = float(z[side_contact.slide])
+    x, y, turn, _ = mesh.attachments.unknowns[side_contact.place]
     angle = float(np.real(mesh.fits[item.beam].angle(middle, middle))) + float(z[turn])
-    force = 0.5 * sum(z[mesh.elements.unknowns[own.element + k, -2:]] for k in (0, 1))
-    place = mesh.attachments.origin[own.place] + z[[x, y]]
+    force = 0.5 * sum(z[mesh.elements.unknowns[side_contact.element + k, -2:]] for k in (0, 1))
+    place = mesh.attachments.origin[side_contact.place] + z[[x, y]]
     lies = _may_lie(piece, item, middle) and _lies(piece, item, place, force, angle)
     lies = lies and not free
     both = [FlankPlace(change.contact, middle + side * NEW_PLACE, int(lies and side < 0)) for side in (-1.0, 1.0)]
-    beyond = piece.with_flanks([*_without(piece, change.number), *both], piece.closed)
-    first, last = (_new_side(piece, beyond, change.contact, one.parameter) for one in both)
-    begin = _with_force(piece, change.at, beyond, change.number)
+    beyond = piece.with_flanks([*_remaining_places(piece, change.number), *both], piece.closed)
+    first, last = (_new_side(piece, beyond, change.contact, contact.parameter) for contact in both)
+    begin = _pass_force_on(piece, change.at, beyond, change.number)
     new = beyond.whole.mesh
     full = beyond.whole.values(begin.x, begin.drive)
-    for number, one in zip((first, last), both, strict=True):
-        full[new.contacts[number].slide] = one.parameter
-        full[new.contacts[number].unknown] = 0.5 * float(z[own.unknown])
+    for number, contact in zip((first, last), both, strict=True):
+        full[new.contacts[number].slide] = contact.parameter
+        full[new.contacts[number].unknown] = 0.5 * float(z[side_contact.unknown])
     if lies:
         _guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
     begin = begin._replace(x=full[new.free])
     low, high = (beyond.slot_in_own(number, slide=True) for number in (first, last))
-    at = _at_level(beyond, begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
+    at = _solve_at_level(beyond, begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
     if lies and (at is None or not _presses(beyond, at)):
-        return _apart(piece, change, free=True)
+        return _part_contact(piece, change, free=True)
     return None if at is None else (beyond, beyond.grow(at), float(at.rate[high] - at.rate[low]))
 
 
 def _guess_laid(mesh: Discretisation, z: FloatArray, element: int, tension: float) -> None:
     """Put what is known of an element that lies on an obstacle into a state."""
-    own = mesh.elements.unknowns[element]
-    z[own[8:-2]] = 0.0
-    z[own[-2]], z[own[-1]] = tension, 0.0
+    side_contact = mesh.elements.unknowns[element]
+    z[side_contact[8:-2]] = 0.0
+    z[side_contact[-2]], z[side_contact[-1]] = tension, 0.0
 
 
-def _from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
+def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
     """Return the piece in which a side lies from a clamped end on, or touches beside it, and how that grows."""
     condition: Any = change.condition
     mesh, z, item = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive), condition.item
-    own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
-    element, end = (own[-1], 1) if condition.last else (own[0], 0)
+    side_contact = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+    element, end = (side_contact[-1], 1) if condition.last else (side_contact[0], 0)
     angle = float(np.real(mesh.fits[item.beam].angle(float(end), 0.5))) + float(
         z[mesh.elements.unknowns[element, 3 + 4 * end]]
     )
@@ -430,19 +444,19 @@ def _from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) ->
         at = new.contacts[number].element + (laid > 0)
         _guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
     slide = beyond.slot_in_own(number, slide=True)
-    found = _at_level(beyond, begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
-    if lies and (found is None or not _presses(beyond, found)):
-        return _from_root(piece, change, free=True)
-    if found is None:
+    solved = _solve_at_level(beyond, begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
+    if lies and (solved is None or not _presses(beyond, solved)):
+        return _lie_from_root(piece, change, free=True)
+    if solved is None:
         return None
-    return beyond, beyond.grow(found), float(found.rate[slide]) * (-1.0 if condition.last else 1.0)
+    return beyond, beyond.grow(solved), float(solved.rate[slide]) * (-1.0 if condition.last else 1.0)
 
 
 def _presses(piece: PieceOfPath, at: PathEquilibrium) -> bool:
     """Return True if everything that lies on an obstacle presses on it."""
     whole, count = piece.grow(at), len(piece.whole.mesh.contacts)
-    rows = [count + k for k, one in enumerate(piece.sides.all) if one.kind == "pulls"]
-    return all(piece.row_value(whole, row) > -ROUNDINGS["pulls"] for row in rows)
+    rows = [count + k for k, contact in enumerate(piece.sides.all) if contact.kind == "pulls"]
+    return all(piece.row_value(whole, row) > -ROUNDING_OF_KIND["pulls"] for row in rows)
 
 
 def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | None:
@@ -451,36 +465,38 @@ def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | N
     mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
     contact = mesh.contacts[change.number]
     item: Any = contact.item
-    sides = [k for k, one in enumerate(mesh.contacts) if one.slide >= 0 and one.item.beam == item.beam]  # type: ignore[union-attr]
+    sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0 and contact.item.beam == item.beam]  # type: ignore[union-attr]
     if condition.kind == "lies":
         laid = -1 if change.number == sides[0] and False in piece.sides.roots(item) else 1
         laid = laid if laid < 0 or change.number == sides[-1] or change.number + 1 in sides else -1
     else:
         laid = contact.laid
     element = contact.element + (laid > 0)
-    beyond = _relaid(piece, change.number, laid if condition.kind == "lies" else 0)
+    beyond = _lay_anew(piece, change.number, laid if condition.kind == "lies" else 0)
     begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
     full = beyond.whole.values(begin.x, begin.drive)
-    own = mesh.elements.unknowns[element]
+    side_contact = mesh.elements.unknowns[element]
     inside = float(mesh.elements.cuts[element].mean())
-    angle = float(np.real(mesh.fits[item.beam].angle(inside, inside))) + 0.5 * float(z[own[3]] + z[own[7]])
+    angle = float(np.real(mesh.fits[item.beam].angle(inside, inside))) + 0.5 * float(
+        z[side_contact[3]] + z[side_contact[7]]
+    )
     along = np.array([np.cos(angle), np.sin(angle)])
     if condition.kind == "lies":
-        _guess_laid(new, full, element, float(z[own[-2:]] @ along))
+        _guess_laid(new, full, element, float(z[side_contact[-2:]] @ along))
     else:
-        full[new.elements.unknowns[element, -2:]] = z[own[-2]] * along
-    at = beyond.own.solve(full[new.free][beyond.kept], change.at.drive)
+        full[new.elements.unknowns[element, -2:]] = z[side_contact[-2]] * along
+    at = beyond.own.solve(full[new.free][beyond.own_mask], change.at.drive)
     return None if at is None else (beyond, beyond.grow(at), sense)
 
 
-def _at_level(piece: PieceOfPath, begin: PathEquilibrium, row: dict[int, float], level: float) -> Any:
+def _solve_at_level(piece: PieceOfPath, begin: PathEquilibrium, row: dict[int, float], level: float) -> Any:
     """Return the equilibrium of a piece at which a combination of its unknowns has a value."""
-    near = piece.shrink(begin)
-    border = np.zeros(len(near.x) + 1)
+    begin_guess = piece.shrink(begin)
+    border = np.zeros(len(begin_guess.x) + 1)
     for slot, factor in row.items():
         border[slot] = factor
-    state = piece.own.equations.solve(near.x, near.drive, border, level)
+    state = piece.own.equations.solve(begin_guess.x, begin_guess.drive, border, level)
     if state is None or not np.isfinite(state.rate).all():
         return None
-    return near._replace(x=state.free, drive=float(state.way), rate=state.rate, unstable=state.unstable,
+    return begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate, unstable=state.unstable,
                          effort=state.effort)  # fmt: skip

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
 NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins
-ROUNDINGS = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
+ROUNDING_OF_KIND = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
              "wraps": 1e-9, "pulls": 1e-9}  # fmt: skip
 """By how much each kind of condition may be negative."""
 
@@ -62,15 +62,15 @@ class SideConditions:
 
     def _find(self) -> Iterator[SideCondition]:
         mesh = self.mesh
-        sides = [(k, one) for k, one in enumerate(mesh.contacts) if one.slide >= 0]
+        sides = [(k, contact) for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
         for number, item in enumerate(mesh.fits.network.contacts):
             if not isinstance(item, BeamOnObstacle):
                 continue
             yield SideCondition("touch", number, item)
             beam = mesh.fits.network.beams[item.beam]
-            own = [one for _, one in sides if one.item.beam == item.beam]  # type: ignore[union-attr]
+            elements = [contact for _, contact in sides if contact.item.beam == item.beam]  # type: ignore[union-attr]
             for last in self.roots(item):
-                if not own or own[-1 if last else 0].item is not item:
+                if not elements or elements[-1 if last else 0].item is not item:
                     yield SideCondition("wraps", number, item, last)
             for k in sorted(self.closed):
                 pad = mesh.contacts[k].item
@@ -78,26 +78,26 @@ class SideConditions:
                     for last, node in ((False, beam.start), (True, beam.end)):
                         if pad.node == node and not np.isfinite(pad.stiffness):
                             yield SideCondition("tangent", k, item, last)
-        for k, one in sides:
-            side: Any = one.item
+        for k, contact in sides:
+            side: Any = contact.item
             marks = smooth_marks(mesh.fits.network.beams[side.beam], mesh.fits[side.beam])
-            place = float(mesh.elements.cuts[one.element, 1])
+            place = float(mesh.elements.cuts[contact.element, 1])
             low, high = max(m for m in marks if m < place), min(m for m in marks if m > place)
-            before, after = ([other for _, other in sides if other.item.beam == side.beam  # type: ignore[union-attr]
-                              and (other.element > one.element) == above and other is not one]
+            before, after = ([neighbour for _, neighbour in sides if neighbour.item.beam == side.beam  # type: ignore[union-attr]
+                              and (neighbour.element > contact.element) == above and neighbour is not contact]
                              for above in (False, True))  # fmt: skip
-            if not any(low < mesh.elements.cuts[other.element, 1] for other in before):
+            if not any(low < mesh.elements.cuts[neighbour.element, 1] for neighbour in before):
                 yield SideCondition("end", k, side, False, low)
-            if not any(high > mesh.elements.cuts[other.element, 1] for other in after):
+            if not any(high > mesh.elements.cuts[neighbour.element, 1] for neighbour in after):
                 yield SideCondition("end", k, side, True, high)
-            if one.laid and len(side.outline.radius):
+            if contact.laid and len(side.outline.radius):
                 yield SideCondition("pulls", k, side)
-            if not one.laid and not any(other.item is side for other in before[-1:] + after[:1]):
+            if not contact.laid and not any(neighbour.item is side for neighbour in before[-1:] + after[:1]):
                 yield SideCondition("spreads", k, side)
-        for (k, one), (_, other) in itertools.pairwise(sides):
-            if one.item.beam == other.item.beam:  # type: ignore[union-attr]
-                kind: Literal["closes", "pinch"] = "closes" if one.item is other.item else "pinch"
-                yield SideCondition(kind, k, one.item)  # type: ignore[arg-type]
+        for (k, contact), (_, neighbour) in itertools.pairwise(sides):
+            if contact.item.beam == neighbour.item.beam:  # type: ignore[union-attr]
+                kind: Literal["closes", "pinch"] = "closes" if contact.item is neighbour.item else "pinch"
+                yield SideCondition(kind, k, contact.item)  # type: ignore[arg-type]
 
     def roots(self, item: BeamOnObstacle) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
@@ -119,26 +119,32 @@ class SideConditions:
         marks = smooth_marks(beam, fitted)
         inside = 0.5 * (marks[-2] + marks[-1] if last else marks[0] + marks[1])
         angle = float(np.real(fitted.angle(float(last), inside)))
-        found = item.outline.distance(np.real(np.array(beam_end_at(network, item.beam, int(last)))))
+        edge = item.outline.distance(np.real(np.array(beam_end_at(network, item.beam, int(last)))))
         half = 0.5 * float(np.real(beam.section.thickness_at(float(last), inside)))
-        slope = float(found.normal[0] * np.cos(angle) + found.normal[1] * np.sin(angle))
-        return abs(float(found.value) - half) < ON_OBSTACLE * mesh.scales.length and abs(slope) < ON_OBSTACLE
+        slope = float(edge.normal[0] * np.cos(angle) + edge.normal[1] * np.sin(angle))
+        return abs(float(edge.value) - half) < ON_OBSTACLE * mesh.scales.length and abs(slope) < ON_OBSTACLE
 
     def gaps_of(self, item: BeamOnObstacle) -> SideGaps:
         """Return the gaps of a side, with what touches already."""
         if item not in self._gaps:
             mesh, touched = self.mesh, list[int]()
-            own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+            elements = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
             beam = mesh.fits.network.beams[item.beam]
-            for number, one in enumerate(mesh.contacts):
-                if one.item.name != item.name:
+            for number, contact in enumerate(mesh.contacts):
+                if contact.item.name != item.name:
                     continue
-                if one.slide >= 0 and one.item is item:
-                    touched += [one.element, one.element + 1]
-                elif isinstance(one.item, NodeOnObstacle) and number in self.closed:
-                    touched += [own[0]] * (one.item.node == beam.start) + [own[-1]] * (one.item.node == beam.end)
-            touched += [own[-1] if last else own[0] for last in self.roots(item)]
-            laid = [one.element + (one.laid > 0) for one in mesh.contacts if one.laid and one.item is item]
+                if contact.slide >= 0 and contact.item is item:
+                    touched += [contact.element, contact.element + 1]
+                elif isinstance(contact.item, NodeOnObstacle) and number in self.closed:
+                    touched += [elements[0]] * (contact.item.node == beam.start) + [elements[-1]] * (
+                        contact.item.node == beam.end
+                    )
+            touched += [elements[-1] if last else elements[0] for last in self.roots(item)]
+            laid = [
+                contact.element + (contact.laid > 0)
+                for contact in mesh.contacts
+                if contact.laid and contact.item is item
+            ]
             self._gaps[item] = SideGaps(mesh, item, tuple(touched), tuple(laid))
         return self._gaps[item]
 
@@ -149,29 +155,29 @@ class SideConditions:
     @cached_property
     def roundings(self) -> FloatArray:
         """By how much each may be negative."""
-        return np.array([ROUNDINGS[one.kind] for one in self.all])
+        return np.array([ROUNDING_OF_KIND[condition.kind] for condition in self.all])
 
     def values(self, z: FloatArray, stage: Stage) -> FloatArray:
         """Return the values of all conditions in n states (n, size), (conditions, n)."""
-        return np.array([self.value(one, z, stage) for one in self.all]).reshape(len(self.all), len(z))
+        return np.array([self.value(condition, z, stage) for condition in self.all]).reshape(len(self.all), len(z))
 
-    def value(self, one: SideCondition, z: FloatArray, stage: Stage) -> FloatArray:
+    def value(self, condition: SideCondition, z: FloatArray, stage: Stage) -> FloatArray:
         """Return the values of a condition in n states, (n,)."""
-        if one.kind == "touch":
-            return self.gaps_of(one.item).least(z, stage)
-        if one.kind == "wraps":
-            return self._curvature_at_root(one, z)
-        contact = self.mesh.contacts[one.number]
-        if one.kind == "pulls":
+        if condition.kind == "touch":
+            return self.gaps_of(condition.item).least(z, stage)
+        if condition.kind == "wraps":
+            return self._curvature_at_root(condition, z)
+        contact = self.mesh.contacts[condition.number]
+        if condition.kind == "pulls":
             return self._pull(contact, z)
-        if one.kind == "tangent":
-            return self._run_away(contact, one, z)
-        if one.kind == "spreads":
+        if condition.kind == "tangent":
+            return self._run_away(contact, condition, z)
+        if condition.kind == "spreads":
             return self._relative_curvature(contact, z)
-        if one.kind in ("closes", "pinch"):
-            following = self.mesh.contacts[one.number + 1]
+        if condition.kind in ("closes", "pinch"):
+            following = self.mesh.contacts[condition.number + 1]
             return np.asarray(z[:, following.slide] - z[:, contact.slide] - NEW_PLACE)
-        return np.asarray((one.mark - z[:, contact.slide]) * (1.0 if one.last else -1.0) - 0.5 * NEW_PLACE)
+        return np.asarray((condition.mark - z[:, contact.slide]) * (1.0 if condition.last else -1.0) - 0.5 * NEW_PLACE)
 
     def _pull(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the tension along a round obstacle, positive if it presses the side on."""
@@ -182,11 +188,11 @@ class SideConditions:
         bulge = contact.item.outline.distance(place * mesh.scales.length).curvature  # type: ignore[union-attr]
         return np.asarray(np.sign(bulge) * z[:, mesh.elements.unknowns[element, -2]])
 
-    def _curvature_at_root(self, one: SideCondition, z: FloatArray) -> FloatArray:
+    def _curvature_at_root(self, condition: SideCondition, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap at an end that lies on the obstacle."""
-        mesh, item = self.mesh, one.item
-        own = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
-        element, side = (own[-1], 1) if one.last else (own[0], 0)
+        mesh, item = self.mesh, condition.item
+        elements = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+        element, side = (elements[-1], 1) if condition.last else (elements[0], 0)
         moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]
         inside, at = float(mesh.elements.cuts[element].mean()), np.array([float(side)])
         slopes = shape_functions(mesh.degree, at)[1][0]
@@ -197,23 +203,23 @@ class SideConditions:
         sides = [float(np.real(fitted.angle(at + step, inside) + np.zeros(1))[0]) for step in (PLACE_STEP, -PLACE_STEP)]
         bend = bend + (sides[0] - sides[1]) / (2 * PLACE_STEP) / speed
         place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, side])]).place[:, 0]
-        found = item.outline.distance(place * mesh.scales.length)
+        edge = item.outline.distance(place * mesh.scales.length)
         angle = 0.5 * sum(sides) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
-        rises = found.normal[:, 1] * np.cos(angle) - found.normal[:, 0] * np.sin(angle)
-        return np.asarray(bend * rises + found.curvature * mesh.scales.length * rises**2)
+        rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
+        return np.asarray(bend * rises + edge.curvature * mesh.scales.length * rises**2)
 
-    def _run_away(self, pad: ContactAt, one: SideCondition, z: FloatArray) -> FloatArray:
+    def _run_away(self, pad: ContactAt, condition: SideCondition, z: FloatArray) -> FloatArray:
         """Return how much the side of a beam runs away from the obstacle from a pad at its end."""
         mesh = self.mesh
-        own = [k for k, name in enumerate(mesh.elements.beam) if name == one.item.beam]
-        element, side = (own[-1], 1) if one.last else (own[0], 0)
-        fitted = mesh.fits[one.item.beam]
+        elements = [k for k, name in enumerate(mesh.elements.beam) if name == condition.item.beam]
+        element, side = (elements[-1], 1) if condition.last else (elements[0], 0)
+        fitted = mesh.fits[condition.item.beam]
         inside = float(mesh.elements.cuts[element].mean())
         angle = float(np.real(fitted.angle(float(side), inside))) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
         place = poses(mesh.attachments, z, [pad.place]).place[:, 0]
-        normal = one.item.outline.distance(place * mesh.scales.length).normal
+        normal = condition.item.outline.distance(place * mesh.scales.length).normal
         along = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
-        return np.asarray(-along if one.last else along)
+        return np.asarray(-along if condition.last else along)
 
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""
@@ -234,7 +240,7 @@ class SideConditions:
         angles = [np.real(fitted.angle(parameter + step, inside)) for step in (PLACE_STEP, 0.0, -PLACE_STEP)]
         bend = 0.5 * total + (angles[0] - angles[2]) / (2 * PLACE_STEP) / speed
         x, y, turn, _ = mesh.attachments.unknowns[contact.place]
-        found = item.outline.distance((mesh.attachments.origin[contact.place] + z[:, [x, y]]) * length)  # type: ignore[union-attr]
+        edge = item.outline.distance((mesh.attachments.origin[contact.place] + z[:, [x, y]]) * length)  # type: ignore[union-attr]
         angle = angles[1] + z[:, turn]
-        rises = found.normal[:, 1] * np.cos(angle) - found.normal[:, 0] * np.sin(angle)
-        return np.asarray(bend * rises + found.curvature * length * rises**2)
+        rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
+        return np.asarray(bend * rises + edge.curvature * length * rises**2)

@@ -23,9 +23,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.contact import BeamOnObstacle
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
-NEAR = 1e-3  # share of a mean beam length within which the least gap is found exactly
-N_ROUNDS, LEVEL = 20, 1e-9  # of the search for the place of a least gap, and the slope there: its square is the error
-ROUNDING = 1e-13
+NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
+N_ROUNDS, SLOPE_LEVEL = (
+    20,
+    1e-9,
+)  # of the search for the place of a least gap, and the slope there: its square is the error
+GAP_RESOLUTION = 1e-13
 BESIDE_CONTACT = 1e-7  # mean beam lengths by which a side may lie in an obstacle beside a contact: rounding
 
 
@@ -40,13 +43,13 @@ class SideStates(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """Where on the way n states are: the drive (n,), and the share of what is constant, (n, 1, 1) or 1."""
+    """Places of n states on the way: the drive (n,), and the share of what is constant, (n, 1, 1) or 1."""
 
     drive: FloatArray
     share: Any = 1.0
 
     @classmethod
-    def of(cls, problem: NetworkProblem, ways: FloatArray) -> Stage:
+    def from_problem(cls, problem: NetworkProblem, ways: FloatArray) -> Stage:
         """Return the stage at places of the way of a problem, (n,)."""
         return cls(np.zeros(len(ways)), ways[:, None, None]) if problem.ramp else cls(ways)
 
@@ -93,7 +96,7 @@ def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
 
 
 @lru_cache(maxsize=64)
-def _to_series(degree: int) -> FloatArray:
+def _series_matrix(degree: int) -> FloatArray:
     """Return the matrix from values at the Gauss points to Legendre coefficients."""
     places = basis(degree).places
     return read_only(np.linalg.inv(legendre.legvander(2 * places - 1, len(places) - 1)))
@@ -101,7 +104,7 @@ def _to_series(degree: int) -> FloatArray:
 
 def _rows_at(degree: int, places: FloatArray) -> _AtFractions:
     """Return the matrices at any places, (n, ...): shapes, integrals from values at Gauss points, interpolation."""
-    series = _to_series(degree)
+    series = _series_matrix(degree)
     x, count = 2 * places - 1, len(series)
     polynomials = legendre.legvander(x, count)
     order = np.arange(1, count)
@@ -165,25 +168,25 @@ class SideGaps:
     def measure(self, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> tuple[Any, Any, SideStates]:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
-        found = self.item.outline.distance(seen.place * self.mesh.scales.length)
+        values = self.item.outline.distance(seen.place * self.mesh.scales.length)
         half = np.stack(
             [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
         )
-        slope = found.normal[..., 0] * np.cos(seen.angle) + found.normal[..., 1] * np.sin(seen.angle)
+        slope = values.normal[..., 0] * np.cos(seen.angle) + values.normal[..., 1] * np.sin(seen.angle)
         taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
         slope = slope - np.stack(taper, axis=1)
-        return found.value / self.mesh.scales.length - half, slope, seen
+        return values.value / self.mesh.scales.length - half, slope, seen
 
     def least(self, z: FloatArray, stage: Stage) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
 
-        It is exact where it is below `NEAR`, and above it otherwise.
+        It is exact where it is below `NEAR_GAP`, and above it otherwise.
         """
         gap, rows, _ = self._dips(z, stage)
-        found = (gap + self.slack[:, None]).min(axis=(1, 2))
+        values = (gap + self.slack[:, None]).min(axis=(1, 2))
         for state, row, value in zip(rows.state, rows.row, self._refine(z, stage, rows)[0], strict=True):
-            found[state] = min(found[state], value + self.slack[row])
-        return np.asarray(found)
+            values[state] = min(values[state], value + self.slack[row])
+        return np.asarray(values)
 
     def find_least(self, z: FloatArray, stage: Stage) -> LeastGap:
         """Return the least gap of one state (size,) exactly: where the side is parallel to the obstacle."""
@@ -196,8 +199,8 @@ class SideGaps:
         )
         for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
             if value + self.slack[number] <= best:
-                own = self._measure_at(z[None], stage, int(self.elements[number]), np.array([fraction]))
-                best, least = value + float(self.slack[number]), LeastGap(value, float(own.parameter[0]))
+                indices = self._measure_at(z[None], stage, int(self.elements[number]), np.array([fraction]))
+                best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
         return least
 
     def _dips(self, z: FloatArray, stage: Stage) -> tuple[Any, _Dips, SideStates]:
@@ -209,9 +212,11 @@ class SideGaps:
         share = np.where(dips, (gap[..., 1:] - high - gap[..., :-1]) / np.where(dips, low - high, 1.0), 0.0)
         bound = gap[..., :-1] + share * low  # where the tangents at both places meet
         allowed = gap + self.slack[:, None]
-        lower = bound + self.slack[:, None] < np.minimum(allowed.min(axis=(1, 2)), NEAR)[:, None, None] - ROUNDING
-        near = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
-        state, row, place = near
+        lower = (
+            bound + self.slack[:, None] < np.minimum(allowed.min(axis=(1, 2)), NEAR_GAP)[:, None, None] - GAP_RESOLUTION
+        )
+        dips_near = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
+        state, row, place = dips_near
         return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
 
     def _refine(self, z: FloatArray, stage: Stage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
@@ -220,18 +225,18 @@ class SideGaps:
         low, high = dips.low.copy(), dips.high.copy()
         value, best = np.full(len(a), np.inf), 0.5 * (a + b)
         for row in np.unique(dips.row).tolist():
-            own = np.flatnonzero(dips.row == row)
+            indices = np.flatnonzero(dips.row == row)
             for _ in range(N_ROUNDS):
-                middle = b[own] - high[own] * (b[own] - a[own]) / (high[own] - low[own])
-                states = dips.state[own]
+                middle = b[indices] - high[indices] * (b[indices] - a[indices]) / (high[indices] - low[indices])
+                states = dips.state[indices]
                 seen = self._measure_at(z[states], stage.take(states), int(self.elements[row]), middle)
-                value[own], best[own] = seen.gap, middle
-                if np.abs(seen.slope).max() < LEVEL:
+                value[indices], best[indices] = seen.gap, middle
+                if np.abs(seen.slope).max() < SLOPE_LEVEL:
                     break
                 below = seen.slope < 0
-                high[own] = np.where(below, 0.5 * high[own], seen.slope)
-                low[own] = np.where(below, seen.slope, 0.5 * low[own])
-                a[own], b[own] = np.where(below, middle, a[own]), np.where(below, b[own], middle)
+                high[indices] = np.where(below, 0.5 * high[indices], seen.slope)
+                low[indices] = np.where(below, seen.slope, 0.5 * low[indices])
+                a[indices], b[indices] = np.where(below, middle, a[indices]), np.where(below, b[indices], middle)
         return value, best
 
     def _measure_at(self, z: FloatArray, stage: Stage, element: int, fraction: FloatArray) -> _Beside:
@@ -252,10 +257,10 @@ class SideGaps:
         cuts = np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element]
         parameter = cuts[:, 0] + (cuts[:, 1] - cuts[:, 0]) * fraction
         length = self.mesh.scales.length
-        found = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
-        slope = found.normal[:, 0] * np.cos(angle) + found.normal[:, 1] * np.sin(angle)
+        edge = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
+        slope = edge.normal[:, 0] * np.cos(angle) + edge.normal[:, 1] * np.sin(angle)
         slope = slope - self._taper(parameter, element)
-        return _Beside(found.value / length - self.half_thickness(parameter, element), slope, parameter)
+        return _Beside(edge.value / length - self.half_thickness(parameter, element), slope, parameter)
 
 
 class _Dips(NamedTuple):
@@ -289,9 +294,9 @@ def carry(
     Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (k,) are those of the
     contacts of sides of the new elements, if they are not those that these were made for.
     """
-    found = np.zeros(new.size, z.dtype)
+    values = np.zeros(new.size, z.dtype)
     for name, place in new.nodes.items():
-        found[new.attachments.unknowns[place]] = z[old.attachments.unknowns[old.nodes[name]]]
+        values[new.attachments.unknowns[place]] = z[old.attachments.unknowns[old.nodes[name]]]
     moved = with_places(old, z).elements
     cuts = moved.cuts if moved.moved_cuts is None else moved.moved_cuts
     fresh = new.elements.cuts
@@ -305,15 +310,15 @@ def carry(
         after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
         for k, side in ((0, 0), (-1, 1)):
             ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
-            found[new.attachments.unknowns[ends[1]]] = z[old.attachments.unknowns[ends[0]]]
+            values[new.attachments.unknowns[ends[1]]] = z[old.attachments.unknowns[ends[0]]]
         if len(before) == len(after) and np.array_equal(cuts[before], fresh[after]):
-            own = new.elements.unknowns[after]
-            found[own[:, 8:]] = z[old.elements.unknowns[before, 8:]]
+            indices = new.elements.unknowns[after]
+            values[indices[:, 8:]] = z[old.elements.unknowns[before, 8:]]
             for k in after[:-1].tolist():
-                other = old.attachments.unknowns[old.elements.ends[before[0] + k - after[0], 1]]
-                here = new.attachments.unknowns[new.elements.ends[k, 1]]
-                found[here] = z[other]
-                found[here[:2]] += _origin(old, int(old.elements.ends[before[0] + k - after[0], 1])) - _origin(
+                old_place = old.attachments.unknowns[old.elements.ends[before[0] + k - after[0], 1]]
+                new_place = new.attachments.unknowns[new.elements.ends[k, 1]]
+                values[new_place] = z[old_place]
+                values[new_place[:2]] += _origin(old, int(old.elements.ends[before[0] + k - after[0], 1])) - _origin(
                     new, int(new.elements.ends[k, 1])
                 )
             continue
@@ -324,18 +329,18 @@ def carry(
             end = int(new.elements.ends[k, 1])
             if k != after[-1]:
                 x, y, body, _ = new.attachments.unknowns[end]
-                found[[x, y]], found[body] = place[-1] - _origin(new, end), turn[-1]
-            own = new.elements.unknowns[k]
+                values[[x, y]], values[body] = place[-1] - _origin(new, end), turn[-1]
+            indices = new.elements.unknowns[k]
             rest = turn[:-2] - turn[-2] * rule.values[:, 0] - turn[-1] * rule.values[:, 1]
-            found[own[columns[2:]]] = bubbles @ rest
-            found[own[-2:]] = force[-1]
-    number_of = {one.number: one.unknown for one in old.contacts if one.slide < 0}
-    for one in new.contacts:
-        if one.slide < 0:
-            found[one.unknown] = z[number_of[one.number]]
+            values[indices[columns[2:]]] = bubbles @ rest
+            values[indices[-2:]] = force[-1]
+    number_of = {contact.number: contact.unknown for contact in old.contacts if contact.slide < 0}
+    for contact in new.contacts:
+        if contact.slide < 0:
+            values[contact.unknown] = z[number_of[contact.number]]
         else:
-            found[one.slide], found[one.flag] = fresh[one.element, 1], one.laid
-    return found
+            values[contact.slide], values[contact.flag] = fresh[contact.element, 1], contact.laid
+    return values
 
 
 def _origin(mesh: Discretisation, place: int) -> FloatArray:
@@ -350,11 +355,11 @@ def _sample(
     ends = cuts[elements, 1]
     home = np.minimum(np.searchsorted(ends, at, side="left"), len(elements) - 1)
     for k in np.unique(home).tolist():
-        number, own = int(elements[k]), home == k
+        number, indices = int(elements[k]), home == k
         left, right = cuts[number]
-        fractions = np.clip((at[own] - left) / (right - left), 0.0, 1.0)
+        fractions = np.clip((at[indices] - left) / (right - left), 0.0, 1.0)
         seen = side_states(mesh, z[None], stage, np.array([number]), fractions)
-        place[own], turn[own] = seen.place[0, 0], seen.turn[0, 0]
+        place[indices], turn[indices] = seen.place[0, 0], seen.turn[0, 0]
         load = energy.line_load(mesh, *stage)[0, number]
-        force[own] = z[mesh.elements.unknowns[number, -2:]] + load * seen.ahead[0, 0][:, None]
+        force[indices] = z[mesh.elements.unknowns[number, -2:]] + load * seen.ahead[0, 0][:, None]
     return place, turn, force

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.elastica.contact.equations import GapBounds, without_contacts
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, moved_tables
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, compute_moved_tables
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
 
 SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations
-NEUTRAL = 1e-6  # stiffness of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones do
+NEUTRAL_STIFFNESS = (
+    1e-6  # stiffness of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones do
+)
 SMALLEST_FORCE = 1e-12  # of a contact that begins, in the curvature of its gap over its force
 
 
@@ -73,21 +75,21 @@ class SlidingEquations(NumpyEquations):
         slots = np.full(self.mesh.size, -1)
         slots[self.mesh.free] = np.arange(len(self.mesh.free))
         object.__setattr__(self, "slots", slots)
-        nodes = tuple(one for one in self.mesh.contacts if one.slide < 0)
+        nodes = tuple(contact for contact in self.mesh.contacts if contact.slide < 0)
         watched = GapBounds(replace(self.mesh, contacts=nodes)) if nodes else None
         object.__setattr__(self, "watched", watched)
 
     @classmethod
-    def of(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
+    def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
         e = mesh.elements
-        names = [name for name in (*_TABLES, "length") if getattr(e, name) is not None]
+        names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
         if e.weight.ndim > 2:  # of several states: those of the first
             first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
             e = e._replace(**first, moved_cuts=None)
         copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
-        own = e._replace(**copies)
-        whole = replace(mesh, elements=own)
+        indices = e._replace(**copies)
+        whole = replace(mesh, elements=indices)
         return cls(whole, ramp, plain=make(replace(without_contacts(whole), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
@@ -97,21 +99,21 @@ class SlidingEquations(NumpyEquations):
     # -- places --------------------------------------------------------------------------------------------------------
     @property
     def _sides(self) -> list[ContactAt]:
-        return [one for one in self.mesh.contacts if one.slide >= 0]
+        return [contact for contact in self.mesh.contacts if contact.slide >= 0]
 
     def move_to(self, places: FloatArray) -> bool:
         """Move the elements of the equations without contacts to places; return False where one would vanish."""
         assert self.mesh.moving is not None
-        tables = moved_tables(self.mesh, places)
+        tables = compute_moved_tables(self.mesh, places)
         cuts = tables.pop("moved_cuts")
         if not (cuts[:, 1] - cuts[:, 0] > SMALLEST_ELEMENT).all():
             return False
         self.plain.refill(self.mesh.moving.elements, tables)
         return True
 
-    def laid_parts(self, z: FloatArray) -> list[LaidPart]:
+    def find_laid_parts(self, z: FloatArray) -> list[LaidPart]:
         """Return the elements that lie on obstacles; the elements stand at their places."""
-        found = []
+        edge = []
         for contact in self._sides:
             side = contact.laid if contact.closed is not None else int(np.rint(z[contact.flag]))
             if not side:
@@ -119,36 +121,36 @@ class SlidingEquations(NumpyEquations):
             seen = self.side_at(contact, z)
             # of the line on which the middle of the beam lies once the gap is closed
             bulge = seen.bulge / (1 - seen.bulge * seen.gap) if seen.bulge else 0.0
-            found.append(LaidPart(contact.element + (side > 0), contact, -float(np.sign(seen.rises)) * bulge))
-        return found
+            edge.append(LaidPart(contact.element + (side > 0), contact, -float(np.sign(seen.rises)) * bulge))
+        return edge
 
     def _lay(self, parts: list[LaidPart]) -> None:
         """Take the energy of elements that lie on obstacles out of the equations without contacts."""
         e = self.plain.mesh.elements
         for part in parts:
             rows = np.array([part.element])
-            names = [name for name in (*_TABLES, "length") if getattr(e, name) is not None]
+            names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
             tables = {name: getattr(e, name)[rows] for name in names}
             for name in ("weight", "ahead", "length"):
                 tables[name] = 0.0 * tables[name]
             self.plain.refill(rows, tables)
 
-    def _without_tension(self, z: FloatArray, parts: list[LaidPart]) -> FloatArray:
+    def _drop_tension(self, z: FloatArray, parts: list[LaidPart]) -> FloatArray:
         """Return unknowns in which nothing pulls along an obstacle."""
         if not parts:
             return z
-        found = z.copy()
+        edge = z.copy()
         for part in parts:
-            found[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
-        return found
+            edge[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
+        return edge
 
-    def _laid_rows(self, part: LaidPart, z: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
+    def _compute_laid_rows(self, part: LaidPart, z: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
         """Return unknowns, residual and its derivatives (9, 9) of an element that lies on an obstacle.
 
         They are x, y and rotation of both ends, the tension, and a force that is none; the places are held.
         """
         mesh = self.mesh
-        own = mesh.elements.unknowns[part.element]
+        indices = mesh.elements.unknowns[part.element]
         item: Any = part.contact.item
         fitted, section = mesh.fits[item.beam], mesh.fits.network.beams[item.beam].section
         cuts = mesh.elements.cuts[part.element] if mesh.moving is None else self._cuts_of(part.element, z)
@@ -162,11 +164,13 @@ class SlidingEquations(NumpyEquations):
         )
         axial = float(self.mesh.axial[part.element, 0])
         moment, length = rigidity * (part.curvature - bend), float(cuts[1] - cuts[0]) * speed
-        unknowns = np.array([own[0], own[1], own[3], own[4], own[5], own[7], own[-2], own[-1]])
-        angle = rest + z[own[[3, 7]]]
+        unknowns = np.array(
+            [indices[0], indices[1], indices[3], indices[4], indices[5], indices[7], indices[-2], indices[-1]]
+        )
+        angle = rest + z[indices[[3, 7]]]
         along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        tension, idle = z[own[-2]], z[own[-1]]
+        tension, idle = z[indices[-2]], z[indices[-1]]
         ends = mesh.elements.ends[part.element]
         if part.curvature:
             reach = (angle[1] - angle[0]) / part.curvature
@@ -203,18 +207,18 @@ class SlidingEquations(NumpyEquations):
         angle = slope[0] + float(z[turn])
         along = np.array([np.cos(angle), np.sin(angle)])
         across = np.array([-along[1], along[0]])
-        found = item.outline.distance(place * length)  # type: ignore[union-attr]
-        normal = np.asarray(found.normal, float)
+        edge = item.outline.distance(place * length)  # type: ignore[union-attr]
+        normal = np.asarray(edge.normal, float)
         sideways = np.array([normal[1], -normal[0]])
-        bulge = float(found.curvature) * length * np.outer(sideways, sideways)
+        bulge = float(edge.curvature) * length * np.outer(sideways, sideways)
         rises = float(normal @ across)
         hessian = np.zeros((3, 3))
         hessian[:2, :2] = bulge
         curvature = self._curvature(contact, z, bend) * rises + float(along @ bulge @ along)
         return SideAt(
-            float(found.value) / length - radius, float(normal @ along) - taper, np.append(normal, 0.0),
+            float(edge.value) / length - radius, float(normal @ along) - taper, np.append(normal, 0.0),
             np.append(bulge @ along, rises), hessian, (-taper * slope[2], rises * slope[1]), [x, y, turn], curvature,
-            rises, float(found.curvature) * length,
+            rises, float(edge.curvature) * length,
         )  # fmt: skip
 
     def _beam_at(self, contact: ContactAt, parameter: float) -> tuple[tuple[float, float, float], float, float, float]:
@@ -232,13 +236,13 @@ class SlidingEquations(NumpyEquations):
 
     def _curvature(self, contact: ContactAt, z: FloatArray, unloaded: float) -> float:
         """Return the curvature of the loaded beam at a contact: the mean of both elements that meet there."""
-        e, found = self.plain.mesh.elements, list[float]()
+        e, curvatures = self.plain.mesh.elements, list[float]()
         columns = [3, 7, *range(8, self.mesh.degree + 7)]
         for number, end in ((contact.element, 1.0), (contact.element + 1, 0.0)):
             if e.length[number]:  # else it lies on the obstacle
                 slopes = shape_functions(self.mesh.degree, np.array([end]))[1][0]
-                found.append(float(slopes @ z[e.unknowns[number, columns]]) / float(e.length[number]))
-        return unloaded + sum(found) / max(len(found), 1)
+                curvatures.append(float(slopes @ z[e.unknowns[number, columns]]) / float(e.length[number]))
+        return unloaded + sum(curvatures) / max(len(curvatures), 1)
 
     # -- equations -----------------------------------------------------------------------------------------------------
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
@@ -247,12 +251,12 @@ class SlidingEquations(NumpyEquations):
         n, z = self.n, np.asarray(self.values(free, way))
         moved = mesh.base if self.ramp else mesh.rate
         sides = self._sides
-        places = z[[one.slide for one in sides]]
+        places = z[[contact.slide for contact in sides]]
         if not self.move_to(places):
             return LinearEquations(np.full(n, np.nan), np.eye(n), np.zeros(n))
-        laid = self.laid_parts(z)
+        laid = self.find_laid_parts(z)
         self._lay(laid)
-        bare = self._without_tension(z, laid)[mesh.free][:count]
+        bare = self._drop_tension(z, laid)[mesh.free][:count]
         at = plain.linearise(bare, way)
         residual, change, tangent = np.zeros(n), np.zeros(n), np.zeros((n, n))
         residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
@@ -269,30 +273,30 @@ class SlidingEquations(NumpyEquations):
                 residual[force], tangent[force, force], tangent[place, place] = -free[force], -1.0, 1.0
                 continue
             side, value = self.side_at(contact, z), float(z[contact.unknown])
-            own = slots[side.unknowns]
-            residual[own] -= value * side.gap_row
-            tangent[np.ix_(own, own)] -= value * side.hessian
-            tangent[own, force] -= side.gap_row
+            indices = slots[side.unknowns]
+            residual[indices] -= value * side.gap_row
+            tangent[np.ix_(indices, indices)] -= value * side.hessian
+            tangent[indices, force] -= side.gap_row
             residual[force], residual[place] = -side.gap, side.tangency
-            tangent[force, own] -= side.gap_row
-            tangent[place, own] += side.tangency_row
+            tangent[force, indices] -= side.gap_row
+            tangent[place, indices] += side.tangency_row
             tangent[force, place], tangent[place, place] = -side.by_place[0], side.by_place[1]
-            tangent[:count, place] += self._by_place(bare, way, z, number, laid)
-            rows.append((own, -side.gap_row, 0.0))
+            tangent[:count, place] += self._differentiate_by_place(bare, way, z, number, laid)
+            rows.append((indices, -side.gap_row, 0.0))
             bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
-            rows.append((own, side.tangency_row, stiffness))
+            rows.append((indices, side.tangency_row, stiffness))
         self.move_to(places)
         return LinearEquations(residual, tangent, change, self._frozen(tangent, rows, laid, z), len(laid))
 
     def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
         """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
-        own = self.mesh.elements.unknowns[part.element]
-        inner = self.slots[own[8:]]
-        residual[inner] = z[own[8:]]
+        indices = self.mesh.elements.unknowns[part.element]
+        inner = self.slots[indices[8:]]
+        residual[inner] = z[indices[8:]]
         tangent[inner], tangent[:, inner] = 0.0, 0.0
         tangent[inner, inner] = 1.0
-        unknowns, rows, slopes = self._laid_rows(part, z)
+        unknowns, rows, slopes = self._compute_laid_rows(part, z)
         slots = self.slots[unknowns]
         held = slots < 0
         residual[slots[6]] = tangent[slots[6], slots[6]] = 0.0
@@ -320,25 +324,27 @@ class SlidingEquations(NumpyEquations):
                 continue
             term = press(self.mesh, contact, z)
             slots = self.slots[term.unknowns]
-            own = slots >= 0
-            pushed = slots[own]
-            residual[pushed] += term.gradient[own]
-            tangent[np.ix_(pushed, pushed)] += term.hessian[np.ix_(own, own)]
-            change[pushed] += term.hessian[own] @ moved[term.unknowns]
-            rows.append((pushed[pushed != slot], term.hessian[-1, :-1][own[:-1]], float(term.hessian[-1, -1])))
+            indices = slots >= 0
+            pushed = slots[indices]
+            residual[pushed] += term.gradient[indices]
+            tangent[np.ix_(pushed, pushed)] += term.hessian[np.ix_(indices, indices)]
+            change[pushed] += term.hessian[indices] @ moved[term.unknowns]
+            rows.append((pushed[pushed != slot], term.hessian[-1, :-1][indices[:-1]], float(term.hessian[-1, -1])))
 
-    def _by_place(self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]) -> FloatArray:
+    def _differentiate_by_place(
+        self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]
+    ) -> FloatArray:
         """Return the change of the residuals without contacts with one of the places."""
         sides, unknown = [], self._sides[number].slide
         for step in (PLACE_STEP, -PLACE_STEP):
             beside = z.copy()
             beside[unknown] += step
-            if not self.move_to(beside[[one.slide for one in self._sides]]):
+            if not self.move_to(beside[[contact.slide for contact in self._sides]]):
                 return np.full(len(free), np.nan)
             self._lay(laid)
             residual = np.array(self.plain.linearise(free, way).residual)
             for part in laid:
-                unknowns, rows, _ = self._laid_rows(part, beside)
+                unknowns, rows, _ = self._compute_laid_rows(part, beside)
                 slots = self.slots[unknowns]
                 residual[slots[6:]] = 0.0
                 residual[slots[slots >= 0]] += rows[slots >= 0]
@@ -356,7 +362,7 @@ class SlidingEquations(NumpyEquations):
         whole = np.zeros((count + len(rows), count + len(rows)))
         whole[:count, :count] = tangent[:count, :count]
         for part in laid:
-            unknowns, _, slopes = self._laid_rows(part, z)
+            unknowns, _, slopes = self._compute_laid_rows(part, z)
             slots = self.slots[unknowns]
             some = slots >= 0
             whole[np.ix_(slots[some], slots[some])] -= slopes[np.ix_(some, some)]
@@ -366,9 +372,9 @@ class SlidingEquations(NumpyEquations):
             whole[slots[6], slots[6]] += slopes[6, 6]
             whole[slots[7], slots[7]] = 1.0
         motions = np.flatnonzero(self.plain.mesh.free < self.mesh.n_motions)
-        whole[motions, motions] += NEUTRAL
-        for number, (own, row, pivot) in enumerate(rows, start=count):
-            whole[number, own] = whole[own, number] = row
+        whole[motions, motions] += NEUTRAL_STIFFNESS
+        for number, (indices, row, pivot) in enumerate(rows, start=count):
+            whole[number, indices] = whole[indices, number] = row
             whole[number, number] = pivot
         return whole
 
@@ -404,12 +410,12 @@ class SlidingEquations(NumpyEquations):
 
     def evaluate_gradient(self, z: FloatArray, drive: float, share: float = 1.0) -> FloatArray:
         """Return the gradient of one state by all unknowns; that by places is zero."""
-        self.move_to(z[[one.slide for one in self._sides]])
-        laid = self.laid_parts(z)
+        self.move_to(z[[contact.slide for contact in self._sides]])
+        laid = self.find_laid_parts(z)
         self._lay(laid)
-        total = np.array(self.plain.evaluate(self._without_tension(z, laid), drive, share)[0])
+        total = np.array(self.plain.evaluate(self._drop_tension(z, laid), drive, share)[0])
         for part in laid:
-            unknowns, rows, _ = self._laid_rows(part, z)
+            unknowns, rows, _ = self._compute_laid_rows(part, z)
             total[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
             np.add.at(total, unknowns, rows)
         for contact in self.mesh.contacts:
@@ -425,4 +431,4 @@ class SlidingEquations(NumpyEquations):
         return total
 
 
-_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")
+MOVED_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")

@@ -268,18 +268,22 @@ class _ArrayBuilder:
             for k, (number, place) in enumerate(touching)
         )
         contacts += self._flank_contacts(flanks, elements, size + len(contacts))
-        acting = [*springs, *loads, *(Attached(one.item, (one.place,)) for one in contacts)]
+        acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
         free, base, rate = self._constraints(size, elements, attachments, acting)
         if contacts:
-            sides = [one for one in contacts if one.slide >= 0]
-            more = [one.unknown for one in contacts] + [one.slide for one in sides] + [one.flag for one in sides]
+            sides = [contact for contact in contacts if contact.slide >= 0]
+            more = (
+                [contact.unknown for contact in contacts]
+                + [contact.slide for contact in sides]
+                + [contact.flag for contact in sides]
+            )
             size += len(more)
             free = np.append(free, more)
             base, rate = (np.append(values, np.zeros(len(more))) for values in (base, rate))
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
             self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension, contacts,
-            join_cut_laws(laws, elements.beam, [(one.item.beam, one.slide) for one in contacts if one.slide >= 0])  # type: ignore[union-attr]
+            join_cut_laws(laws, elements.beam, _sides(contacts))
             if flanks
             else None,
         )  # fmt: skip
@@ -462,6 +466,12 @@ class _ArrayBuilder:
             unknown = self.bodies[node][local % FRAME_OF_DRIVE]
             held[unknown], rate[unknown], base[unknown] = True, sense, 0.0
         return np.flatnonzero(~held), base, rate
+
+
+def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:
+    """Return beam and unknown place of each contact of a side."""
+    sides: Any = [contact for contact in contacts if contact.slide >= 0]
+    return [(contact.item.beam, contact.slide) for contact in sides]
 
 
 def _direction(angle: Any) -> Any:

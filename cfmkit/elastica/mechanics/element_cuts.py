@@ -1,4 +1,4 @@
-"""Where the beams of a network are cut into elements: at marks, at layers of taut ones, at places of contacts."""
+"""Cuts of beams into elements: at marks, at layers of taut ones, at places of contacts."""
 
 from __future__ import annotations
 
@@ -65,20 +65,20 @@ def find_moving_cuts(beam: Beam, fitted: Fit, places: Sequence[float]) -> CutLaw
     even = [k / count for k in range(1, count + 1)]
     fixed, shares = [ends[0][1]], [ends[0][2]]
     for (_, *low), (_, *high) in itertools.pairwise(ends):
-        for own, (start, end) in zip((fixed, shares), zip(low, high, strict=True), strict=True):
-            own.extend(start + share * (end - start) for share in even)
+        for columns, (start, end) in zip((fixed, shares), zip(low, high, strict=True), strict=True):
+            columns.extend(start + share * (end - start) for share in even)
     return CutLaw(np.concatenate(fixed), np.concatenate(shares))
 
 
 def join_cut_laws(laws: Mapping[str, CutLaw], beams: tuple[str, ...], sides: Sequence[tuple[str, int]]) -> MovingCuts:
-    """Return the moving ends of the elements of all beams; `sides` are the beam and the unknown place of each contact."""
+    """Return the moving ends of the elements of all beams; `sides` are beam and unknown place of each contact."""
     rows, fixed, shares = [], [], []
     for name, law in laws.items():
         mine = [k for k, (beam, _) in enumerate(sides) if beam == name]
-        own = [number for number, beam in enumerate(beams) if beam == name]
+        columns = [number for number, beam in enumerate(beams) if beam == name]
         spread = np.zeros((len(law.fixed), len(sides)))
         spread[:, mine] = law.shares
-        rows += own
+        rows += columns
         fixed.append(np.stack([law.fixed[:-1], law.fixed[1:]], axis=1))
         shares.append(np.stack([spread[:-1], spread[1:]], axis=1))
     return MovingCuts(np.array(rows), np.concatenate(fixed), np.concatenate(shares), [unknown for _, unknown in sides])

@@ -94,7 +94,7 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(KNOWN) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None:
-            mesh.known[key] = SlidingEquations.of(mesh, ramp, equations)
+            mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif mesh.contacts:
             mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(without_contacts(mesh), ramp))
         else:

@@ -20,24 +20,24 @@ if TYPE_CHECKING:
 PLACE_STEP = 1e-6  # of a beam's parameter, by which is differentiated
 
 
-def moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
+def compute_moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
     """Return the tables of the elements in `mesh.moving`, (..., r, q), with contacts at some places (..., k)."""
     moving = mesh.moving
     assert moving is not None
     cuts = moving.fixed + np.einsum("rck,...k->...rc", moving.shares, places)
     wide = mesh.elements.curl is not None
-    found: dict[str, Any] = {}
+    tables_by_name: dict[str, Any] = {}
     for rows, beam, inside in _parts(mesh):
         fitted, section = mesh.fits[beam], mesh.fits.network.beams[beam]
         tables = smooth_tables(section, fitted, mesh.scales, mesh.degree, cuts[..., rows, :], inside, wide)
         for name, values in tables.items():
             inner = values.shape[len(cuts.shape) - 1 :]
-            table = found.setdefault(name, np.empty((*cuts.shape[:-1], *inner)))
+            table = tables_by_name.setdefault(name, np.empty((*cuts.shape[:-1], *inner)))
             table[(..., rows, *(slice(None),) * len(inner))] = values
     floor = mesh.floor[moving.elements]
     if floor.any():
-        found["axial"] = found["axial"] + floor[:, None]
-    return found | {"moved_cuts": cuts}
+        tables_by_name["axial"] = tables_by_name["axial"] + floor[:, None]
+    return tables_by_name | {"moved_cuts": cuts}
 
 
 def with_places(mesh: Discretisation, z: Any) -> Discretisation:
@@ -49,12 +49,12 @@ def move_elements(mesh: Discretisation, z: Any) -> BeamElements:
     """Return the elements with contacts at their places in states (..., size)."""
     e, moving = mesh.elements, mesh.moving
     assert moving is not None
-    moved = moved_tables(mesh, z[..., moving.places])
+    moved = compute_moved_tables(mesh, z[..., moving.places])
     changed: dict[str, Any] = {}
     for name, values in moved.items():
-        own = e.cuts if name == "moved_cuts" else getattr(e, name)
+        table_at_rest = e.cuts if name == "moved_cuts" else getattr(e, name)
         rank = 1 if name == "length" else 2
-        first = own.reshape(-1, *own.shape[-rank:])[0]
+        first = table_at_rest.reshape(-1, *table_at_rest.shape[-rank:])[0]
         whole = np.broadcast_to(first, (*z.shape[:-1], *first.shape)).copy()
         whole[(..., moving.elements, *(slice(None),) * (rank - 1))] = values
         changed[name] = whole
@@ -71,13 +71,13 @@ def _parts(mesh: Discretisation) -> list[tuple[Any, str, float]]:
     """Return rows of `mesh.moving` in each smooth part of each beam, its name and a place inside the part."""
     if _parts not in mesh.known:
         assert mesh.moving is not None
-        numbers, found = np.asarray(mesh.moving.elements), []
+        numbers, parts = np.asarray(mesh.moving.elements), []
         for beam in dict.fromkeys(mesh.elements.beam[number] for number in numbers):
             middles = mesh.elements.cuts[numbers].mean(axis=1)
-            own = np.array([mesh.elements.beam[number] == beam for number in numbers])
+            of_beam = np.array([mesh.elements.beam[number] == beam for number in numbers])
             for begin, end in itertools.pairwise(smooth_marks(mesh.fits.network.beams[beam], mesh.fits[beam])):
-                rows = np.flatnonzero(own & (begin <= middles) & (middles < end))
+                rows = np.flatnonzero(of_beam & (begin <= middles) & (middles < end))
                 if len(rows):
-                    found.append((rows, beam, 0.5 * (begin + end)))
-        mesh.known[_parts] = found
+                    parts.append((rows, beam, 0.5 * (begin + end)))
+        mesh.known[_parts] = parts
     return mesh.known[_parts]  # type: ignore[no-any-return]

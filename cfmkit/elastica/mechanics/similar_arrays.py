@@ -32,5 +32,5 @@ def discretise_alike(
 
     It has the template's `cuts` if they are given: where they differ by complex steps only.
     """
-    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=cuts)
-    return without_floor(found, np.flatnonzero(found.floored & ~template.floored))
+    arrays = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=cuts)
+    return without_floor(arrays, np.flatnonzero(arrays.floored & ~template.floored))

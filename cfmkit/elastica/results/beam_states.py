@@ -279,12 +279,12 @@ def _lie_down(
     moment = (e.rigidity * e.weight / rule.weights)[..., :1] * change * scales.moment
     force = tension[..., None] * scales.force
     laid = states._replace(turn=turn, h=force * np.cos(angle), v=force * np.sin(angle), moment=moment + 0.0 * turn)
-    own = {name: np.where(lies, getattr(laid, name), getattr(states, name)) for name in ("turn", "h", "v", "moment")}
+    merged = {name: np.where(lies, getattr(laid, name), getattr(states, name)) for name in ("turn", "h", "v", "moment")}
     direction = e.angle + rotation[..., :1] + change * rule.places
     stretch = 1 + e.axial * tension[..., None]
     along = [np.where(lies, stretch * turned, field) for turned, field in
              ((np.cos(direction), fields.slope_x), (np.sin(direction), fields.slope_y))]  # fmt: skip
-    return states._replace(**own), fields._replace(slope_x=along[0], slope_y=along[1])
+    return states._replace(**merged), fields._replace(slope_x=along[0], slope_y=along[1])
 
 
 class _Fields(NamedTuple):

@@ -189,8 +189,8 @@ class EquilibriumPath(ShortRepr):
         """
         mesh = self.mesh
         unit = mesh.scales.moment if self.network.contacts[number].turns else mesh.scales.force
-        own = [contact.unknown for contact in mesh.contacts if contact.number == number]
-        return read_only(self.at.z[:, own].sum(axis=1) * unit)
+        unknowns = [contact.unknown for contact in mesh.contacts if contact.number == number]
+        return read_only(self.at.z[:, unknowns].sum(axis=1) * unit)
 
     def contact_places(self, number: int) -> FloatArray:
         """Return between which places the side of a beam touches at every point, (n, 2) [share of its length].
@@ -198,17 +198,17 @@ class EquilibriumPath(ShortRepr):
         They are the same where it touches at one place, and not a number where it is apart.
         """
         mesh, item = self.mesh, self.network.contacts[number]
-        own = [one for one in mesh.contacts if one.number == number]
-        found = np.full((len(self), 2, max(len(own), 1)), np.nan)
-        for k, one in enumerate(own):
-            side = np.rint(self.at.z[:, one.flag])
-            here = np.reshape(mesh.fits[item.beam].arc(self.at.z[:, one.slide]), (-1,))  # type: ignore[union-attr]
-            closed = self.at.z[:, one.unknown] > 0
-            first, last = own[:1] == [one], own[-1:] == [one]
-            found[:, 0, k] = np.where(closed, np.where((side < 0) & first, 0.0, here), np.nan)
-            found[:, 1, k] = np.where(closed, np.where((side > 0) & last, 1.0, here), np.nan)
-        low = np.where(np.isnan(found[:, 0]), np.inf, found[:, 0]).min(axis=1)
-        high = np.where(np.isnan(found[:, 1]), -np.inf, found[:, 1]).max(axis=1)
+        sides = [contact for contact in mesh.contacts if contact.number == number]
+        places = np.full((len(self), 2, max(len(sides), 1)), np.nan)
+        for k, contact in enumerate(sides):
+            side = np.rint(self.at.z[:, contact.flag])
+            place = np.reshape(mesh.fits[item.beam].arc(self.at.z[:, contact.slide]), (-1,))  # type: ignore[union-attr]
+            closed = self.at.z[:, contact.unknown] > 0
+            first, last = sides[:1] == [contact], sides[-1:] == [contact]
+            places[:, 0, k] = np.where(closed, np.where((side < 0) & first, 0.0, place), np.nan)
+            places[:, 1, k] = np.where(closed, np.where((side > 0) & last, 1.0, place), np.nan)
+        low = np.where(np.isnan(places[:, 0]), np.inf, places[:, 0]).min(axis=1)
+        high = np.where(np.isnan(places[:, 1]), -np.inf, places[:, 1]).max(axis=1)
         apart = ~np.isfinite(low)
         return read_only(np.where(apart[:, None], np.nan, np.stack([low, high], axis=1)))
 

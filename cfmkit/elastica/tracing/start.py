@@ -65,7 +65,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
         return DriveStart(problem, None, (), None, None, None)
     flanks: tuple[FlankPlace, ...] = ()
     for what, change in ramps:
-        ramp = _changed(change, mesh if remesh is None or not flanks else remesh(flanks), remesh)
+        ramp = _make_ramp(change, mesh if remesh is None or not flanks else remesh(flanks), remesh)
         options = Options(
             1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
         )
@@ -77,8 +77,12 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
                 continue
             if isinstance(item, Remeshed):
                 touching = item.problem.mesh
-                flanks = tuple(FlankPlace(one.number, float(touching.elements.cuts[one.element, 1]), one.laid)
-                               for one in touching.contacts if one.slide >= 0)  # fmt: skip
+                cuts = touching.elements.cuts
+                flanks = tuple(
+                    FlankPlace(contact.number, float(cuts[contact.element, 1]), contact.laid)
+                    for contact in touching.contacts
+                    if contact.slide >= 0
+                )
                 continue
             if isinstance(item, PathEvent):
                 if control.branch != "primary" and item.before != item.after:  # nothing is lost on a path straight on
@@ -120,7 +124,7 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
         yield "constant loads", (_loads_as_drive, False)
 
 
-def _changed(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:
+def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:
     """Return the problem along what is constant."""
     alter, ramp = change
     own = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
@@ -171,11 +175,11 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     if problem.remesh is not None:
         beams, remesh = {mesh.elements.beam[number] for number in needless.tolist()}, problem.remesh
 
-        def stiffened(flanks: tuple[FlankPlace, ...]) -> Discretisation:
+        def remesh_stiff(flanks: tuple[FlankPlace, ...]) -> Discretisation:
             found = remesh(flanks)
             return without_floor(found, [k for k, name in enumerate(found.elements.beam) if name in beams])
 
-        stiff = replace(stiff, remesh=stiffened)
+        stiff = replace(stiff, remesh=remesh_stiff)
     return stiff, correct(stiff, at.x, at.drive) or at
 
 

@@ -30,7 +30,7 @@ Fault = tuple[tuple[str | int, ...], str]
 Mechanism = Any
 """The block `mechanism`, which imports this file."""
 OVERLAP = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
-STANDING = ("clamped", "pinned")  # supports of nodes that are held in place
+HELD_SUPPORTS = ("clamped", "pinned")  # supports of nodes that are held in place
 LONGEST_POLYLINE = 200  # corners
 
 
@@ -236,17 +236,17 @@ def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]
     """
     if obstacle.nodes is None and obstacle.beams is None and obstacle.stiffness is not None:
         return free_ends(mechanism)
-    found = dict(obstacle.nodes) if obstacle.nodes is not None else free_ends(mechanism)
+    pads = dict(obstacle.nodes) if obstacle.nodes is not None else free_ends(mechanism)
     for name in sides_of(mechanism, obstacle):
         if name not in mechanism.beams:
             continue
-        beam, given = mechanism.beams[name], mechanism.of_beams("thickness")[name]
+        beam, thickness = mechanism.beams[name], mechanism.of_beams("thickness")[name]
         for node, last in ((beam.start, False), (beam.end, True)):
-            if mechanism.nodes[node].support not in STANDING:
-                half = 0.5 * (given[-1 if last else 0][1] if isinstance(given, tuple) else given)
-                own = found.get(node, 0.0) if obstacle.nodes is None or node not in obstacle.nodes else math.inf
-                found[node] = max(own, half) if math.isfinite(own) else found[node]
-    return found
+            if mechanism.nodes[node].support not in HELD_SUPPORTS:
+                half = 0.5 * (thickness[-1 if last else 0][1] if isinstance(thickness, tuple) else thickness)
+                stated = pads.get(node, 0.0) if obstacle.nodes is None or node not in obstacle.nodes else math.inf
+                pads[node] = max(stated, half) if math.isfinite(stated) else pads[node]
+    return pads
 
 
 def free_ends(mechanism: Mechanism) -> dict[str, float]:
@@ -312,8 +312,8 @@ def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str 
     for name in sides_of(mechanism, obstacle):
         if name not in mechanism.beams:
             continue
-        given = thickness[name]
-        most = max(value for _, value in given) if isinstance(given, tuple) else given
+        profile = thickness[name]
+        most = max(value for _, value in profile) if isinstance(profile, tuple) else profile
         if outline.smallest_hollow <= 0.5 * most:
             yield (
                 place,

@@ -257,11 +257,11 @@ def _touching_side(solution: Solution, ax: Axes, number: int, poses: list[int]) 
         if np.isnan(touching[point, 0]):
             continue
         along = path.places(contact.beam)
-        own = along[point] if along.ndim > 1 else along
+        sampled = along[point] if along.ndim > 1 else along
         line = path.shape(contact.beam, point)
         first, last = touching[point].tolist()
         shares = np.linspace(first, last, 2 + 30 * int(last > first))
-        places = np.column_stack([np.interp(shares, own, line[:, k]) for k in (0, 1)])
+        places = np.column_stack([np.interp(shares, sampled, line[:, k]) for k in (0, 1)])
         for image, copy in enumerate(_both(solution, [places])):
             gid = f"side-{number}-{pose}-{image}"
             if np.ptp(shares) > 0:
