@@ -151,7 +151,7 @@ class PieceOfPath:
         """Return an equilibrium without the forces of open contacts."""
         return at._replace(x=at.x[self.own_mask], rate=at.rate[self.own_mask])
 
-    def spread(self, values: Any) -> Any:
+    def expand(self, values: Any) -> Any:
         """Return values of the own unknowns among those of all, zero for the others."""
         spread_values = np.zeros((len(self.own_mask), *np.shape(values)[1:]))
         spread_values[self.own_mask] = values
@@ -159,13 +159,13 @@ class PieceOfPath:
 
     def grow(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium with the forces of all contacts."""
-        return at._replace(x=self.spread(at.x), rate=self.spread(at.rate))
+        return at._replace(x=self.expand(at.x), rate=self.expand(at.rate))
 
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
         start = None if event.near is None else self.grow(event.near)
-        modes = None if event.modes is None else self.spread(event.modes)
+        modes = None if event.modes is None else self.expand(event.modes)
         return replace(event, near=start, modes=modes, within=within)
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
@@ -211,7 +211,7 @@ class PieceOfPath:
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
         whole, kept, n_samples = self.whole, self.own_mask, FEWEST_SAMPLES + 1
-        x, rate = (self.spread(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
+        x, rate = (self.expand(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
         drive = np.array([at.drive for at in states])
         width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
         moved = np.abs(chord[:, whole.motions]).max(axis=1)

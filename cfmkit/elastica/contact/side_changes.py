@@ -272,11 +272,13 @@ def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath,
 def _find(beyond: PieceOfPath, condition: SideCondition, wanted: tuple[str, bool]) -> int:
     """Return the row of a condition on the same side."""
     kind, last = wanted
-    count = len(beyond.whole.mesh.contacts)
-    return count + next(
-        k for k, contact in enumerate(beyond.sides.all)
-        if contact.kind == kind and contact.item is condition.item and (kind not in ("tangent", "wraps") or contact.last == last)
-    )  # fmt: skip
+    sided = kind in ("tangent", "wraps")
+    rows = (
+        k
+        for k, row in enumerate(beyond.sides.all)
+        if row.kind == kind and row.item is condition.item and not (sided and row.last != last)
+    )
+    return len(beyond.whole.mesh.contacts) + next(rows)
 
 
 def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquilibrium | None:

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
-from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
+from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.section import Taper
 
@@ -61,7 +61,7 @@ class Stage(NamedTuple):
 def side_states(mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> SideStates:
     """Return the states at fractions (k,) of elements (m,) in n states (n, size); contacts stand at their places."""
     moved = with_places(mesh, z)
-    whole, rule, at = moved.elements, basis(mesh.degree), _matrices(mesh.degree, tuple(fractions.tolist()))
+    whole, rule, at = moved.elements, basis(mesh.degree), _rows_at(mesh.degree, fractions)
     fields = energy.fields(moved, z, *stage)
     rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
     speed = np.broadcast_to(whole.weight, (len(z), *whole.weight.shape[-2:]))[:, elements] / rule.weights
@@ -81,18 +81,12 @@ def side_states(mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any
     )
 
 
-class _AtFractions(NamedTuple):
+class _RowsAtPlaces(NamedTuple):
+    """Matrices from an element's unknowns, and values at its Gauss points, to places on it."""
+
     values: FloatArray
     integrals: FloatArray
     interpolation: FloatArray
-
-
-@lru_cache(maxsize=64)
-def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
-    rule, ends = basis(degree), np.array(fractions)
-    return _AtFractions(
-        shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
-    )
 
 
 @lru_cache(maxsize=64)
@@ -102,7 +96,7 @@ def _series_matrix(degree: int) -> FloatArray:
     return read_only(np.linalg.inv(legendre.legvander(2 * places - 1, len(places) - 1)))
 
 
-def _rows_at(degree: int, places: FloatArray) -> _AtFractions:
+def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
     """Return the matrices at any places, (n, ...): shapes, integrals from values at Gauss points, interpolation."""
     series = _series_matrix(degree)
     x, count = 2 * places - 1, len(series)
@@ -113,7 +107,7 @@ def _rows_at(degree: int, places: FloatArray) -> _AtFractions:
     shapes[:, 0], shapes[:, 1] = (1 - x) / 2, (1 + x) / 2
     order = np.arange(2, degree + 1)
     shapes[:, 2:] = (polynomials[:, 2 : degree + 1] - polynomials[:, : degree - 1]) / np.sqrt(4 * order - 2)
-    return _AtFractions(shapes, primitives @ series / 2, polynomials[:, :count] @ series)
+    return _RowsAtPlaces(shapes, primitives @ series / 2, polynomials[:, :count] @ series)
 
 
 class LeastGap(NamedTuple):
@@ -199,7 +193,9 @@ class SideGaps:
         )
         for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
             if value + self.slack[number] <= best:
-                indices = self._measure_at(z[None], stage, int(self.elements[number]), np.array([fraction]))
+                indices = self._measure_at(
+                    self._on_element(z[None], stage, int(self.elements[number])), np.array([fraction])
+                )
                 best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
         return least
 
@@ -226,10 +222,11 @@ class SideGaps:
         value, best = np.full(len(a), np.inf), 0.5 * (a + b)
         for row in np.unique(dips.row).tolist():
             indices = np.flatnonzero(dips.row == row)
+            chosen = dips.state[indices]
+            states = self._on_element(z[chosen], stage.take(chosen), int(self.elements[row]))
             for _ in range(N_ROUNDS):
                 middle = b[indices] - high[indices] * (b[indices] - a[indices]) / (high[indices] - low[indices])
-                states = dips.state[indices]
-                seen = self._measure_at(z[states], stage.take(states), int(self.elements[row]), middle)
+                seen = self._measure_at(states, middle)
                 value[indices], best[indices] = seen.gap, middle
                 if np.abs(seen.slope).max() < SLOPE_LEVEL:
                     break
@@ -239,28 +236,47 @@ class SideGaps:
                 a[indices], b[indices] = np.where(below, middle, a[indices]), np.where(below, b[indices], middle)
         return value, best
 
-    def _measure_at(self, z: FloatArray, stage: Stage, element: int, fraction: FloatArray) -> _Beside:
-        """Return gap, slope and parameter at one place of an element in each of n states."""
+    def _on_element(self, z: FloatArray, stage: Stage, element: int) -> _ElementStates:
+        """Return what gaps at places of an element are made of, in n states."""
         moved = with_places(self.mesh, z)
-        e, rule, count = moved.elements, basis(self.mesh.degree), len(z)
+        e, count = moved.elements, len(z)
         fields = energy.fields(moved, z, *stage)
-        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / rule.weights
-        values, upto, through = _rows_at(self.mesh.degree, fraction)
-        start = poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0]
-        x = start[:, 0] + (fields.slope_x[:, element] * speed * upto).sum(axis=1)
-        y = start[:, 1] + (fields.slope_y[:, element] * speed * upto).sum(axis=1)
-        rotation = z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)]
-        turn = (rotation * values).sum(axis=1)
-        rest = np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element]
-        angle = (rest * through).sum(axis=1) + turn
+        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / basis(self.mesh.degree).weights
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
-        cuts = np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element]
-        parameter = cuts[:, 0] + (cuts[:, 1] - cuts[:, 0]) * fraction
+        return _ElementStates(
+            element,
+            poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
+            fields.slope_x[:, element] * speed,
+            fields.slope_y[:, element] * speed,
+            z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)],
+            np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element],
+            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element],
+        )
+
+    def _measure_at(self, states: _ElementStates, fraction: FloatArray) -> _Beside:
+        """Return gap, slope and parameter at one place of an element in each of n states."""
+        values, upto, through = _rows_at(self.mesh.degree, fraction)
+        x = states.start[:, 0] + (states.x * upto).sum(axis=1)
+        y = states.start[:, 1] + (states.y * upto).sum(axis=1)
+        angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
+        parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
         length = self.mesh.scales.length
         edge = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
         slope = edge.normal[:, 0] * np.cos(angle) + edge.normal[:, 1] * np.sin(angle)
-        slope = slope - self._taper(parameter, element)
-        return _Beside(edge.value / length - self.half_thickness(parameter, element), slope, parameter)
+        slope = slope - self._taper(parameter, states.element)
+        return _Beside(edge.value / length - self.half_thickness(parameter, states.element), slope, parameter)
+
+
+class _ElementStates(NamedTuple):
+    """One element in n states: its start, slopes of its line and angle at Gauss points, rotation, cuts."""
+
+    element: int
+    start: FloatArray  # (n, 2)
+    x: FloatArray  # (n, q)
+    y: FloatArray
+    rotation: FloatArray  # (n, degree + 1)
+    angle: FloatArray  # (n, q) unloaded
+    cuts: FloatArray  # (n, 2)
 
 
 class _Dips(NamedTuple):
