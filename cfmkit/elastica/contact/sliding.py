@@ -38,6 +38,13 @@ NEUTRAL_STIFFNESS = (
 SMALLEST_FORCE = 1e-12  # of a contact that begins, in the curvature of its gap over its force
 
 
+class LinearisedSides(LinearEquations):
+    """The equations at some unknowns, and what their stability is counted from."""
+
+    frozen: FloatArray  # (m, m) symmetric, with places of contacts held
+    n_laid: int  # elements that lie on obstacles: each has one force
+
+
 class LaidPart(NamedTuple):
     """An element that lies on an obstacle: which, where it does, and the curvature that it takes on."""
 
@@ -253,7 +260,9 @@ class SlidingEquations(NumpyEquations):
         sides = self._sides
         places = z[[contact.slide for contact in sides]]
         if not self.move_to(places):
-            return LinearEquations(np.full(n, np.nan), np.eye(n), np.zeros(n))
+            nowhere = LinearisedSides(np.full(n, np.nan), np.eye(n), np.zeros(n))
+            nowhere.frozen, nowhere.n_laid = np.eye(n), 0
+            return nowhere
         laid = self.find_laid_parts(z)
         self._lay(laid)
         bare = self._drop_tension(z, laid)[mesh.free][:count]
@@ -287,7 +296,9 @@ class SlidingEquations(NumpyEquations):
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
             rows.append((indices, side.tangency_row, stiffness))
         self.move_to(places)
-        return LinearEquations(residual, tangent, change, self._frozen(tangent, rows, laid, z), len(laid))
+        at = LinearisedSides(residual, tangent, change)
+        at.frozen, at.n_laid = self._frozen(tangent, rows, laid, z), len(laid)
+        return at
 
     def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
         """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
@@ -382,11 +393,11 @@ class SlidingEquations(NumpyEquations):
         """Return the number of unstable directions at a held drive, with places of contacts held."""
         from scipy.linalg import lapack
 
-        assert at.frozen is not None
+        assert isinstance(at, LinearisedSides)
         factors, pivots, _ = lapack.dsytrf(at.frozen, lower=1)
         single = pivots > 0
         negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
-        forces = int((self.plain.mesh.free >= self.mesh.n_motions).sum()) - at.laid
+        forces = int((self.plain.mesh.free >= self.mesh.n_motions).sum()) - at.n_laid
         return negative - forces - (len(at.frozen) - self.plain.n)
 
     # -- gradients -----------------------------------------------------------------------------------------------------

@@ -54,8 +54,6 @@ class LinearEquations(NamedTuple):
     residual: FloatArray
     tangent: FloatArray
     change: FloatArray
-    frozen: FloatArray | None = None  # (m, m) tangent with places of contacts held, whose inertia counts; None: tangent
-    laid: int = 0  # elements that lie on obstacles, each with one force
 
 
 class MarchState(NamedTuple):

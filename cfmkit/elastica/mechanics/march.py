@@ -160,7 +160,7 @@ class CompiledEquations(NumpyEquations):
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
-        self.code.linearise(self.row, np.ascontiguousarray(free, float), *out[:3], way)
+        self.code.linearise(self.row, np.ascontiguousarray(free, float), *out, way)
         return out
 
     def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
