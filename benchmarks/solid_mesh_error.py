@@ -5,7 +5,7 @@ stress at five poses are compared with those on a mesh of twice as many elements
 corners and ends of clamps were split five times and then all once more; it shares neither the size nor the estimate of
 the analysis. Printed are the errors, the bars, and how many bars contain the error. References are kept in
 `solid_mesh_references.json` for the outlines of today; ``--references`` computes them again (ten minutes), ``--write``
-puts the table into docs/solid.md, ``--only thick`` takes the parts with that word in their names.
+puts the table into benchmarks/RESULTS.md, ``--only thick`` takes the parts with that word in their names.
 """
 
 from __future__ import annotations
@@ -262,7 +262,7 @@ def part_target() -> float:
 def main() -> None:
     """Print the table, and write it where that is required."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--write", action="store_true", help="into docs/solid.md")
+    parser.add_argument("--write", action="store_true", help="into benchmarks/RESULTS.md")
     parser.add_argument("--references", action="store_true", help="compute the references again")
     parser.add_argument("--only", default="", help="parts whose name has this in it")
     wanted = parser.parse_args()
@@ -288,7 +288,7 @@ def main() -> None:
     made = table(rows)
     print(made)
     if wanted.write:
-        page = Path("docs/solid.md")
+        page = Path("benchmarks/RESULTS.md")
         text = page.read_text(encoding="utf-8")
         mark = re.escape(MARKS)
         page.write_text(

@@ -190,7 +190,7 @@ def _python() -> str:
     classes = [name for name in names if inspect.isclass(getattr(cfmkit, name))]
     text = (
         "Arrays are read-only and in SI units. Every function takes a specification or the path of its file. "
-        "[Results in Python](../howto.md#use-it-from-python) has examples.\n"
+        "[Results in Python](../python.md) has examples.\n"
     )
     parts = [
         "# Python\n",

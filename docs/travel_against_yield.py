@@ -1,4 +1,4 @@
-"""Print the table of travel against yield in docs/made_parts.md: python docs/travel_against_yield.py [TRAVEL ...].
+"""Print the table of travel against yield in benchmarks/RESULTS.md: python docs/travel_against_yield.py [TRAVEL ...].
 
 The strip of configs/studies/slider_crank_strip_yield.yaml, which bends as that of configs/slider_crank_strip.yaml, is
 designed with margins for several travels [mm]. 99 % is requested, so that the search gives the best that it finds. Its

@@ -194,9 +194,9 @@ PREPOSITIONS = {
     "via", "with", "within", "without",
 }  # fmt: skip
 IRREGULAR_PARTICIPLES = {
-    "begun", "bent", "borne", "bought", "broken", "built", "chosen", "cut", "done", "drawn", "driven", "fallen",
+    "begun", "bent", "borne", "bought", "broken", "built", "chosen", "done", "drawn", "driven", "fallen",
     "felt", "found", "given", "gone", "grown", "heard", "held", "kept", "known", "laid", "left", "lost", "made",
-    "meant", "met", "put", "read", "said", "seen", "set", "shown", "sold", "spent", "split", "spoilt", "stuck",
+    "meant", "met", "said", "seen", "shown", "sold", "spent", "spoilt", "stuck",
     "sunk", "taken", "thought", "thrown", "told", "torn", "turned", "understood", "wound", "written",
 }  # fmt: skip
 PRONOUNS = {
@@ -211,7 +211,9 @@ CONVERSIONS = {
 
 def is_participle(word: str) -> bool:
     """Return True if a word by itself is a participle: ``judged``, ``held``."""
-    return word in IRREGULAR_PARTICIPLES or (len(word) > 4 and word.endswith("ed") and not word.endswith("eed"))
+    return word in IRREGULAR_PARTICIPLES or (
+        len(word) > 4 and word.endswith("ed") and not word.endswith(("eed", "bed"))
+    )
 
 
 def is_property(node: ast.FunctionDef) -> bool:

@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
+from cfmkit.cli.guide import list_terms
 from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.errors import UsageError
 
@@ -74,6 +75,7 @@ BY_NAME = {
     "force_ripple": "a metric",
     "pla": "a material",
     "MPa": "a unit",
+    "envelope": "a term",
     "undercut": "a warning or failure",
     "lan-2010": "a paper",
 }
@@ -91,7 +93,7 @@ def overview() -> Document:
         ("topics", topics, columns),
         ("anything else by its name, such as", by_name, columns),
     )
-    text = "explains one of these; `cfmkit show FAMILY --figure` draws a mechanism with its dimensions named"
+    text = "explains one of these, or a word by its meaning (creep, BOM); `cfmkit show FAMILY --figure` draws a family"
     return _page("cfmkit show", text, sections, {"families": mechanisms, "topics": topics})
 
 
@@ -261,7 +263,7 @@ def _default(key: Record) -> str:
 def found(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
-    for kind, (records, fields) in _KINDS.items():
+    for kind, (records, fields) in KINDS.items():
         every = records()
         if known := [one for key in _keys(kind, name) for one in every.get(key, ())]:
             sections.append((kind, known, fields or SPEC_KEY_FIELDS))
@@ -290,7 +292,7 @@ def _symbols(name: str) -> list[Record]:
 
 def names() -> list[str]:
     """Return every name that `found` knows, but for the paths of keys and symbols."""
-    return [name for records, _ in _KINDS.values() for name in records() if "." not in name]
+    return [name for records, _ in KINDS.values() for name in records() if "." not in name]
 
 
 def references() -> list[dict[str, str]]:
@@ -439,21 +441,18 @@ def _property(item: Mapping[str, Any]) -> str:
     """Return the numbers of a material in words."""
     scatter, strength = item["scatter"], item["yield_strength"]
     reported = [
-        f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_ends(scatter['youngs_modulus'], 1e9)})",
+        f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_range(scatter['youngs_modulus'], 1e9)})",
         f"nu = {item['poisson_ratio']:.4g} ({_spread(scatter['poisson_ratio'])})",
         f"density {item['density']:.4g} kg/m^3 ({_spread(scatter['density'])})",
     ]
     if strength is not None:
-        reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_ends(scatter['yield_strength'], 1e6)})")
+        reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_range(scatter['yield_strength'], 1e6)})")
     return ", ".join(reported)
 
 
-def _ends(ends: Sequence[float], size: float) -> str:
-    return " ... ".join(f"{end / size:.4g}" for end in ends)
-
-
 _ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
-_KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
+KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
+    "terms": (list_terms, (field("name", "word"), field("meaning", wraps=True))),
     "materials": (
         _materials,
         (field("name", "material"), Field("properties", _property, wraps=True), field("source", wraps=True)),

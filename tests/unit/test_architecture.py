@@ -248,8 +248,9 @@ def test_files_and_functions_stay_small():
     assert {name: found for name, found in longest.items() if found[0] > 60} == {}
 
 
-def test_the_page_on_architecture_names_files_that_there_are():
-    page = (ROOT.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["architecture", "extending"])
+def test_the_pages_for_contributors_name_files_that_there_are(name):
+    page = (ROOT.parent / "docs" / f"{name}.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"`([a-z_]+(?:/[a-z_]+)*/[a-z_]+\.py)`", page))
     assert len(shown) > 20
     there = [f"/{path.relative_to(ROOT.parent).as_posix()}" for path in (*SOURCES, *ROOT.parent.glob("t*/**/*.py"))]

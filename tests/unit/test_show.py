@@ -1,7 +1,6 @@
 """`cfmkit show` explains by name whatever a run can print."""
 
 import ast
-import itertools
 import re
 from functools import cache
 from pathlib import Path
@@ -10,7 +9,8 @@ from sources import calls_of
 
 from cfmkit.cli import show_topics
 from cfmkit.experiment.value_definitions import recorded
-from cfmkit.stock.springs.spec import CatalogueSpring, SpringWire
+
+ROOT = Path(__file__).parents[2]
 
 
 @cache
@@ -38,20 +38,11 @@ def test_every_number_of_a_recording_is_explained():
     assert show_topics.found("coverage").data["values"][0]["family"] == "recordings"
 
 
-def table(page, head):
-    """Return the first cells of a table of a page, below a head."""
-    rows = itertools.takewhile(lambda line: line.startswith("|"), page.partition(f"\n{head}:\n\n")[2].splitlines())
-    return [row.split("|")[1] for row in list(rows)[2:]]
-
-
-def test_the_names_that_the_reference_calls_new_are_those_of_the_program():
-    page = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(encoding="utf-8")
-    named = re.findall(r"`([a-z_]+)`", " ".join(table(page, "Numbers")))
-    warnings = re.findall(r"`([a-z_]+)`", page.partition("\nWarnings: ")[2].partition(". ")[0])
-    keys = re.findall(r"`([a-z_.\[\]]+)`", " ".join(table(page, "Keys")))
-    assert len(named) > 20
-    assert len(warnings) == 8
-    assert len(keys) > 10
-    assert {*named, *warnings} - explained() == {"relative_change"}  # a column of changes.csv
-    catalogue = {*CatalogueSpring.model_fields, *SpringWire.model_fields}
-    assert [key for key in keys if key not in catalogue and show_topics.found(key) is None] == []
+def test_the_keys_that_pages_name_are_those_of_the_program():
+    """Those of the changes that are called new, too."""
+    pages = [path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")]
+    pages.append((ROOT / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n### New\n")[2])
+    named = set(re.findall(r"`((?:mechanism|design|analysis)\.[a-z_]+(?:\.[a-z_]+)*)(?=[`:=\[])", "".join(pages)))
+    assert len(named) > 60
+    known = show_topics.KINDS["keys"][0]()
+    assert sorted(key for key in named if key not in known and not key.endswith((".yaml", ".py"))) == []

@@ -538,8 +538,8 @@ def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
 
 
 def test_the_example_of_the_page_is_a_kind_of_leaf():
-    page = (CONFIGS.parent / "docs" / "vcfm.md").read_text(encoding="utf-8")
-    code = page.split("## Adding a kind of leaf or spring")[1].split("```py\n")[1].split("```")[0]
+    page = (CONFIGS.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+    code = page.split("## A kind of leaf or spring")[1].split("```py\n")[1].split("```")[0]
     given = {"Any": Any, "LeafKind": LeafKind, "LeafLaw": LeafLaw, "VBeam": VBeam}
     names: dict[str, Any] = given | {"dataclass": dataclass, "replace": replace, "__name__": __name__}
     exec(code, names)  # the page's own code

@@ -24,9 +24,9 @@ class ShowOptions(Common):
     topic: Annotated[
         str | None,
         argument(
-            "NAME",
-            "What to explain: a family, units, metrics, materials, references, or anything by its name: brace_length, "
-            "pla, MPa; default: list all.",
+            "WORD",
+            "What to explain: a family, units, metrics, materials, references, anything by its name: brace_length, "
+            "pla, MPa, or a word by its meaning: creep, BOM; default: list all.",
             shell_completion.topics,
         ),
     ] = None
@@ -41,17 +41,22 @@ class ShowOptions(Common):
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Document:
-    """Explain a family with every key of its spec; list units, metrics, materials or papers; or explain one by name."""
+    """Explain a family with every key of its spec; list units, metrics, materials or papers; or explain one word."""
+    from cfmkit.cli.show_by_meaning import explain_by_meaning
     from cfmkit.cli.show_topics import explain, skipped
 
     if options.figure is not None:
         return _copy_drawing(options.topic, options.figure)
     try:
-        found = explain(options.topic)
+        answer = explain(options.topic)
     except UsageError:
         _refer_to_help(options.topic)
-        raise
-    return with_skipped_families(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
+        if (by_meaning := explain_by_meaning(options.topic or "")) is None:
+            raise
+        answer = by_meaning
+    if options.topic and set(answer.data) == {"terms"}:
+        answer = explain_by_meaning(options.topic) or answer
+    return with_skipped_families(skipped(options.topic), replace(answer, data={"show": options.topic, **answer.data}))
 
 
 def _refer_to_help(name: str | None) -> None:

@@ -84,7 +84,7 @@ class Stops(Model):
         return self
 
 
-class Envelope(Model):
+class MovingPartSizes(Model):
     """Sizes of the parts that move, for their distances from the plate, its screws and each other."""
 
     brace_width: NonNegativeLength = Field(0.0, description="of a brace, across its length")
@@ -198,7 +198,7 @@ class Mechanism(Model):
     bearings: Bearings | None = Field(None, description="of the rollers: their friction and life")
     guide: Guide | None = Field(None, description="of the slider: its friction")
     stops: Stops | None = Field(None, description="end stops of the slider")
-    envelope: Envelope | None = Field(None, description="sizes of the moving parts, for their clearances")
+    envelope: MovingPartSizes | None = Field(None, description="sizes of the moving parts, for their clearances")
     mounting: Annotated[Mounting, BeforeValidator(_mounting, json_schema_input_type=str | Mounting)] | None = Field(
         None,
         description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; if stated, "

@@ -53,10 +53,10 @@ def expected_forces(result: Result, run: Run) -> str:
     ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(near.middle, low, high, strict=True)]
     expected = [f"{one[0]} ({one[1]} to {one[2]}) at {place}" for one, place in zip(ends, at, strict=True)]
     make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
-    verb = "press" if curve.motion_dimension == "length" else "turn"
+    verb = "displace to" if curve.motion_dimension == "length" else "turn to"
     return (
-        f"{make}, {_to_measure(parts, weight)}, {verb} it to {_listed(at)}, and expect {_listed(expected)}: each range "
-        f"holds for {100 * SHARE:.0f} % of parts {whence}, to first order"
+        f"{make}, {_to_measure(parts, weight)}, {verb} {_listed(at)}, and expect {_listed(expected)}: each range "
+        f"holds for {100 * SHARE:.0f} % of parts {whence} (linear estimate)"
     )
 
 

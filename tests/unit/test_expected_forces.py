@@ -45,14 +45,14 @@ def test_a_travel_to_the_other_side_is_measured_at_its_end_not_at_rest():
     spec = spec.replace({"design": {"rescale": {"width": "10 mm"}, "tolerances": {MODULUS: {"normal": "3 %"}}}})
     result = cfmkit.analyze(spec)
     reported = expected_forces(result, Run())
-    force = float(re.search(r"press it to -1 mm and -2 mm, and expect .* and (-?[\d.]+) N \(.*at -2 mm", reported)[1])
+    force = float(re.search(r"displace to -1 mm and -2 mm, and expect .* and (-?[\d.]+) N \(.*at -2 mm", reported)[1])
     assert force == pytest.approx(result.curve.effort[-1], rel=5e-3)
 
 
 def measured(name, **changes):
     """Return what the sentence says to measure and to determine."""
     spec = cfmkit.load(f"configs/{name}.yaml").replace(changes)
-    return re.search(r"geometry/, (.*), press", expected_forces(cfmkit.analyze(spec), Run())).group(1)
+    return re.search(r"geometry/, (.*), displace to", expected_forces(cfmkit.analyze(spec), Run())).group(1)
 
 
 def test_a_modulus_is_no_dimension_and_takes_no_place_of_one():

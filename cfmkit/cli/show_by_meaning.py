@@ -1,0 +1,97 @@
+"""Answers of `cfmkit show` to a word that is no name: terms and names that mean it, and pages on it."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import chain
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from cfmkit.cli.guide import compile_phrases, look_for, read_terms, search
+from cfmkit.cli.show_topics import KINDS
+from cfmkit.documents.document import Document, Paragraph, field, listed
+
+if TYPE_CHECKING:
+    import re
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from cfmkit.documents.document import Block
+
+KINDS_OF_NAMES = {"metrics": "metric", "values": "metric", "keys": "key", "findings": "warning"}
+"""Kinds of names whose texts are searched, and what one of them is called."""
+
+MAX_NAMES, MAX_PAGES = 14, 5
+"""On the page; the JSON document has all."""
+
+
+class NamedMeaning(NamedTuple):
+    """A name with its kind and meaning, and its rank: 0 for those that the glossary names."""
+
+    rank: int
+    name: str
+    kind: str
+    meaning: str
+
+
+def explain_by_meaning(word: str) -> Document | None:
+    """Return what there is on a word that is a term, a synonym, or part of a definition; None if there is nothing."""
+    targets = look_for(word)
+    named = _names(word, targets) if word.strip() else []
+    matching_terms = [name for name in read_terms() if name == word or name in targets]
+    if not (matching_terms or targets or named):
+        return None
+    meanings = [{"name": name, "meaning": read_terms()[name]} for name in matching_terms]
+    names = [{"name": entry.name, "kind": entry.kind, "meaning": entry.meaning} for entry in named]
+    headings: dict[str, str] = {}
+    for section in search(word):
+        headings.setdefault(section.page, section.heading)
+    pages = [{"page": name, "section": heading} for name, heading in headings.items()]
+
+    def blocks() -> Iterator[Block]:
+        if targets:
+            yield Paragraph("see", ", ".join(targets))
+        meaning = field("meaning", wraps=True)
+        yield from listed("terms", meanings, (field("name", "word"), meaning))
+        yield from listed("names", names[:MAX_NAMES], (field("name", wraps=True), field("kind"), meaning))
+        if (more := len(names) - MAX_NAMES) > 0:
+            yield Paragraph("more", f"{more} names; --json has all")
+        yield from listed("pages", pages[:MAX_PAGES], (field("page", "cfmkit docs"), field("section", wraps=True)))
+
+    return Document({"look_for": [*targets], "terms": meanings, "names": names, "pages": pages}, blocks())
+
+
+def _names(word: str, targets: Sequence[str]) -> list[NamedMeaning]:
+    """Return the names that the glossary gives for a word, then those that it is part of, then those of its meaning.
+
+    Of keys that have one name and meaning in several blocks the shortest path stands for all.
+    """
+    by_target, by_word = compile_phrases(targets or (word,)), compile_phrases((word,))
+    named: dict[tuple[str, str, str], NamedMeaning] = {}
+    for kind, path, meaning in _named_texts():
+        last = path.rpartition(".")[2].removesuffix("[]")
+        ranks = (by_target.fullmatch(last), _is_part(by_word, last), by_word.search(meaning))
+        rank = next((rank for rank, match in enumerate(ranks) if match), None)
+        if rank is not None:
+            present = named.get((kind, last, meaning))
+            if present is None or len(path) < len(present.name):
+                named[kind, last, meaning] = NamedMeaning(rank, path, kind, meaning)
+    return sorted(named.values(), key=lambda entry: entry.rank)
+
+
+def _is_part(word: re.Pattern[str], name: str) -> bool:
+    """Return True if a name has a word in it: ``hysteresis_area`` has ``hysteresis``."""
+    return bool(word.search(name.replace("_", " ")))
+
+
+@cache
+def _named_texts() -> tuple[tuple[str, str, str], ...]:
+    """Return the kind, name (path of a key) and meaning of everything in `KINDS_OF_NAMES`."""
+    return tuple(
+        (singular, *_name_and_meaning(record))
+        for kind, singular in KINDS_OF_NAMES.items()
+        for record in chain.from_iterable(KINDS[kind][0]().values())
+    )
+
+
+def _name_and_meaning(record: Mapping[str, Any]) -> tuple[str, str]:
+    text = record.get("definition") or record.get("meaning") or record.get("description") or ""
+    return str(record.get("path") or record["name"]), str(text)
