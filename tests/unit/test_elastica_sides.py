@@ -273,3 +273,13 @@ def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_
     near[own.slots[mesh.elements.unknowns[0, -2]]] = False  # its curvature is that of the closed gap: exact there
     assert slopes[near] == pytest.approx(at.tangent[near], abs=1e-6)
     assert drum.laid == -1
+
+
+@pytest.mark.parametrize("with_pad", [False, True])
+def test_a_leaf_parallel_to_a_floor_ends_with_the_reason(with_pad):
+    floor = line((0, -HALF), 0.0)
+    pads = (NodeOnObstacle("floor", "tip", floor, HALF),) if with_pad else ()
+    net = leaf(*pads, side("floor", floor), support=guided(np.pi / 2), at=(0.0, 0.1))
+    path = trace(net, Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
+    assert path.status is PathStatus.LOST
+    assert path.message == "beam 'leaf' on 'floor' is met along the whole length at 0.1: no place touches first"

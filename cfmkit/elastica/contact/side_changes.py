@@ -10,31 +10,25 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
-from cfmkit.elastica.contact.side_conditions import NEW_PLACE, ROUNDING_OF_KIND
+from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween, describe
+from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
+from cfmkit.elastica.contact.side_conditions import NEW_PLACE
 from cfmkit.elastica.contact.side_gaps import Stage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import NodeOnObstacle
-from cfmkit.elastica.model.section import Taper
-from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
-    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.side_conditions import SideCondition
-    from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import BeamOnObstacle
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
 N_SECANTS, ZERO_LEVEL = 12, 1e-13
 RATE_STEP = 1e-6  # motion by which rates of conditions are differentiated
 FROM_ROOT, BESIDE_ROOT = 1e-3, 1e-2  # of a beam from a clamped end on the obstacle: what lies there first; a point
-NO_TENSION = 1e-9  # share of a force along an obstacle that is none
-STRAIGHT_TURN = 1e-9  # turn of an unloaded beam that is none [rad]
 BEGINS_TO_LIE = "{names} begins to lie on it along a length at {{place}}: {why}"
+MEETS_WHOLE = "{names} is met along the whole length at {{place}}: no place touches first"
 REACHES_MARK = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
 CONTACTS_MEET = "two contacts of beam {beam!r} meet at {{place}}"
 NO_WAY = "no equilibrium was found behind the change of the contact of {names} at {{place}}"
@@ -49,6 +43,8 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     at = step.bisect(row)
     if at is None:
         return None
+    if condition.kind == "tangent" and _is_parallel(piece, condition, at):
+        return PathStop(WhyStopped.LOST, at.drive, MEETS_WHOLE.format(names=describe(condition.item)))
     if condition.kind == "pinch":
         return PathStop(WhyStopped.LOST, at.drive, CONTACTS_MEET.format(beam=condition.item.beam))
     number = _side_number(piece, condition)
@@ -91,13 +87,17 @@ def _mark(piece: PieceOfPath, condition: SideCondition) -> str:
     return f"a corner or a step of the beam at {condition.mark:.3g} of it"
 
 
-def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: SideCondition) -> ContactChange | None:
+def _locate_touch(
+    piece: PieceOfPath, step: StepBetween, row: int, condition: SideCondition
+) -> ContactChange | PathStop | None:
     """Return where a side begins to touch."""
     share = step.crossing(row)
     if share is None:
         return None
     x, drive = step.at(share)
     guess = step.first._replace(x=x, drive=float(drive))
+    if _is_parallel(piece, condition, guess):
+        return PathStop(WhyStopped.LOST, guess.drive, MEETS_WHOLE.format(names=describe(condition.item)))
     for _ in range(2):
         stage = Stage.from_problem(piece.whole, np.array([guess.drive]))
         least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
@@ -128,6 +128,11 @@ def _locate_touch(piece: PieceOfPath, step: StepBetween, row: int, condition: Si
             return None
         guess = closer
     return None
+
+
+def _is_parallel(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> bool:
+    stage = Stage.from_problem(piece.whole, np.array([at.drive]))
+    return piece.sides.gaps_of(condition.item).is_parallel(piece.whole.values(at.x, at.drive), stage)
 
 
 def _new_side(piece: PieceOfPath, beyond: PieceOfPath, number: int, parameter: float) -> int:
@@ -197,7 +202,7 @@ def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: flo
     before = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] < parameter]
     after = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] > parameter]
     roots = piece.sides.roots(item)
-    if not _may_lie(piece, item, parameter):
+    if not may_lie(piece, item, parameter):
         return None
     if before and after:
         pair = before[-1], after[0]
@@ -207,42 +212,6 @@ def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: flo
     if before and not after and True in roots and mesh.contacts[before[-1]].item is item:
         return before[-1]
     return None
-
-
-def _may_lie(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> bool:
-    """Return True if a side takes on another curvature where it lies on an obstacle."""
-    return bool(len(item.outline.radius)) or abs(_measure_unloaded_bend(piece, item, parameter)) > STRAIGHT_TURN
-
-
-def _measure_unloaded_bend(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> float:
-    """Return the curvature of an unloaded beam by its parameter [rad]."""
-    fitted = piece.whole.mesh.fits[item.beam]
-    sides = [float(np.real(fitted.angle(parameter + step, parameter))) for step in (PLACE_STEP, -PLACE_STEP)]
-    return (sides[0] - sides[1]) / (2 * PLACE_STEP)
-
-
-def _lies(piece: PieceOfPath, item: BeamOnObstacle, place: Any, force: Any, angle: float) -> bool:
-    """Return True if a side that spreads lies on the obstacle; else it touches at points, with a free part between.
-
-    Where nothing pulls along a round obstacle it is tried: with what lies there the tension grows, or is none.
-    """
-    mesh = piece.whole.mesh
-    bulge = float(item.outline.distance(np.asarray(place) * mesh.scales.length).curvature)
-    if bulge:
-        tension = float(np.array([np.cos(angle), np.sin(angle)]) @ force)
-        return bool(np.sign(bulge) * tension > -NO_TENSION * float(np.hypot(*force)))
-    return True
-
-
-def _cannot_lie(piece: PieceOfPath, item: BeamOnObstacle) -> str:
-    """Return why a beam cannot lie on an obstacle along a length; empty if it can."""
-    beam = piece.whole.mesh.fits.network.beams[item.beam]
-    shape, section = beam.shape, beam.section
-    if section.shear:
-        return "with shear deformation that is not modelled: leave it out of the beam"
-    if isinstance(section.thickness, Taper) or not isinstance(shape, Polynomial) or len(shape.coefficients) > 2:
-        return "that is modelled for beams of one thickness and curvature only"
-    return ""
 
 
 def _join_contacts(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath:
@@ -323,8 +292,8 @@ def enter_side_change(
     """Return the piece behind a change of a side, its start, the sense of the drive, and whether it has turned."""
     condition = change.condition
     if condition is not None and condition.kind in ("wraps", "spreads", "lies"):
-        why = _cannot_lie(piece, condition.item)
-        curved = condition.kind == "wraps" or _may_lie(piece, condition.item, 0.5)
+        why = why_not_laid(piece, condition.item)
+        curved = condition.kind == "wraps" or may_lie(piece, condition.item, 0.5)
         if why and curved:
             names = f"beam {condition.item.beam!r} on {condition.item.name!r}"
             return PathStop(WhyStopped.LOST, change.at.drive, BEGINS_TO_LIE.format(names=names, why=why))
@@ -394,7 +363,7 @@ def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False)
     angle = float(np.real(mesh.fits[item.beam].angle(middle, middle))) + float(z[turn])
     force = 0.5 * sum(z[mesh.elements.unknowns[side_contact.element + k, -2:]] for k in (0, 1))
     place = mesh.attachments.origin[side_contact.place] + z[[x, y]]
-    lies = _may_lie(piece, item, middle) and _lies(piece, item, place, force, angle)
+    lies = may_lie(piece, item, middle) and presses_where_it_spreads(piece, item, place, force, angle)
     lies = lies and not free
     both = [FlankPlace(change.contact, middle + side * NEW_PLACE, int(lies and side < 0)) for side in (-1.0, 1.0)]
     beyond = piece.with_flanks([*_remaining_places(piece, change.number), *both], piece.closed)
@@ -406,20 +375,13 @@ def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False)
         full[new.contacts[number].slide] = contact.parameter
         full[new.contacts[number].unknown] = 0.5 * float(z[side_contact.unknown])
     if lies:
-        _guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
+        guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
     begin = begin._replace(x=full[new.free])
     low, high = (beyond.slot_in_own(number, slide=True) for number in (first, last))
     at = _solve_at_level(beyond, begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
-    if lies and (at is None or not _presses(beyond, at)):
+    if lies and (at is None or not presses(beyond, at)):
         return _part_contact(piece, change, free=True)
     return None if at is None else (beyond, beyond.grow(at), float(at.rate[high] - at.rate[low]))
-
-
-def _guess_laid(mesh: Discretisation, z: FloatArray, element: int, tension: float) -> None:
-    """Put what is known of an element that lies on an obstacle into a state."""
-    side_contact = mesh.elements.unknowns[element]
-    z[side_contact[8:-2]] = 0.0
-    z[side_contact[-2]], z[side_contact[-1]] = tension, 0.0
 
 
 def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
@@ -433,7 +395,7 @@ def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False
     )
     force = z[mesh.elements.unknowns[element, -2:]]
     place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, end])]).place[0]
-    lies = _lies(piece, item, place, force, angle) and not free
+    lies = presses_where_it_spreads(piece, item, place, force, angle) and not free
     first = FROM_ROOT if lies else BESIDE_ROOT
     parameter, laid = (1 - first, 1) if condition.last else (first, -1)
     beyond = piece.with_flanks(
@@ -444,21 +406,14 @@ def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False
     full = beyond.whole.values(begin.x, begin.drive)
     if lies:
         at = new.contacts[number].element + (laid > 0)
-        _guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
+        guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
     slide = beyond.slot_in_own(number, slide=True)
     solved = _solve_at_level(beyond, begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
-    if lies and (solved is None or not _presses(beyond, solved)):
+    if lies and (solved is None or not presses(beyond, solved)):
         return _lie_from_root(piece, change, free=True)
     if solved is None:
         return None
     return beyond, beyond.grow(solved), float(solved.rate[slide]) * (-1.0 if condition.last else 1.0)
-
-
-def _presses(piece: PieceOfPath, at: PathEquilibrium) -> bool:
-    """Return True if everything that lies on an obstacle presses on it."""
-    whole, count = piece.grow(at), len(piece.whole.mesh.contacts)
-    rows = [count + k for k, contact in enumerate(piece.sides.all) if contact.kind == "pulls"]
-    return all(piece.row_value(whole, row) > -ROUNDING_OF_KIND["pulls"] for row in rows)
 
 
 def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | None:
@@ -484,7 +439,7 @@ def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | N
     )
     along = np.array([np.cos(angle), np.sin(angle)])
     if condition.kind == "lies":
-        _guess_laid(new, full, element, float(z[side_contact[-2:]] @ along))
+        guess_laid(new, full, element, float(z[side_contact[-2:]] @ along))
     else:
         full[new.elements.unknowns[element, -2:]] = z[side_contact[-2]] * along
     at = beyond.own.solve(full[new.free][beyond.own_mask], change.at.drive)

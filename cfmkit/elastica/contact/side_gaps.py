@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
 NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
+PARALLEL_GAP = 1e-9  # mean beam lengths by which the gap along a beam changes that is parallel to an obstacle
 N_ROUNDS, SLOPE_LEVEL = (
     20,
     1e-9,
@@ -171,6 +172,10 @@ class SideGaps:
         slope = slope - np.stack(taper, axis=1)
         return values.value / self.mesh.scales.length - half, slope, seen
 
+    def is_parallel(self, z: FloatArray, stage: Stage) -> bool:
+        """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
+        return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
+
     def least(self, z: FloatArray, stage: Stage) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
 
@@ -194,7 +199,7 @@ class SideGaps:
         for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
             if value + self.slack[number] <= best:
                 indices = self._measure_at(
-                    self._on_element(z[None], stage, int(self.elements[number])), np.array([fraction])
+                    self._take_element(z[None], stage, int(self.elements[number])), np.array([fraction])
                 )
                 best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
         return least
@@ -223,7 +228,7 @@ class SideGaps:
         for row in np.unique(dips.row).tolist():
             indices = np.flatnonzero(dips.row == row)
             chosen = dips.state[indices]
-            states = self._on_element(z[chosen], stage.take(chosen), int(self.elements[row]))
+            states = self._take_element(z[chosen], stage.take(chosen), int(self.elements[row]))
             for _ in range(N_ROUNDS):
                 middle = b[indices] - high[indices] * (b[indices] - a[indices]) / (high[indices] - low[indices])
                 seen = self._measure_at(states, middle)
@@ -236,7 +241,7 @@ class SideGaps:
                 a[indices], b[indices] = np.where(below, middle, a[indices]), np.where(below, b[indices], middle)
         return value, best
 
-    def _on_element(self, z: FloatArray, stage: Stage, element: int) -> _ElementStates:
+    def _take_element(self, z: FloatArray, stage: Stage, element: int) -> _ElementStates:
         """Return what gaps at places of an element are made of, in n states."""
         moved = with_places(self.mesh, z)
         e, count = moved.elements, len(z)
