@@ -283,3 +283,9 @@ def test_a_leaf_parallel_to_a_floor_ends_with_the_reason(with_pad):
     path = trace(net, Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
     assert path.status is PathStatus.LOST
     assert path.message == "beam 'leaf' on 'floor' is met along the whole length at 0.1: no place touches first"
+
+
+def test_a_constant_load_may_close_a_contact_of_a_side_before_the_drive_moves():
+    net = replace(leaf(side("pin", PINS["disc"])), loads=(PointLoad("tip", 0.0, -1.0),))
+    path = trace(net, Loading((PointLoad("tip", 0.0, -1.0),), np.array([0.0, 2.0])), EXACT)
+    assert path.contact_force(0)[[0, -1]] == pytest.approx([1.224370708397327, 5.552993116405933], rel=1e-9)
