@@ -24,8 +24,8 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, dual_arrays, effort_slopes, unknown_slopes
 from cfmkit.elastica.mechanics.designs import design_of, make_up, set_up
-from cfmkit.elastica.mechanics.discretise import discretise_alike
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results import beam_states, stress_extremes
 from cfmkit.elastica.results.path import N_PLACES, load_displacement, node_motion, node_reaction, strain_energy

@@ -7,7 +7,7 @@ import pytest
 from beam_support import CANTILEVER, CONFIGS, config, solved
 
 import cfmkit
-from cfmkit.errors import SpecError
+from cfmkit.errors import InputError, SpecError
 from cfmkit.families.beam.figures import figures
 from cfmkit.results import Status
 
@@ -144,8 +144,13 @@ def test_a_rotation_that_is_stopped_has_a_moment():
             "obstacles.o", "'fillet', the radius of its corners, is missing",
         ),
         (
-            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam]}}\n",
-            "obstacles.o", "beams",
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [baem]}}\n",
+            "obstacles.o", "baem",
+        ),
+        (
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam], "
+            "stiffness: 1 N/mm}}\n",
+            "obstacles.o", "rigid",
         ),
         ("  obstacles: {o: {kind: lin, through: [0 mm, -50 mm], direction: 0 deg}}\n", "obstacles.o", "line"),
         (
@@ -220,3 +225,64 @@ def test_a_support_that_is_pushed_against_a_rigid_stop_has_no_start():
     result = cfmkit.analyze(stated("  stops: {end: {node: root, direction: -90 deg, gap: 10 mm}}\n", text))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "the drive is blocked by stop 'end' at 0.5 of the constant loads" in result.message
+
+
+LEAF = """cfmkit: 1
+family: beam
+mechanism:
+  material: {name: steel-1.4310}
+  width: 10 mm
+  thickness: 0.5 mm
+  nodes:
+    root: {at: [0 mm, 0 mm], support: clamped}
+    tip: {at: [100 mm, 0 mm]}
+  beams: {leaf: {start: root, end: tip}}
+  obstacles:
+    OBSTACLES
+  drive: {kind: displacement, node: tip, direction: -90 deg}
+analysis: {travel: 30 mm, points: 16}
+"""
+
+
+def over(obstacles):
+    """Return a leaf over obstacles."""
+    return cfmkit.loads(LEAF.replace("OBSTACLES", obstacles))
+
+
+def test_the_side_of_a_leaf_has_columns_of_its_force_and_place_and_a_sentence():
+    result = cfmkit.analyze(over("pin: {kind: disc, centre: [50 mm, -10 mm], radius: 4.75 mm}"))
+    force, first, last = (result.curve.extra[f"pin_leaf_{end}"].values for end in ("force", "from", "to"))
+    (row,) = np.flatnonzero(result.curve.extra["event"].values != "")
+    assert result.curve.extra["event"].values[row] == "pin leaf begins"
+    assert np.isnan(first[:row]).all()
+    assert (force[row + 1 :] > 0).all()
+    assert first[row + 1 :] == pytest.approx(last[row + 1 :])
+    assert (np.diff(first[row + 1 :]) > 0).all()  # it slides outwards
+    assert cfmkit.evaluate(result)["contact_force[pin]"].value > 0
+    assert result.values["contact_force_max"].value == pytest.approx(force.max(), rel=1e-9)
+    said = {warning.name: warning.message for warning in result.warnings}
+    assert "contact begins at" in said["contact_begins"]
+    assert "'leaf' and 'pin'" in said["contact_begins"]
+    assert "side_in_obstacle" not in said
+
+
+def test_a_leaf_that_is_clamped_on_a_drum_wraps_around_it_and_its_stress_stays():
+    result = cfmkit.analyze(over("drum: {kind: disc, centre: [0 mm, -150.25 mm], radius: 150 mm, beams: [leaf]}"))
+    first, last = (result.curve.extra[f"drum_leaf_{end}"].values for end in ("from", "to"))
+    assert first[-1] == 0
+    assert 0.05 < last[-1] < 0.9
+    bent = 0.5 * 0.5e-3 / 150.25e-3 * result.spec.mechanism.of_beams("material")["leaf"].youngs_modulus
+    assert result.curve.extra["max_stress"].values[-1] == pytest.approx(bent, rel=1e-6)
+    assert "lies along 'drum'" in {one.name: one.message for one in result.warnings}["contact_begins"]
+
+
+def test_a_leaf_that_lies_in_an_obstacle_before_any_load_is_refused_with_depth_and_place():
+    with pytest.raises(InputError, match=r"'leaf' lies 2\.25 mm inside it at 50% of its length"):
+        cfmkit.analyze(over("pin: {kind: disc, centre: [50 mm, -3 mm], radius: 5 mm}"))
+
+
+def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
+    result = cfmkit.analyze(over("pin: {kind: disc, centre: [50 mm, -10 mm], radius: 4.75 mm, nodes: {tip: 1 mm}}"))
+    said = {warning.name: warning.message for warning in result.warnings}
+    assert "list it in 'beams'" in said["side_in_obstacle"]
+    assert "pin_leaf_force" not in result.curve.extra

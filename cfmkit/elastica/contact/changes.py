@@ -13,18 +13,24 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.equations import with_closed
+from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
+from cfmkit.elastica.contact.side_gaps import Stage, carry
 from cfmkit.elastica.contact.terms import gaps, measure
-from cfmkit.elastica.model.contact import NodeOnObstacle
+from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
-from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import hermite
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.problem import NetworkProblem
-    from cfmkit.numerics.continuation.path import Options, PathEvent
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.model.contact import Contact
+    from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
@@ -35,17 +41,19 @@ FAR = 2.0  # times a step's motion by which a gap must be open at both ends for 
 STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
-NOT_LOCATED = "where {names} {what} was not found near {{place}}"
 
 
 class ContactChange(NamedTuple):
     """The begin or end of a contact; unstable directions before and after it."""
 
-    kind: Literal["begins", "ends", "blocks"]
-    number: int  # of the contact
+    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes"]
+    number: int  # of the contact in the arrays of its piece
     at: PathEquilibrium
     before: int
     after: int
+    contact: int = -1  # in `Network.contacts`
+    condition: SideCondition | None = None  # on the side of a beam, that is met
+    piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,72 +65,174 @@ class PieceOfPath:
     options: Options
 
     @cached_property
-    def own(self) -> NetworkProblem:
+    def own(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
-        return replace(self.whole, mesh=with_closed(self.whole.mesh, self.closed))
+        mesh = with_closed(self.whole.mesh, self.closed)
+        return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, piece=self)
+
+    @cached_property
+    def sides(self) -> SideConditions:
+        """Conditions on the sides of beams."""
+        return SideConditions(self.whole.mesh, self.closed)
+
+    @property
+    def flanks(self) -> tuple[FlankPlace, ...]:
+        """Places at which sides touch."""
+        cuts = self.whole.mesh.elements.cuts
+        return tuple(
+            FlankPlace(contact.number, float(cuts[contact.element, 1]), contact.laid)
+            for contact in self.whole.mesh.contacts
+            if contact.slide >= 0
+        )
+
+    def sides_of(self, beam: str) -> list[int]:
+        """Return the numbers in the arrays of the contacts of the side of a beam, in order along it."""
+        sides: Any = [(k, contact) for k, contact in enumerate(self.whole.mesh.contacts) if contact.slide >= 0]
+        return [k for k, contact in sides if contact.item.beam == beam]
+
+    def with_flanks(self, flanks: Sequence[FlankPlace], closed: frozenset[int]) -> PieceOfPath:
+        """Return the problem in which sides touch at other places, and nodes as said."""
+        assert self.whole.remesh is not None
+        network = self.whole.mesh.fits.network
+        beams = list(network.beams)
+
+        def place(flank: FlankPlace) -> tuple[int, float]:
+            item: Any = network.contacts[flank.number]
+            return beams.index(item.beam), flank.parameter
+
+        order = sorted(flanks, key=place)
+        mesh = self.whole.remesh(tuple(order))
+        sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
+        nodes = [k for k in closed if self.whole.mesh.contacts[k].slide < 0]
+        return PieceOfPath(replace(self.whole, mesh=mesh), frozenset([*nodes, *sides]), self.options)
+
+    def carry(self, at: PathEquilibrium, beyond: PieceOfPath) -> PathEquilibrium:
+        """Return an equilibrium in the unknowns of another piece, but for forces and places of sides."""
+        z, old, new = self.whole.values(at.x, at.drive), self.whole.mesh, beyond.whole.mesh
+        moved = carry(old, z, Stage.from_problem(self.whole, np.array([at.drive])), new)
+        kept = {(contact.number, k): contact for k, contact in self._enumerate_contacts(old)}
+        for k, contact in self._enumerate_contacts(new):
+            same = kept.get((contact.number, k))
+            if same is not None and contact.slide >= 0:
+                moved[contact.unknown] = z[same.unknown]
+        return at._replace(x=moved[new.free], rate=np.zeros(len(new.free)))
+
+    @staticmethod
+    def _enumerate_contacts(mesh: Discretisation) -> Iterator[tuple[int, ContactAt]]:
+        """Yield each contact with its place among those of the same item."""
+        seen: dict[int, int] = {}
+        for contact in mesh.contacts:
+            seen[contact.number] = seen.get(contact.number, -1) + 1
+            yield seen[contact.number], contact
 
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
         """Return the problem with another set of closed contacts."""
         return PieceOfPath(self.whole, closed, self.options)
 
     def say(self, number: int) -> str:
-        """Return what a contact is called."""
-        return describe(self.whole, number)
+        """Return what the contact of a row of `values` is called."""
+        count = len(self.whole.mesh.contacts)
+        return describe(
+            self.whole.mesh.contacts[number].item if number < count else self.sides.all[number - count].item
+        )
 
     def say_all(self, number: int) -> str:
         """Return what a contact and those that are closed with it are called, where they block the drive together."""
-        others = [self.say(other) for other in sorted(self.closed - {number})]
+        others = [self.say(index) for index in sorted(self.closed - {number})]
         return " with ".join([self.say(number), *others[:2]])
 
     # -- unknowns ------------------------------------------------------------------------------------------------------
     @cached_property
-    def _kept(self) -> Any:
+    def own_mask(self) -> Any:
+        """Which free unknowns of the whole are those of the own problem."""
         return np.isin(self.whole.mesh.free, self.own.mesh.free)
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium without the forces of open contacts."""
-        return at._replace(x=at.x[self._kept], rate=at.rate[self._kept])
+        return at._replace(x=at.x[self.own_mask], rate=at.rate[self.own_mask])
 
-    def _spread(self, values: Any) -> Any:
-        found = np.zeros((len(self._kept), *np.shape(values)[1:]))
-        found[self._kept] = values
-        return found
+    def expand(self, values: Any) -> Any:
+        """Return values of the own unknowns among those of all, zero for the others."""
+        spread_values = np.zeros((len(self.own_mask), *np.shape(values)[1:]))
+        spread_values[self.own_mask] = values
+        return spread_values
 
     def grow(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium with the forces of all contacts."""
-        return at._replace(x=self._spread(at.x), rate=self._spread(at.rate))
+        return at._replace(x=self.expand(at.x), rate=self.expand(at.rate))
 
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
-        near = None if event.near is None else self.grow(event.near)
-        modes = None if event.modes is None else self._spread(event.modes)
-        return replace(event, near=near, modes=modes, within=within)
+        start = None if event.near is None else self.grow(event.near)
+        modes = None if event.modes is None else self.expand(event.modes)
+        return replace(event, near=start, modes=modes, within=within)
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
         """Return True if forces are as large as where a structure locks, between two points that nearly coincide."""
         forces = (np.abs(at.x) / self.whole.unit)[~self.whole.motions]
-        near = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
-        return bool(near and forces.max(initial=0.0) > LOCKED_FORCE)
+        start = abs(at.drive - before.drive) <= LOCKED_STEP * self.options.span
+        return bool(start and forces.max(initial=0.0) > LOCKED_FORCE)
 
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
-        """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n)."""
+        """Return the forces of closed and the gaps of open contacts in states (n, free), (contacts, n).
+
+        Behind them come the values of the conditions on sides of beams.
+        """
         mesh, way = self.whole.mesh, drives[:, None]
         z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
         z[:, mesh.free] = x
-        return np.array(
-            [
-                z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
-                for number, contact in enumerate(mesh.contacts)
-            ]
-        )
+        spread_values = np.empty((len(mesh.contacts) + len(self.sides.all), len(z)))
+        for number, contact in enumerate(mesh.contacts):
+            spread_values[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
+        spread_values[len(mesh.contacts) :] = self.sides.values(z, Stage.from_problem(self.whole, drives))
+        return spread_values
+
+    def row_value(self, at: PathEquilibrium, number: int) -> float:
+        """Return one row of `values` at an equilibrium."""
+        mesh, drives = self.whole.mesh, np.array([at.drive])
+        z = self.whole.values(at.x, at.drive)[None]
+        if number >= len(mesh.contacts):
+            condition = self.sides.all[number - len(mesh.contacts)]
+            return float(self.sides.value(condition, z, Stage.from_problem(self.whole, drives))[0])
+        contact = mesh.contacts[number]
+        return float(z[0, contact.unknown] if number in self.closed else gaps(mesh, contact, z)[0])
 
     def roundings(self, values: FloatArray) -> FloatArray:
-        """Return by how much a force or a gap may be negative, (contacts,)."""
+        """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""
         closed = np.isin(np.arange(len(values)), list(self.closed))
-        largest = float(np.abs(values[closed]).max(initial=1.0))
-        return np.where(closed, FORCE_ROUNDING * largest, GAP_ROUNDING)
+        largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
+        shape = -1, *(1,) * (values.ndim - 2)
+        spread_values = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
+        spread_values[len(self.whole.mesh.contacts) :] = self.sides.roundings.reshape(shape)
+        return spread_values
+
+    def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
+        """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
+        whole, kept, n_samples = self.whole, self.own_mask, FEWEST_SAMPLES + 1
+        x, rate = (self.expand(np.array(rows).T).T for rows in zip(*((at.x, at.rate) for at in states), strict=True))
+        drive = np.array([at.drive for at in states])
+        width, chord = np.diff(drive)[:, None], np.diff(x, axis=0)
+        moved = np.abs(chord[:, whole.motions]).max(axis=1)
+        slope = np.abs(rate[:, whole.motions]).max(axis=1)
+        dense = SAMPLES_PER_RADIUS * moved * whole.mesh.scales.length <= FEWEST_SAMPLES * self.smallest_radius
+        smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= STEEP * moved
+        s = np.linspace(0.0, 1.0, n_samples)[:, None, None]
+        between = x[:-1] + s * s * (3 - 2 * s) * chord
+        between = between + width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
+        drives = drive[:-1] + s[:, :, 0] * width[:, 0]
+        values = self.values(between.reshape(-1, len(kept)), drives.ravel())
+        values = values.reshape(len(values), n_samples, -1).swapaxes(1, 2)
+        calm = (values[..., 1:] >= -self.roundings(values)[..., None]).all(axis=(0, 2))
+        return calm & dense & smooth
+
+    @cached_property
+    def smallest_radius(self) -> float:
+        """Smallest radius of a pad and the obstacle that it may pass [m]."""
+        items = [contact.item for contact in self.whole.mesh.contacts]
+        radii = [item.outline.smallest_bulge + item.radius for item in items if isinstance(item, NodeOnObstacle)]
+        return min(radii, default=np.inf)
 
     def grows_along(self, at: PathEquilibrium, number: int) -> float:
         """Return how force or gap of a contact changes with the drive at an equilibrium."""
@@ -135,76 +245,38 @@ class PieceOfPath:
         gap = measure(mesh, contact, self.whole.values(at.x, at.drive))
         return float(gap.gradient @ moved[gap.unknowns])
 
-    # -- changes -------------------------------------------------------------------------------------------------------
-    def find_change_before_end(
-        self, previous: PathEquilibrium | None, stop: PathStop
-    ) -> ContactChange | PathStop | None:
-        """Return the first change between the last point and the end of a piece that ends early; None without any."""
-        if previous is None or stop.end in (WhyStopped.COMPLETE, WhyStopped.FULL) or stop.drive == previous.drive:
-            return None
-        near = self.shrink(previous)
-        last = correct(self.own, near.x + (stop.drive - near.drive) * near.rate, stop.drive)
-        if last is None or largest_motion(self.own, last.x - near.x) > self.options.largest_motion:
-            return None
-        return self.find_change(previous, self.grow(last))
-
-    def find_change(self, first: PathEquilibrium, last: PathEquilibrium) -> ContactChange | PathStop | None:
-        """Return the first change of a contact between two points of the piece; None if there is none."""
-        step = StepBetween(self, first, last)
-        if step.is_far:
-            return None
-        values = step.values
-        rounding = self.roundings(values)
-        dips = (values < -rounding[:, None])[:, 1:]
-        if not dips.any():
-            return None
-        if not dips[:, -1].any():  # only the guess says so: see whether the equilibrium does
-            at = step.solve(float(step.shares[1:][dips.any(axis=0).argmax()]))
-            if at is None:
-                return None
-            return self.find_change_at_end(first, self.grow(at), rounding)
-        found = [self._locate(step, int(number)) for number in np.flatnonzero(dips.any(axis=1))]
-        missing = next((number for number, change in found if change is None), None)
-        known = [change for _, change in found if change is not None]
-        if not known:
-            assert missing is not None
-            what = "ends" if missing in self.closed else "begins"
-            return PathStop(WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=self.say(missing), what=what))
-        return min(known, key=lambda change: step.share_of(change.at))
-
-    def find_change_at_end(
-        self, first: PathEquilibrium, last: PathEquilibrium, rounding: FloatArray
-    ) -> ContactChange | PathStop | None:
-        """Return the first change up to a point that may violate a condition; None if it does not."""
-        values = self.values(last.x[None], np.array([last.drive]))[:, 0]
-        return self.find_change(first, last) if (values < -rounding).any() else None
-
-    def _locate(self, step: StepBetween, number: int) -> tuple[int, ContactChange | None]:
-        """Return where a contact changes within a step: where its gap and its force are both zero."""
-        share = step.crossing(number)
-        if share is None:
-            return number, None
-        guess, drive = step.at(share)
-        kind: Literal["begins", "ends"] = "ends" if number in self.closed else "begins"
-        both = self.with_closed(self.closed | {number})
-        x = guess[both._kept]
-        border = np.zeros(len(x) + 1)
-        border[int(both._kept[: self._slot(number)].sum())] = 1.0
-        state = both.own.equations.solve(x, drive, border, 0.0)
-        if state is not None and np.isfinite(state.rate).all():
-            free = both._spread(state.free)
-            free[self._slot(number)] = 0.0
-            at = step.first._replace(x=free, drive=float(state.way), effort=np.nan, stiffness=np.nan)
-            if step.contains(at, guess):
-                return number, ContactChange(kind, number, at, step.first.unstable, step.first.unstable)
-        at_bracket = step.bisect(number)
-        if at_bracket is None:
-            return number, None
-        return number, ContactChange(kind, number, at_bracket, step.first.unstable, step.first.unstable)
-
-    def _slot(self, number: int) -> int:
+    def slot(self, number: int) -> int:
         """Return the number of a contact's force among the free unknowns of the whole problem."""
         return int(np.searchsorted(self.whole.mesh.free, self.whole.mesh.contacts[number].unknown))
+
+    def slot_in_own(self, number: int, slide: bool = False) -> int:
+        """Return the number of a contact's force, or place, among the free unknowns of the own problem."""
+        contact = self.whole.mesh.contacts[number]
+        return int(np.searchsorted(self.own.mesh.free, contact.slide if slide else contact.unknown))
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedProblem(NetworkProblem):
+    """The problem of a piece; it knows between which states of a march no contact changes."""
+
+    piece: PieceOfPath | None = None
+
+    def march(self, walk: Walk) -> MarchedSteps:
+        """Return the equilibria on the way to the next requested values, as far as nothing happens."""
+        marched = super().march(walk)
+        if marched.states and self.piece is not None:
+            states = [at for at, _ in marched.states]
+            quiet = self.piece.are_quiet([walk.here, *states]).tolist()
+            self._quiet.update((id(at), at) for at, calm in zip(states, quiet, strict=True) if calm)
+        return marched
+
+    def is_quiet_before(self, at: PathEquilibrium) -> bool:
+        """Return True if no contact changes on the step of a march that ends at a state."""
+        return self._quiet.pop(id(at), None) is not None
+
+    @cached_property
+    def _quiet(self) -> dict[int, PathEquilibrium]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +301,7 @@ class StepBetween:
     @cached_property
     def shares(self) -> FloatArray:
         """Places at which gaps and forces are looked at, from 0 to 1: so dense that no obstacle is passed."""
-        items = [contact.item for contact in self.part.whole.mesh.contacts]
-        length = self.part.whole.mesh.scales.length
-        radii = [item.outline.smallest_bulge + item.radius for item in items if isinstance(item, NodeOnObstacle)]
-        wanted = SAMPLES_PER_RADIUS * self.moved * length / min(radii, default=np.inf)
+        wanted = SAMPLES_PER_RADIUS * self.moved * self.part.whole.mesh.scales.length / self.part.smallest_radius
         return np.linspace(0.0, 1.0, int(np.clip(np.ceil(wanted), FEWEST_SAMPLES, MOST_SAMPLES)) + 1)
 
     @property
@@ -242,7 +311,8 @@ class StepBetween:
             return False
         mesh, ends = self.part.whole.mesh, self.part.values(*self.at(np.array([[0.0], [1.0]])))
         arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
-        return bool((ends > FAR * self.moved * (1.0 + arms[:, None])).all())
+        reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
+        return bool((ends > FAR * self.moved * reach[:, None]).all())
 
     @cached_property
     def values(self) -> FloatArray:
@@ -262,15 +332,15 @@ class StepBetween:
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.at(share)
-        at = correct(self.part.own, x[self.part._kept], drive)
-        if at is None or largest_motion(self.part.own, at.x - x[self.part._kept]) > MAX_MISS * self.moved + 1e-9:
+        at = correct(self.part.own, x[self.part.own_mask], drive)
+        if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
 
     def crossing(self, number: int) -> float | None:
         """Return the first share at which force or gap of a contact vanishes, by straight lines; None if nowhere."""
         values = self.values[number]
-        below = np.flatnonzero(values[1:] < 0)
+        below = np.flatnonzero(values[1:] < -self.part.roundings(self.values)[number])
         if not len(below):
             return None
         behind = int(below[0]) + 1
@@ -288,8 +358,8 @@ class StepBetween:
 
     def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
         """Return True if an equilibrium lies within the step, near a guess."""
-        near = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
-        return near and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
+        start = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
+        return start and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
 
     def bisect(self, number: int) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at which force or gap vanishes, by its drive alone; None if lost."""
@@ -301,23 +371,28 @@ class StepBetween:
             at = self.solve(share)
             if at is None:
                 raise ArithmeticError
-            whole = part.grow(at)
-            return float(part.values(whole.x[None], np.array([whole.drive]))[number, 0])
+            return part.row_value(part.grow(at), number)
 
         try:
-            low, high = value(0.0), value(1.0)
-            if low <= 0:
+            row_values = self.values[number]
+            behind = np.flatnonzero(row_values[1:] < -part.roundings(self.values)[number])
+            end = int(behind[0]) + 1 if len(behind) else len(row_values) - 1
+            begin = next((k for k in range(end - 1, -1, -1) if value(float(self.shares[k])) > 0), None)
+            if begin is None:
                 return self.first
-            if high > 0:
+            last = next((k for k in range(end, len(row_values)) if value(float(self.shares[k])) <= 0), None)
+            if last is None:
                 return None
-            share = float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14))
+            share = float(brentq(value, self.shares[begin], self.shares[last], xtol=1e-15, rtol=1e-14))
         except ArithmeticError:
             return None
         at = self.solve(share)
         return None if at is None else part.grow(at)
 
 
-def describe(problem: NetworkProblem, number: int) -> str:
-    """Return what a contact is called: a stop by its name, a pad by its node and its obstacle."""
-    item = problem.mesh.contacts[number].item
-    return f"{item.node!r} on {item.name!r}" if isinstance(item, NodeOnObstacle) else f"stop {item.name!r}"
+def describe(item: Contact) -> str:
+    """Return what a contact is called: a stop by its name, a pad by its node, a side by its beam, and the obstacle."""
+    if isinstance(item, Stop):
+        return f"stop {item.name!r}"
+    side = f"node {item.node!r}" if isinstance(item, NodeOnObstacle) else f"beam {item.beam!r}"
+    return f"{item.node!r} on {item.name!r}" if isinstance(item, NodeOnObstacle) else f"{side} on {item.name!r}"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.contact.terms import gaps, press
-from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
+from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.poses import poses
 
 if TYPE_CHECKING:
@@ -22,20 +22,22 @@ if TYPE_CHECKING:
 
 def without_contacts(mesh: Discretisation) -> Discretisation:
     """Return the arrays of a network in which every contact is open: forces of contacts are held at zero."""
-    return replace(mesh, contacts=(), free=mesh.free[mesh.free < _first_contact(mesh)])
+    if not mesh.contacts:
+        return mesh
+    return replace(mesh, contacts=(), moving=None, free=mesh.free[mesh.free < _first_contact(mesh)])
 
 
 def with_closed(mesh: Discretisation, closed: frozenset[int]) -> Discretisation:
     """Return the arrays of a network in which some contacts are closed, by their numbers, and all others open."""
     if not closed:
         return without_contacts(mesh)
-    contacts = tuple(one._replace(closed=number in closed) for number, one in enumerate(mesh.contacts))
-    held = [one.unknown for one in contacts if not one.closed]
+    contacts = tuple(contact._replace(closed=number in closed) for number, contact in enumerate(mesh.contacts))
+    held = [contact.unknown for contact in contacts if not contact.closed]
     return replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
 
 
 def _first_contact(mesh: Discretisation) -> int:
-    return min(one.unknown for one in mesh.contacts)
+    return min(contact.unknown for contact in mesh.contacts)
 
 
 class GapBounds:
@@ -47,17 +49,19 @@ class GapBounds:
     def __init__(self, mesh: Discretisation) -> None:
         """Begin without any."""
         self.mesh = mesh
-        places = [one.place for one in mesh.contacts]
+        places = [contact.place for contact in mesh.contacts]
         self.places = np.array(places)
-        self.forces = np.array([one.unknown for one in mesh.contacts])
-        self.turning = np.array([one.item.turns for one in mesh.contacts])
+        self.forces = np.array([contact.unknown for contact in mesh.contacts])
+        self.turning = np.array([contact.item.turns for contact in mesh.contacts])
         self.turns = mesh.attachments.unknowns[places, 3]
-        self.judged = np.array([one.closed is None for one in mesh.contacts])
+        self.judged = np.array([contact.closed is None for contact in mesh.contacts])
         self.at = np.zeros((len(places), 2))  # where each gap was measured: place, or rotation
         self.gap = np.full(len(places), -np.inf)
 
     def are_open(self, z: FloatArray) -> Any:
         """Return which contacts without a force are certainly open, (contacts,)."""
+        if not self.judged.any():
+            return self.judged
         where = poses(self.mesh.attachments, z, self.places).place
         if self.turning.any():
             where = np.where(self.turning[:, None], np.stack([z[self.turns], 0 * z[self.turns]], axis=1), where)
@@ -101,12 +105,12 @@ class ContactEquations(NumpyEquations):
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
-        found = np.array(self.plain.gradients(z, drive))
+        whole_gradients = np.array(self.plain.gradients(z, drive))
         for contact in self.mesh.contacts:
             for number in np.flatnonzero(z[:, contact.unknown]).tolist():
                 term = press(self.mesh, contact, z[number])
-                found[number, term.unknowns] += term.gradient
-        return found
+                whole_gradients[number, term.unknowns] += term.gradient
+        return whole_gradients
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -116,6 +120,33 @@ class ContactEquations(NumpyEquations):
             gradient[term.unknowns] += term.gradient
             hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
         return gradient, hessian
+
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses (k, n) at places (k,) of the way.
+
+        Those without a force are found without contacts, together; it is seen then whether a gap closes.
+        """
+        count, mesh = self.plain.n, self.mesh
+        idle = ~np.asarray(free)[:, count:].any(axis=1)
+        if not idle.any() or any(contact.closed for contact in mesh.contacts):
+            return super().solve_each(free, way, tolerance, quick)
+        rows, pad = np.flatnonzero(idle), ((0, 0), (0, self.n - count))
+        easy = self.plain.solve_each(free[rows, :count], way[rows], tolerance, quick)
+        z = np.array([self.values(*pair) for pair in zip(np.pad(easy.free, pad), way[rows], strict=True)])
+        judged = [contact for contact in mesh.contacts if contact.closed is None]
+        good = easy.converged & np.all([gaps(mesh, contact, z) >= 0 for contact in judged], axis=0)
+        left = np.setdiff1d(np.arange(len(free)), rows[good])
+        whole_gradients = super().solve_each(free[left], way[left], tolerance, quick)
+        whole = SolvedStates(
+            np.ones(len(free), bool), np.zeros((len(free), self.n)), np.zeros((len(free), self.n)),
+            np.zeros(len(free), np.int64), np.zeros(len(free)),
+        )  # fmt: skip
+        padded = easy._replace(free=np.pad(easy.free, pad), rate=np.pad(easy.rate, pad))
+        for total, some, other in zip(whole, padded, whole_gradients, strict=True):
+            total[rows[good]], total[left] = some[good], other
+        return whole
 
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
@@ -133,9 +164,9 @@ class ContactEquations(NumpyEquations):
                 continue
             term = press(mesh, contact, z)
             slots = self.slots[term.unknowns]
-            own = slots >= 0
-            rows = slots[own]
-            residual[rows] += term.gradient[own]
-            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(own, own)]
-            change[rows] += term.hessian[own] @ moved[term.unknowns]
+            inside = slots >= 0
+            rows = slots[inside]
+            residual[rows] += term.gradient[inside]
+            tangent[np.ix_(rows, rows)] += term.hessian[np.ix_(inside, inside)]
+            change[rows] += term.hessian[inside] @ moved[term.unknowns]
         return LinearEquations(residual, tangent, change)

@@ -9,11 +9,13 @@ has a limit point at the change. A contact between whose change and the drive no
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.contact.changes import FORCE_ROUNDING, ContactChange, PieceOfPath
+from cfmkit.elastica.contact.first_change import find_change, find_change_before_end
+from cfmkit.elastica.contact.side_changes import enter_side_change
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.folds import pass_fold
 from cfmkit.numerics.continuation.follow import LOCKED, follow, follow_on
@@ -34,10 +36,17 @@ FIRST_ARC = 0.1  # of the step before, behind a limit point at a change
 SHORTEST_STEP = 1e-6  # share of the range
 BLOCKED = "the drive is blocked by {names} at {{place}}"
 SNAPS = "the drive cannot go on at {{place}}, where {names} {what}: a limit point; follow it by through_folds"
+BUCKLES_AWAY = "stability is lost at {place}, where a part that an obstacle holds buckles away from it"
 LOSES = "stability is lost at {{place}}, where {names} {what}"
 
 
-Item = Point | PathEvent | PathStop | ContactChange
+class Remeshed(NamedTuple):
+    """The points that follow have other unknowns: sides of beams touch at other places."""
+
+    problem: NetworkProblem
+
+
+Item = Point | PathEvent | PathStop | ContactChange | Remeshed
 
 
 def follow_in_contact(
@@ -51,13 +60,13 @@ def follow_in_contact(
 
     Every change comes behind a point that lies at it.
     """
-    if not problem.mesh.contacts:
+    if not problem.mesh.fits.network.contacts:
         yield from follow(problem, start, targets, options, branch)
         return
     closed = frozenset(
         number
         for number, contact in enumerate(problem.mesh.contacts)
-        if problem.values(start.x, start.drive)[contact.unknown] > FORCE_ROUNDING
+        if contact.slide >= 0 or problem.values(start.x, start.drive)[contact.unknown] > FORCE_ROUNDING
     )
     yield from _until_full(_follow(problem, start, targets, options, branch, closed), options)
 
@@ -93,14 +102,17 @@ def _follow(
         if count > MAX_CHANGES_AT_ONE_PLACE:
             yield PathStop(WhyStopped.LOST, place, "contacts begin and end without end at {place}")
             return
+        mesh = (change.piece or part).whole.mesh
         after = _enter(part, change, sense)
         if isinstance(after, PathStop):
             yield change._replace(kind="blocks") if after.end is WhyStopped.BLOCKED else change
             yield after
             return
+        names, what = (change.piece or part).say(change.number), change.kind
         part, at, sense, turned = after
         yield change._replace(after=at.unstable)
-        names, what = part.say(change.number), change.kind
+        if part.whole.mesh is not mesh:
+            yield Remeshed(part.whole)
         if turned and not options.through_folds:
             yield PathStop(WhyStopped.LIMIT_POINT, place, SNAPS.format(names=names, what=what))
             return
@@ -109,10 +121,22 @@ def _follow(
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
+        # where a contact moves or parts its first place is a little further on: what is requested until there
+        while not walk.done and _lies_between(float(walk.targets[walk.number]), place, at.drive):
+            reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
+            if reached is None:
+                break
+            yield Point(part.grow(reached), walk.number, walk.branch)
+            walk = replace(walk, number=walk.number + 1)
         if walk.done:
             yield PathStop(WhyStopped.COMPLETE, place)
             return
         items, previous = _go_on(part, walk, at, sense), at
+
+
+def _lies_between(target: float, first: float, last: float) -> bool:
+    """Return True if a requested value lies between two that differ."""
+    return first != last and min(first, last) <= target <= max(first, last)
 
 
 def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:
@@ -138,35 +162,43 @@ def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> 
 
 def _follow_part(
     part: PieceOfPath, items: Iterator[Point | PathEvent | PathStop], walk: Walk, previous: PathEquilibrium | None
-) -> Generator[Point | PathEvent | ContactChange, None, PathStop | tuple[Walk, ContactChange, float]]:
+) -> Generator[Point | PathEvent | ContactChange | Remeshed, None, PathStop | tuple[Walk, ContactChange, float]]:
     """Yield the items of a piece up to a change; return the walk there, the change and the sense of travel.
 
     `previous` is where the piece begins if that was yielded before.
     """
     waiting: list[PathEvent] = []
+    mesh = part.whole.mesh
     for item in items:
         if isinstance(item, PathEvent):
             waiting.append(part.grow_event(item))
             continue
         if isinstance(item, PathStop):
-            found = part.find_change_before_end(previous, item)
+            found = find_change_before_end(part, previous, item)
             if found is None:
                 yield from waiting
                 return item
             at, step = None, item.drive
         else:
             at, step = part.grow(item.at), item.at.drive
-            found = None if previous is None else part.find_change(previous, at)
+            quiet = previous is None or part.own.is_quiet_before(item.at)
+            found = None if quiet or previous is None else find_change(part, previous, at)
         if found is not None:
             assert previous is not None
             if isinstance(found, PathStop):
-                return found
+                lost = next((event for event in waiting if event.after > event.before), None)
+                if lost is None:
+                    return found
+                yield from waiting  # the way on from there goes through an obstacle
+                return PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES_AWAY)
             sense = 1.0 if step >= previous.drive else -1.0
             place = found.at.drive
             yield from (event for event in waiting if (place - event.drive) * sense > 0)
             walk = replace(walk, step=abs(step - previous.drive))
             tied = SAME_PLACE * walk.options.span
-            beside = abs(place - previous.drive) <= tied
+            beside = abs(place - previous.drive) <= tied and found.piece is None
+            if found.piece is not None and found.piece.whole.mesh is not mesh:
+                yield Remeshed(found.piece.whole)
             if not walk.done and abs(walk.targets[walk.number] - place) <= tied and not beside:
                 yield Point(found.at, walk.number, walk.branch)
                 walk = replace(walk, number=walk.number + 1)
@@ -190,6 +222,8 @@ def _enter(
     part: PieceOfPath, change: ContactChange, sense: float
 ) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
     """Return the piece behind a change, its start, the sense of the drive there, and whether it has turned."""
+    if change.condition is not None or part.whole.mesh.contacts[change.number].slide >= 0:
+        return enter_side_change(part, change, sense)
     begins, number = change.kind == "begins", change.number
     closed = part.closed | {number} if begins else part.closed - {number}
     beyond = part.with_closed(closed)

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import Contribution
-from cfmkit.elastica.model.contact import Stop
+from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
@@ -36,6 +36,7 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> ContactGap:
         value = item.gap / length + normal @ (at.place[0] - _place_at_rest(mesh, contact))
         hessian = np.zeros((3, 3), jacobian.dtype)
     else:
+        assert isinstance(item, NodeOnObstacle)
         found = item.outline.distance(at.place[0] * length)
         normal, value = found.normal, (found.value - item.radius) / length
         across = np.array([normal[1], -normal[0]]) @ jacobian
@@ -52,6 +53,7 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
     place = poses(mesh.attachments, z, [contact.place]).place[:, 0]
     if isinstance(item, Stop):
         return item.gap / length - (place - _place_at_rest(mesh, contact)) @ _direction(item)
+    assert isinstance(item, NodeOnObstacle)
     return (item.outline.distance(place * length).value - item.radius) / length
 
 

@@ -27,6 +27,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
@@ -49,6 +50,11 @@ class Equilibria:
     z: FloatArray
     drive: FloatArray
 
+    def __post_init__(self) -> None:
+        """Move the elements to the places of contacts, which each point has for itself."""
+        if self.mesh.moving is not None:
+            object.__setattr__(self, "mesh", with_places(self.mesh, self.z))
+
     @cached_property
     def residual(self) -> FloatArray:
         """Gradient of the functional by all unknowns at every point, (p, size): zero at free ones."""
@@ -63,7 +69,7 @@ def partials(mesh: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
     e, at = mesh.elements, energy.fields(mesh, z, drive)
     load = energy.line_load(mesh, drive)
     last = z[..., e.unknowns[:, -2:]]
-    first = last + load * e.length[:, None]
+    first = last + load * e.length[..., None]
     w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
     bent = bending(e, at.curvature)
     density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2

@@ -10,28 +10,36 @@ too.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.element_tables import element_tables, smooth_marks
+from cfmkit.elastica.mechanics.element_cuts import (
+    TAUT,
+    MovingCuts,
+    find_cuts,
+    find_moving_cuts,
+    is_straight,
+    join_cut_laws,
+    turns_little,
+)
+from cfmkit.elastica.mechanics.element_tables import element_tables
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
-from cfmkit.elastica.model.contact import Stop
+from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import driven
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
-from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.model.beam import Beam, Fit
+    from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.contact import Contact
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
@@ -40,10 +48,6 @@ FLOOR_UNDER_MOTION = 3e-12
 """1/EA [L^2/EI] of a straight beam that does not stretch: at rest nothing else determines the force along it."""
 FLOOR_UNDER_LOADS = 1e-3 * FLOOR_UNDER_MOTION
 """The same where loads drive: they reach 1e3 times the force that a motion causes before it is noticed."""
-MAX_TURN = 3.0  # of an unloaded element [rad]; a basis of degree 10 integrates its sine to 1e-10
-TAUT = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
-LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
-LAYER_GROWTH = 4.0  # factor from one of them to the next
 FRAME_OF_DRIVE = 3
 """Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
 
@@ -67,6 +71,8 @@ class BeamElements(NamedTuple):
     rest: Any = None  # (e, q) curvature at rest by u; with curl and hindrance those of wide strips, None without any
     curl: Any = None  # (e, q) th^4/K^2 by u
     hindrance: Any = None  # (e, q) nu^2/(1 - nu^2), 0 unless it is wide
+    laid: Any = None  # (..., e) which lie on an obstacle: their first force is the tension; None: none may
+    moved_cuts: Any = None  # (..., e, 2) cuts with contacts at their places; None where no cut moves
 
 
 class Attachments(NamedTuple):
@@ -87,12 +93,25 @@ class Attached(NamedTuple):
 
 
 class ContactAt(NamedTuple):
-    """A contact, where it acts, and the unknown that is its force."""
+    """A contact, where it acts, and the unknown that is its force; of the side of a beam also its place."""
 
     item: Contact
     place: int  # attachment
     unknown: int
+    number: int  # in `Network.contacts`
     closed: bool | None = None  # None: as force and gap say
+    slide: int = -1  # unknown that is the parameter of the beam's shape at which it touches; -1: a node touches
+    element: int = -1  # that ends there
+    laid: int = 0  # -1 or 1: the element before or behind it lies on the obstacle
+    flag: int = -1  # unknown that says the same of a state
+
+
+class FlankPlace(NamedTuple):
+    """A place at which the side of a beam may touch: an end of two elements that moves along the beam."""
+
+    number: int  # of the contact in `Network.contacts`
+    parameter: float  # of the beam's shape
+    laid: int = 0  # -1 or 1: the side before or behind it, to the next contact or the end, lies on the obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +135,7 @@ class Discretisation:
     pieces: int = 1  # elements for every smooth piece of a beam, at least
     tension: Mapping[str, float] | None = None  # beams that were cut for a large tension
     contacts: tuple[ContactAt, ...] = ()
+    moving: MovingCuts | None = None  # None: no end of an element moves
 
     @cached_property
     def known(self) -> dict[Any, Any]:
@@ -127,10 +147,15 @@ class Discretisation:
         return {name: value for name, value in self.__dict__.items() if name != "known"}
 
     @property
+    def axial(self) -> FloatArray:
+        """1/EA of the elements, (e, q); with contacts at places of several states those of the first."""
+        return np.asarray(self.elements.axial.reshape(-1, *self.elements.axial.shape[-2:])[0])
+
+    @property
     def floor(self) -> FloatArray:
         """1/EA of the elements of beams that do not stretch, (e,): what is left of their floors."""
         stretches = {name: beam.section.axial for name, beam in self.fits.network.beams.items()}
-        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, self.elements.axial[:, 0]))
+        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, self.axial[:, 0]))
 
     @property
     def cuts(self) -> dict[str, list[float]]:
@@ -155,6 +180,7 @@ def discretise(
     scales: MechanicsUnits | None = None,
     fits: BeamFits | None = None,
     cuts: Mapping[str, list[float]] | None = None,
+    flanks: Sequence[FlankPlace] = (),
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
@@ -174,6 +200,8 @@ def discretise(
         Those of the same network, if it was set up before.
     cuts : mapping, optional
         Parameters between which the elements of each beam lie; found from degree, pieces and tension unless given.
+    flanks : sequence of FlankPlace
+        Places at which sides of beams may touch obstacles; of one beam in ascending order.
 
     Raises
     ------
@@ -181,7 +209,7 @@ def discretise(
         If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
     """
     fits = fits or BeamFits(network)
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(cuts)
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(cuts, tuple(flanks))
 
 
 class _ArrayBuilder:
@@ -203,10 +231,19 @@ class _ArrayBuilder:
         self.turns = {name: body[2] for name, body in self.bodies.items()}
         self.own = {name: self._own_place(name) for name in network.nodes}
 
-    def build(self, given_cuts: Mapping[str, list[float]] | None) -> Discretisation:
+    def build(
+        self, given_cuts: Mapping[str, list[float]] | None, flanks: tuple[FlankPlace, ...] = ()
+    ) -> Discretisation:
         """Return the arrays."""
         beams = self.network.beams
-        cuts = given_cuts or {name: self._cuts(name, beam) for name, beam in beams.items()}
+        touched: dict[str, list[float]] = {}
+        for flank in flanks:
+            touched.setdefault(self.network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
+        laws = {name: find_moving_cuts(beams[name], self.fits[name], places) for name, places in touched.items()}
+        cuts = given_cuts or {
+            name: laws[name].at(touched[name]) if name in laws else self._cuts(name, beam)
+            for name, beam in beams.items()
+        }
         tables = element_tables(self.fits, self.scales, self.degree, cuts)
         ends = np.array([pair for name, beam in beams.items() for pair in self._beam(beam, cuts[name], tables)])
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
@@ -215,7 +252,11 @@ class _ArrayBuilder:
             Attached(load, (self._attach(load.node),), grows) for load, grows in given if isinstance(load, PointLoad)
         )
         nodes = {name: self._attach(name) for name in self.network.nodes}
-        touching = [self._attach(contact.node) for contact in self.network.contacts]
+        touching = [
+            (number, self._attach(contact.node))
+            for number, contact in enumerate(self.network.contacts)
+            if not isinstance(contact, BeamOnObstacle)
+        ]
         dofs, arms, origins, frames = zip(*self.places, strict=True)
         frame = np.array([(1.0, 0.0)] * len(frames)) if not any(frames) else _direction(np.array(frames))
         attachments = Attachments(np.array(dofs), np.array(arms), np.array(origins), frame)
@@ -223,19 +264,48 @@ class _ArrayBuilder:
         each = np.array([len(own) - 1 for own in cuts.values()])
         elements, size = self._elements(cuts, tables, ends, attachments, np.repeat(floors, each))
         contacts = tuple(
-            ContactAt(contact, place, size + number)
-            for number, (contact, place) in enumerate(zip(self.network.contacts, touching, strict=True))
+            ContactAt(self.network.contacts[number], place, size + k, number)
+            for k, (number, place) in enumerate(touching)
         )
-        acting = [*springs, *loads, *(Attached(one.item, (one.place,)) for one in contacts)]
+        contacts += self._flank_contacts(flanks, elements, size + len(contacts))
+        acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
         free, base, rate = self._constraints(size, elements, attachments, acting)
         if contacts:
-            size += len(contacts)
-            free = np.append(free, [one.unknown for one in contacts])
-            base, rate = (np.append(values, np.zeros(len(contacts))) for values in (base, rate))
+            sides = [contact for contact in contacts if contact.slide >= 0]
+            more = (
+                [contact.unknown for contact in contacts]
+                + [contact.slide for contact in sides]
+                + [contact.flag for contact in sides]
+            )
+            size += len(more)
+            free = np.append(free, more)
+            base, rate = (np.append(values, np.zeros(len(more))) for values in (base, rate))
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
             self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension, contacts,
+            join_cut_laws(laws, elements.beam, _sides(contacts))
+            if flanks
+            else None,
         )  # fmt: skip
+
+    def _flank_contacts(
+        self, flanks: tuple[FlankPlace, ...], elements: BeamElements, first: int
+    ) -> tuple[ContactAt, ...]:
+        """Return the contacts of the sides of beams: their forces are numbered from `first` on, then their places."""
+        found = []
+        for k, flank in enumerate(flanks):
+            item: Any = self.network.contacts[flank.number]
+            own = [number for number, name in enumerate(elements.beam) if name == item.beam]
+            element = min(own, key=lambda number: abs(elements.cuts[number, 1] - flank.parameter))
+            place = int(elements.ends[element, 1])
+            count = len(flanks)
+            found.append(
+                ContactAt(
+                    item, place, first + k, flank.number, None, first + count + k, element, flank.laid,
+                    first + 2 * count + k,
+                )
+            )  # fmt: skip
+        return tuple(found)
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
     def _scales(self) -> MechanicsUnits:
@@ -300,8 +370,8 @@ class _ArrayBuilder:
     def _cuts(self, name: str, beam: Beam) -> list[float]:
         """Return the parameters between which the elements of a beam lie."""
         tautness = self.tension.get(name, 0.0)
-        whole = self.pieces == 1 and tautness <= TAUT and _turns_little(beam)
-        return [0.0, 1.0] if whole and is_plain(beam) else _cuts(beam, self.fits[name], self.pieces, tautness)
+        whole = self.pieces == 1 and tautness <= TAUT and turns_little(beam)
+        return [0.0, 1.0] if whole and is_plain(beam) else find_cuts(beam, self.fits[name], self.pieces, tautness)
 
     def _beam(self, beam: Beam, cuts: list[float], tables: Mapping[str, Any]) -> list[tuple[int, int]]:
         """Return the attachments of the ends of a beam's elements; those inside the beam are bodies of their own."""
@@ -325,7 +395,7 @@ class _ArrayBuilder:
 
     def _floor(self, name: str, beam: Beam) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
-        if beam.section.axial or not _is_straight(beam, self.fits, name):
+        if beam.section.axial or not is_straight(beam, self.fits, name):
             return 0.0
         rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
         floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
@@ -398,6 +468,12 @@ class _ArrayBuilder:
         return np.flatnonzero(~held), base, rate
 
 
+def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:
+    """Return beam and unknown place of each contact of a side."""
+    sides: Any = [contact for contact in contacts if contact.slide >= 0]
+    return [(contact.item.beam, contact.slide) for contact in sides]
+
+
 def _direction(angle: Any) -> Any:
     """Return cosine and sine in a last axis."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -420,58 +496,3 @@ def _used(size: int, elements: BeamElements, attachments: Attachments, acting: l
             used[unknowns[2]] |= has_arm
             used[unknowns[3]] |= isinstance(item, PointLoad) and (item.follows or item.moment != 0)
     return used
-
-
-def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
-    """Return the parameters between which the elements of a beam lie."""
-    count = pieces if _turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
-    smooth = itertools.pairwise(smooth_marks(beam, fitted))
-    cuts = [left + (right - left) * k / count for left, right in smooth for k in range(count)]
-    cuts.append(1.0)
-    return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
-
-
-def _is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:
-    """Return True if a beam is straight before it is loaded."""
-    if isinstance(beam.shape, Polynomial):
-        return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
-    fitted = fits[name]
-    angle = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)
-    return len(fitted.course.breaks) == 2 and not np.ptp(angle) > 0
-
-
-def _turns_little(beam: Beam) -> bool:
-    """Return True if the angle of an unloaded beam is a polynomial that cannot turn by more than an element may."""
-    return isinstance(beam.shape, Polynomial) and sum(abs(c) for c in beam.shape.coefficients[1:]) <= MAX_TURN
-
-
-def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
-    """Return cuts with layers at both ends of every element: a taut beam bends there, within sqrt(EI/N)."""
-    refined = []
-    for left, right in itertools.pairwise(cuts):
-        width, layers = LAYER_WIDTH / tautness, []
-        while width < 0.3 * (right - left):
-            layers.append(width)
-            width *= LAYER_GROWTH
-        refined += [left, *(left + layer for layer in layers), *(right - layer for layer in reversed(layers))]
-    return [*refined, 1.0]
-
-
-def without_floor(mesh: Discretisation, elements: Any) -> Discretisation:
-    """Return the same arrays with elements that do not stretch at all."""
-    axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
-    axial[elements], floored[elements] = 0.0, False
-    stiff = replace(mesh, elements=mesh.elements._replace(axial=axial), floored=floored)
-    stiff.known.update((key, made.stiffen(stiff)) for key, made in mesh.known.items())
-    return stiff
-
-
-def discretise_alike(
-    template: Discretisation, network: Network, drive: Drive, cuts: Mapping[str, list[float]] | None = None
-) -> Discretisation:
-    """Return the arrays of another network of the same make-up: degree, floors and units of the template's.
-
-    It has the template's `cuts` if they are given: where they differ by complex steps only.
-    """
-    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=cuts)
-    return without_floor(found, np.flatnonzero(found.floored & ~template.floored))

@@ -98,33 +98,39 @@ def _smooth_tables(
     beam: Beam, fitted: Fit, scales: MechanicsUnits, degree: int, cuts: list[float], wide: bool
 ) -> Iterator[dict[str, Any]]:
     """Yield the tables of the elements in each smooth part of a beam."""
-    length, force, rule = scales.length, scales.force, basis(degree)
-    tapers = isinstance(beam.section.thickness, Taper)
     for begin, end in itertools.pairwise(smooth_marks(beam, fitted)):
         own = np.array([pair for pair in itertools.pairwise(cuts) if begin <= 0.5 * sum(pair) < end])
-        if not len(own):  # marks at one place but for rounding
-            continue
-        left, width, inside = own[:, :1], own[:, 1:] - own[:, :1], 0.5 * (begin + end)
-        t = left + width * rule.places
-        along = (fitted.arc(t), float(np.real(fitted.arc(inside)))) if tapers else (t, inside)
-        speed = fitted.speed(t, inside) * width / length + 0.0 * t
-        rigidity, axial, shear = beam.section.rigidities(*along)
-        angle, whole = fitted.angle(t, inside) + 0.0 * t, speed @ rule.weights
-        tables = {
-            "angle": angle,
-            "weight": speed * rule.weights,
-            "rigidity": rigidity / (force * length**2) / speed**2,
-            "axial": axial * force + 0.0 * t,
-            "shear": shear * force + 0.0 * t,
-            "ahead": whole[:, None] - speed @ integrals_to_points(degree).T,
-            "length": whole,
-        }
-        if wide:
-            curl, hindrance = beam.section.curling(beam.section.thickness_at(*along))
-            tables["rest"] = angle @ slopes_at_points(degree).T
-            tables["curl"] = curl / (speed * length) ** 2
-            tables["hindrance"] = hindrance + 0.0 * speed
-        yield tables
+        if len(own):  # else the marks are at one place but for rounding
+            yield smooth_tables(beam, fitted, scales, degree, own, 0.5 * (begin + end), wide)
+
+
+def smooth_tables(
+    beam: Beam, fitted: Fit, scales: MechanicsUnits, degree: int, cuts: FloatArray, inside: float, wide: bool
+) -> dict[str, Any]:
+    """Return the tables of elements between cuts (..., e, 2) in the smooth part of a beam that holds `inside`."""
+    length, force, rule = scales.length, scales.force, basis(degree)
+    left, width = cuts[..., :1], cuts[..., 1:] - cuts[..., :1]
+    t = left + width * rule.places
+    tapers = isinstance(beam.section.thickness, Taper)
+    along = (fitted.arc(t), float(np.real(fitted.arc(inside)))) if tapers else (t, inside)
+    speed = fitted.speed(t, inside) * width / length + 0.0 * t
+    rigidity, axial, shear = beam.section.rigidities(*along)
+    angle, whole = fitted.angle(t, inside) + 0.0 * t, speed @ rule.weights
+    tables = {
+        "angle": angle,
+        "weight": speed * rule.weights,
+        "rigidity": rigidity / (force * length**2) / speed**2,
+        "axial": axial * force + 0.0 * t,
+        "shear": shear * force + 0.0 * t,
+        "ahead": whole[..., None] - speed @ integrals_to_points(degree).T,
+        "length": whole,
+    }
+    if wide:
+        curl, hindrance = beam.section.curling(beam.section.thickness_at(*along))
+        tables["rest"] = angle @ slopes_at_points(degree).T
+        tables["curl"] = curl / (speed * length) ** 2
+        tables["hindrance"] = hindrance + 0.0 * speed
+    return tables
 
 
 def smooth_marks(beam: Beam, fitted: Fit) -> list[float]:

@@ -53,6 +53,9 @@ def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields
     cos, sin = cos_sin(turn)
     normal = force[..., 0] * cos + force[..., 1] * sin
     shear = force[..., 1] * cos - force[..., 0] * sin
+    if e.laid is not None:
+        normal = np.where(e.laid[..., None], own[..., None, -2], normal)
+        shear = np.where(e.laid[..., None], 0.0, shear)
     stretch, slip = 1 + e.axial * normal, e.shear * shear
     return Fields(
         rotation @ rule.slopes.T, cos, sin, normal, shear, stretch * cos - slip * sin, stretch * sin + slip * cos

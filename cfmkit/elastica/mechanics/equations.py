@@ -21,7 +21,7 @@ from cfmkit.elastica.mechanics import energy
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
@@ -119,6 +119,11 @@ class NumpyEquations:
         """Return the equations of the same network with another flexibility along its beams."""
         return replace(self, mesh=mesh)
 
+    def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
+        """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
+        for name, values in tables.items():
+            getattr(self.mesh.elements, name)[elements] = values
+
     @property
     def n(self) -> int:
         """Number of free unknowns."""
@@ -172,8 +177,12 @@ class NumpyEquations:
         numpy.linalg.LinAlgError
             If the tangent is singular.
         """
-        tangent = self.linearise(free, way).tangent
-        return np.asarray(np.linalg.solve(tangent, right.T).T, float), energy.count_unstable(self.mesh, tangent)
+        at = self.linearise(free, way)
+        return np.asarray(np.linalg.solve(at.tangent, right.T).T, float), self.count_unstable(at)
+
+    def count_unstable(self, at: LinearEquations) -> int:
+        """Return the number of unstable directions at a held drive."""
+        return energy.count_unstable(self.mesh, at.tangent)
 
     def solve(
         self,
@@ -222,12 +231,12 @@ class NumpyEquations:
             old, old_way, free, way = free, way, free + change, way + along
             if quick and largest**2 < tolerance:
                 effort = self._effort(old, old_way) + float(at.change @ step)
-                return MarchState(free, way, rate, energy.count_unstable(self.mesh, at.tangent), effort)
+                return MarchState(free, way, rate, self.count_unstable(at), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
             rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < STANDING and largest < 1e-3)
             stands = rounds and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
-                unstable = energy.count_unstable(self.mesh, at.tangent)
+                unstable = self.count_unstable(at)
                 return MarchState(free, way, rate, unstable, self._effort(free, way))
             last = largest
         return None
@@ -257,7 +266,7 @@ class NumpyEquations:
 
         The flexibility is 0 if the tangent is singular.
         """
-        moves, flexibility = np.isinf(self.unit), 0.0
+        moves, flexibility = self.mesh.free < self.mesh.n_motions, 0.0
         vector = np.array(vector, float)
         try:
             inverse = np.linalg.inv(self.linearise(free, way).tangent)
@@ -285,9 +294,11 @@ class NumpyEquations:
 def force_units(mesh: Discretisation) -> FloatArray:
     """Return the unit of each free unknown that is a force, EI/L^2 of its element or 1; infinite for motions."""
     e = mesh.elements
-    bending = (np.real(e.rigidity) * np.real(e.weight)).sum(axis=1) * np.real(e.length)
+    length = np.real(e.length).reshape(-1, len(e.beam))[0]  # those of the first of several states
+    rigidity = np.real(e.rigidity * e.weight).reshape(-1, *e.weight.shape[-2:])[0]
+    bending = rigidity.sum(axis=1) * length
     unit = np.full(mesh.size, np.inf)
-    unit[e.unknowns[:, -2:]] = (bending / np.real(e.length) ** 2)[:, None]
+    unit[e.unknowns[:, -2:]] = (bending / length**2)[:, None]
     unit[[contact.unknown for contact in mesh.contacts]] = 1.0
     return np.asarray(unit[mesh.free])
 

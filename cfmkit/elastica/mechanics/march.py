@@ -17,6 +17,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.equations import ContactEquations, without_contacts
+from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.discretise import BeamElements
@@ -92,7 +93,9 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
     if key not in mesh.known:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(KNOWN) and mesh.degree <= MAX_DEGREE
-        if mesh.contacts:
+        if mesh.moving is not None:
+            mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
+        elif mesh.contacts:
             mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(without_contacts(mesh), ramp))
         else:
             mesh.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(mesh, ramp)
@@ -120,6 +123,13 @@ class CompiledEquations(NumpyEquations):
     def stiffen(self, mesh: Discretisation) -> CompiledEquations:
         """Return the equations of the same network with another flexibility along its beams."""
         return self._exchange(mesh, "axial", mesh.elements.axial)
+
+    def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
+        """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
+        super().refill(elements, tables)
+        for name, values in tables.items():
+            self.arrays[name][elements] = values
+        self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
 
     def rebase(self, base: FloatArray) -> CompiledEquations:
         """Return the equations with other values of the unknowns that are held, (size,)."""

@@ -17,11 +17,11 @@ from cfmkit.numerics.continuation.path import MarchedSteps
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.mechanics.equations import NumpyEquations
+    from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
+    from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
     from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import Border
 
@@ -46,6 +46,8 @@ class NetworkProblem:
     ramp: bool = False
     next_correction: float = 1e-10
     """Size of the next of Newton's corrections, as the square of the last, at which a march accepts an equilibrium."""
+    remesh: Callable[[tuple[FlankPlace, ...]], Discretisation] | None = None
+    """Returns the same arrays with other places at which sides of beams touch; None if none may."""
 
     @cached_property
     def motions(self) -> Any:
@@ -69,7 +71,7 @@ class NetworkProblem:
     def linearise(self, x: FloatArray, drive: float) -> Tangent:
         """Return residual, tangent and the residual's change with the drive."""
         at = self.equations.linearise(x, drive)
-        return Tangent(self.mesh, at.residual, at.change, at.tangent)
+        return Tangent(self.equations, at)
 
     def solve(
         self, x: FloatArray, drive: float, border: Border | None = None, push: FloatArray | None = None
@@ -204,15 +206,28 @@ def _equilibrium(state: MarchState) -> PathEquilibrium:
 class Tangent:
     """Residual and tangent of a network at one place."""
 
-    mesh: Discretisation
-    residual: FloatArray  # (n,)
-    rate: FloatArray  # (n,) change of the residual with the drive
-    tangent: FloatArray  # (n, n)
+    equations: NumpyEquations
+    at: LinearEquations
+
+    @property
+    def residual(self) -> FloatArray:
+        """Forces out of balance, (n,)."""
+        return self.at.residual
+
+    @property
+    def rate(self) -> FloatArray:
+        """Change of the residual with the drive, (n,)."""
+        return self.at.change
+
+    @property
+    def tangent(self) -> FloatArray:
+        """Derivatives of the residual, (n, n)."""
+        return self.at.tangent
 
     @cached_property
     def unstable(self) -> int:
         """Number of unstable directions at a held drive."""
-        return energy.count_unstable(self.mesh, self.tangent)
+        return self.equations.count_unstable(self.at)
 
     def solve(self, right: FloatArray) -> FloatArray | None:
         """Return the tangent's inverse times columns."""

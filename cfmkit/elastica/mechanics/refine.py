@@ -21,20 +21,30 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     tables = element_tables(mesh.fits, mesh.scales, degree, mesh.cuts)
     if mesh.floor.any():
         tables["axial"] = tables["axial"] + mesh.floor[:, None]
-    count, ends = len(e.length), _n_end_motions(mesh)
+    count, ends = len(e.beam), _n_end_motions(mesh)
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)
     unknowns = np.hstack([e.unknowns[:, :8], bubbles, forces])
     forces_end = ends + count * (degree + 1)
-    size = forces_end + len(mesh.contacts)
-    contacts = tuple(one._replace(unknown=forces_end + number) for number, one in enumerate(mesh.contacts))
+    ahead = forces_end - _first_behind_forces(mesh)
+    size = mesh.size + ahead
+    contacts = tuple(
+        one._replace(unknown=one.unknown + ahead, slide=one.slide + ahead, flag=one.flag + ahead)
+        if one.slide >= 0
+        else one._replace(unknown=one.unknown + ahead)
+        for one in mesh.contacts
+    )
+    moving = mesh.moving
+    if moving is not None:
+        moving = moving._replace(places=[place + ahead for place in moving.places])
     free = np.concatenate([mesh.free[mesh.free < ends], np.arange(ends, size)])
     base, rate = np.zeros(size, mesh.base.dtype), np.zeros(size)
     base[:ends], rate[:ends] = mesh.base[:ends], mesh.rate[:ends]
-    elements = e._replace(**tables, unknowns=unknowns)
+    elements = e._replace(**tables, unknowns=unknowns, moved_cuts=None)
     return replace(
-        mesh, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate, contacts=contacts
-    )
+        mesh, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate, contacts=contacts,
+        moving=moving,
+    )  # fmt: skip
 
 
 def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
@@ -44,9 +54,15 @@ def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
     found[..., :ends] = z[..., :ends]
     found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
     found[..., new[:, -2:]] = z[..., old[:, -2:]]
-    if mesh.contacts:
-        found[..., -len(mesh.contacts) :] = z[..., -len(mesh.contacts) :]
+    behind = mesh.size - _first_behind_forces(mesh)
+    if behind:
+        found[..., -behind:] = z[..., -behind:]
     return found
+
+
+def _first_behind_forces(mesh: Discretisation) -> int:
+    """Return the first unknown behind section forces: forces and places of contacts."""
+    return int(mesh.elements.unknowns[:, -2:].max()) + 1
 
 
 def _n_end_motions(mesh: Discretisation) -> int:

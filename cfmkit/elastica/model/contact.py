@@ -226,4 +226,19 @@ class NodeOnObstacle:
         return False
 
 
-Contact = Stop | NodeOnObstacle
+@dataclass(frozen=True)
+class BeamOnObstacle:
+    """The side of a beam and a rigid obstacle that is fixed to the ground; it touches at places that are unknowns."""
+
+    name: str
+    beam: str
+    outline: ObstacleEdge = field(compare=False)
+    stiffness: float = field(default=math.inf, init=False)  # a bed of springs would be another model
+
+    @property
+    def turns(self) -> bool:
+        """False: the force is no moment."""
+        return False
+
+
+Contact = Stop | NodeOnObstacle | BeamOnObstacle

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -190,6 +191,10 @@ class Network(ShortRepr):
         for load in self.loads:
             self.check_load(load)
         for contact in self.contacts:
+            if isinstance(contact, BeamOnObstacle):
+                if contact.beam not in beams:
+                    raise InputError(f"contact {contact.name!r} is of the beam {contact.beam!r}, which is not there")
+                continue
             self._known(contact.node, f"contact {contact.name!r}")
         if self.links:
             self._check_links()

@@ -173,14 +173,21 @@ def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], given: Fl
     through = _matrices(mesh.degree, tuple(given.tolist())).interpolation
     rows = []
     for element in elements:
-        beam, (left, right) = e.beam[element], e.cuts[element]
-        fitted, middle = mesh.fits[beam], 0.5 * (left + right)
+        cuts = e.cuts[element] if e.moved_cuts is None else e.moved_cuts[..., element, :]
+        beam, left, right = e.beam[element], cuts[..., :1], cuts[..., 1:]
+        fitted, middle = mesh.fits[beam], 0.5 * float(e.cuts[element].sum())
         t, known = left + (right - left) * given, left + (right - left) * rule.places
-        added = e.angle[element] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
+        added = e.angle[..., element, :] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
         place = fitted.arc(t)
         thickness = net.beams[beam].section.thickness_at(place, float(np.real(fitted.arc(middle)))) + 0.0 * t
-        rows.append((place, fitted.angle(t, middle) + 0.0 * t + through @ added, thickness))
-    return _BeamAtRest(*(np.array(column) for column in zip(*rows, strict=True)))
+        rows.append(
+            (
+                place,
+                fitted.angle(t, middle) + 0.0 * t + (through @ added if added.ndim == 1 else added @ through.T),
+                thickness,
+            )
+        )
+    return _BeamAtRest(*(np.stack(column, axis=-2) for column in zip(*rows, strict=True)))
 
 
 def _rest_of_designs(
@@ -227,7 +234,8 @@ def _forces(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
     rule, own = basis(mesh.degree), at.z[..., whole.unknowns[elements]]
     tables = {name: getattr(whole, name) for name in ON_POINTS}
     picked = {name: table[..., elements, :] for name, table in tables.items() if table is not None}
-    e = whole._replace(**picked, length=whole.length[..., elements])
+    laid = None if whole.laid is None else whole.laid[..., elements]
+    e = whole._replace(**picked, length=whole.length[..., elements], laid=laid)
     load = energy.line_load(mesh, at.drive)[..., elements, :]
     rotation, end = own[..., energy.rotation_columns(mesh.degree)], own[..., -2:]
     speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(given.tolist()))
@@ -255,7 +263,28 @@ def _forces(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
         (moment - (fields.turning * speed) @ upto) * scales.moment,
         rest.thickness,
     )
+    if e.laid is not None:
+        states, fields = _lie_down(e, rotation, end[..., 0], given, states, fields, scales)
     return _Forces(states, fields, speed, upto)
+
+
+def _lie_down(
+    e: BeamElements, rotation: Any, tension: Any, given: FloatArray, states: BeamStates, fields: _Fields, scales: Any
+) -> tuple[BeamStates, _Fields]:
+    """Return states with those of elements that lie on an obstacle: even tension and moment, rotations in a line."""
+    rule, lies = basis(rotation.shape[-1] - 1), e.laid[..., None]
+    change = (rotation[..., 1] - rotation[..., 0])[..., None]
+    turn = rotation[..., :1] + change * given
+    angle = states.angle + turn
+    moment = (e.rigidity * e.weight / rule.weights)[..., :1] * change * scales.moment
+    force = tension[..., None] * scales.force
+    laid = states._replace(turn=turn, h=force * np.cos(angle), v=force * np.sin(angle), moment=moment + 0.0 * turn)
+    merged = {name: np.where(lies, getattr(laid, name), getattr(states, name)) for name in ("turn", "h", "v", "moment")}
+    direction = e.angle + rotation[..., :1] + change * rule.places
+    stretch = 1 + e.axial * tension[..., None]
+    along = [np.where(lies, stretch * turned, field) for turned, field in
+             ((np.cos(direction), fields.slope_x), (np.sin(direction), fields.slope_y))]  # fmt: skip
+    return states._replace(**merged), fields._replace(slope_x=along[0], slope_y=along[1])
 
 
 class _Fields(NamedTuple):

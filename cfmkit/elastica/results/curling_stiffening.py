@@ -51,7 +51,7 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = np.imag(fitted.angle(t + 1j * _STEP, inside)) / _STEP / np.real(fitted.speed(t, inside))
             rigidity = section.youngs_modulus * section.width * found.thickness**3 / 12
-            weights = mesh.elements.weight[element] * mesh.scales.length
+            weights = mesh.elements.weight[..., element, :] * mesh.scales.length
             density = 0.5 * found.moment**2 / rigidity * weights
             energies[number] += density.sum(axis=1)
             if not section.wide:

@@ -13,6 +13,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.results.path import largest_force
 from cfmkit.results import ROUND_OFF
@@ -34,8 +35,8 @@ ROUNDING = 30 * np.finfo(float).eps
 def stiffest(mesh: Discretisation) -> float:
     """Return the largest force on the end of an element that is moved by a unit length, dimensionless."""
     e = mesh.elements
-    stretch = np.where(mesh.floored, 0.0, (e.weight * e.axial).sum(axis=1))
-    bent = 12.0 / (e.weight / e.rigidity).sum(axis=1)
+    stretch = np.where(mesh.floored, 0.0, (e.weight * e.axial).sum(axis=-1))
+    bent = 12.0 / (e.weight / e.rigidity).sum(axis=-1)
     return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
 
 
@@ -106,7 +107,7 @@ def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatA
     found = np.zeros((len(names) + len(mesh.springs), len(path)))
     beam = np.array([names.index(name) for name in mesh.elements.beam])
     for k, (state, at) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
-        own, _ = energy.element_gradients(mesh, state, at, 1.0)
+        own, _ = energy.element_gradients(with_places(mesh, state), state, at, 1.0)
         np.add.at(found[:, k], beam, (own * z[k][mesh.elements.unknowns]).sum(axis=1))
         for number, spring in enumerate(mesh.springs):
             part = TERMS[type(spring.item)](mesh, spring, state, 1.0, at)

@@ -13,8 +13,8 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import discretise_alike
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.path import PathStatus
 from cfmkit.errors import InputError

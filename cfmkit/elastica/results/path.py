@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
+from cfmkit.elastica.contact.side_gaps import least_side_gaps
 from cfmkit.elastica.contact.terms import gaps, press
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
@@ -17,6 +18,7 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.results import beam_states, stress_extremes
@@ -69,7 +71,7 @@ class Event:
 class ContactEvent:
     """The begin or end of a contact, or a contact that blocks the drive; unstable directions before and after."""
 
-    kind: Literal["begins", "ends", "blocks"]
+    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes"]
     number: int  # of the contact in `Network.contacts`
     drive: float  # [m, rad or 1]
     before: int
@@ -181,14 +183,44 @@ class EquilibriumPath(ShortRepr):
         return np.broadcast_to(self.at_contact, (len(self),))
 
     def contact_force(self, number: int) -> FloatArray:
-        """Return the force of a contact at every point, (n,) [N], of a stop that limits a rotation the moment [N m]."""
-        mesh, contact = self.mesh, self.mesh.contacts[number]
-        unit = mesh.scales.moment if contact.item.turns else mesh.scales.force
-        return read_only(self.at.z[:, contact.unknown] * unit)
+        """Return the force of a contact at every point, (n,) [N], of a stop that limits a rotation the moment [N m].
+
+        Of the side of a beam it is the sum over all places.
+        """
+        mesh = self.mesh
+        unit = mesh.scales.moment if self.network.contacts[number].turns else mesh.scales.force
+        unknowns = [contact.unknown for contact in mesh.contacts if contact.number == number]
+        return read_only(self.at.z[:, unknowns].sum(axis=1) * unit)
+
+    def contact_places(self, number: int) -> FloatArray:
+        """Return between which places the side of a beam touches at every point, (n, 2) [share of its length].
+
+        They are the same where it touches at one place, and not a number where it is apart.
+        """
+        mesh, item = self.mesh, self.network.contacts[number]
+        sides = [contact for contact in mesh.contacts if contact.number == number]
+        places = np.full((len(self), 2, max(len(sides), 1)), np.nan)
+        for k, contact in enumerate(sides):
+            side = np.rint(self.at.z[:, contact.flag])
+            place = np.reshape(mesh.fits[item.beam].arc(self.at.z[:, contact.slide]), (-1,))  # type: ignore[union-attr]
+            closed = self.at.z[:, contact.unknown] > 0
+            first, last = sides[:1] == [contact], sides[-1:] == [contact]
+            places[:, 0, k] = np.where(closed, np.where((side < 0) & first, 0.0, place), np.nan)
+            places[:, 1, k] = np.where(closed, np.where((side > 0) & last, 1.0, place), np.nan)
+        low = np.where(np.isnan(places[:, 0]), np.inf, places[:, 0]).min(axis=1)
+        high = np.where(np.isnan(places[:, 1]), -np.inf, places[:, 1]).max(axis=1)
+        apart = ~np.isfinite(low)
+        return read_only(np.where(apart[:, None], np.nan, np.stack([low, high], axis=1)))
 
     def contact_gap(self, number: int) -> FloatArray:
-        """Return the gap of a contact at every point, (n,) [m or rad]; negative by what an elastic one yields."""
-        mesh, contact = self.mesh, self.mesh.contacts[number]
+        """Return the gap of a contact at every point, (n,) [m or rad]; negative by what an elastic one yields.
+
+        Of the side of a beam it is the least, wherever along the beam that is.
+        """
+        item = self.network.contacts[number]
+        if isinstance(item, BeamOnObstacle):
+            return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
+        mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length
         return read_only(gaps(mesh, contact, self.at.z) * unit)
 
@@ -378,7 +410,7 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
         total = total + fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
     line = mesh.elements.line[:, 1]
     if line.any():
-        rest = partials(mesh, np.zeros((1, mesh.size)), np.zeros(1))["line"]
+        rest = partials(mesh, np.zeros_like(at.z), np.zeros(len(at.z)))["line"]
         moved = rest[:, :, 0] - partials(mesh, at.z, at.drive)["line"][:, :, 0]
         total = total + (moved * line).sum(axis=(1, 2)) * scales.moment / scales.drive
     return total + np.zeros(len(at.z))
@@ -395,7 +427,8 @@ def strain_energy(at: Equilibria) -> Any:
             [term(at.mesh, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
         )
     for contact in at.mesh.contacts:
-        total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
+        if contact.slide < 0:
+            total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
     return total
 
 
@@ -404,5 +437,5 @@ def largest_force(at: Equilibria) -> float:
     mesh, e = at.mesh, at.mesh.elements
     own = at.z[:, e.unknowns]
     curvature = own[..., energy.rotation_columns(mesh.degree)] @ basis(mesh.degree).slopes.T
-    moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)
+    moment = np.abs(e.rigidity * e.length[..., None] * curvature).max(initial=0.0)
     return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))

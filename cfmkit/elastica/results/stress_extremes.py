@@ -94,7 +94,7 @@ def extremes_of_designs(
 ) -> FloatArray:
     """Return the highest combinations along all beams of some designs, (b, p, c); see `forces_of_designs`."""
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
-    elements = len(at.mesh.elements.length)
+    elements = len(at.mesh.elements.beam)
     together, parts = max(1, MAX_TOGETHER // (elements * len(signs) * N_GRID)), []
     for k in range(0, len(at.z), together):
         some = slice(k, k + together)
@@ -125,7 +125,7 @@ def _on_elements(net: Network, at: Equilibria, elements: list[int], signs: Float
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])
     found = forces_of_elements(net, at, elements, fractions)
-    arcs = found.place.reshape(1, len(elements), len(fractions))
+    arcs = found.place.reshape(-1, len(elements), len(fractions))
     return _tops(sections_of_width(np.repeat(widths, len(fractions)), found), arcs, signs, to_series)
 
 

@@ -8,20 +8,24 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.changes import ContactChange
-from cfmkit.elastica.contact.follow import follow_in_contact
-from cfmkit.elastica.mechanics.discretise import without_floor
+from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
+from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.mechanics.similar_arrays import without_floor
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
     from cfmkit.numerics.continuation.problem import PathEquilibrium
+
+    Remesh = Callable[[tuple[FlankPlace, ...]], Discretisation]
+    Change = Callable[[Discretisation], Discretisation]
 
 FIRST_SHARE = 0.5  # of what is constant, in the first step
 LOOSEST_CORRECTION, CORRECTION_SHARE = 1e-10, 1e-6
@@ -43,13 +47,14 @@ class DriveStart(NamedTuple):
     stopped: tuple[str, PathStop] | None  # what could not be applied, and how the way to it ended
 
 
-def find_start(mesh: Discretisation, control: Control) -> DriveStart:
+def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = None) -> DriveStart:
     """Return the equilibrium under what is constant, on a stable branch if there is one.
 
     Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
-    applied: of several stable states it is the one to which this way leads.
+    applied: of several stable states it is the one to which this way leads. `remesh` returns the arrays with other
+    places at which sides of beams touch.
     """
-    problem = NetworkProblem(mesh, next_correction=next_correction(control))
+    problem = NetworkProblem(mesh, next_correction=next_correction(control), remesh=remesh)
     events: list[Event] = []
     branch: PathBranch | None = None
     first: Buckling | None = None
@@ -58,7 +63,9 @@ def find_start(mesh: Discretisation, control: Control) -> DriveStart:
     at = correct(at_rest, np.zeros(len(mesh.free)), 0.0)
     if at is None:
         return DriveStart(problem, None, (), None, None, None)
-    for what, ramp in ramps:
+    flanks: tuple[FlankPlace, ...] = ()
+    for what, change in ramps:
+        ramp = _make_ramp(change, mesh if remesh is None or not flanks else remesh(flanks), remesh)
         options = Options(
             1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
         )
@@ -67,6 +74,15 @@ def find_start(mesh: Discretisation, control: Control) -> DriveStart:
             return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
         for item in follow_in_contact(ramp, begin, np.ones(1), options, branch):
             if isinstance(item, ContactChange):
+                continue
+            if isinstance(item, Remeshed):
+                touching = item.problem.mesh
+                cuts = touching.elements.cuts
+                flanks = tuple(
+                    FlankPlace(contact.number, float(cuts[contact.element, 1]), contact.laid)
+                    for contact in touching.contacts
+                    if contact.slide >= 0
+                )
                 continue
             if isinstance(item, PathEvent):
                 if control.branch != "primary" and item.before != item.after:  # nothing is lost on a path straight on
@@ -80,6 +96,8 @@ def find_start(mesh: Discretisation, control: Control) -> DriveStart:
         if branch is not None and not branch.label:
             branch = branch._replace(label=what)
     # just at a bifurcation Newton's method fails where the way there has led
+    if flanks and remesh is not None:
+        problem = replace(problem, mesh=remesh(flanks))
     if ramps:
         at = correct(problem, at.x, 0.0) or at._replace(drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
     problem, at = _remove_floors(problem, at)
@@ -93,14 +111,24 @@ def next_correction(control: Control) -> float:
     return min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance)
 
 
-def _ramps(mesh: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
-    """Yield what is constant, in the order in which it is applied, with the problem along the share of it."""
+def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
+    """Yield what is constant, in the order in which it is applied, and how the arrays are along the share of it.
+
+    The second of these says whether the share, not the drive, is the way.
+    """
     springs = [spring.item for spring in mesh.springs]
     tight = any(getattr(item, name, None) for item in springs for name in FREE)
     if tight or mesh.elements.gap.any():
-        yield "prestress", NetworkProblem(_without_loads(mesh), ramp=True)
+        yield "prestress", (_without_loads, True)
     if any(not load.grows for load in mesh.loads) or mesh.elements.line[:, 0].any() or mesh.base.any():
-        yield "constant loads", NetworkProblem(_loads_as_drive(mesh))
+        yield "constant loads", (_loads_as_drive, False)
+
+
+def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:
+    """Return the problem along what is constant."""
+    alter, ramp = change
+    own = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
+    return NetworkProblem(alter(mesh), ramp=ramp, remesh=own)
 
 
 def _without_loads(mesh: Discretisation) -> Discretisation:
@@ -144,6 +172,14 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     if not needless.size:
         return problem, at
     stiff = replace(problem, mesh=without_floor(mesh, needless))
+    if problem.remesh is not None:
+        beams, remesh = {mesh.elements.beam[number] for number in needless.tolist()}, problem.remesh
+
+        def remesh_stiff(flanks: tuple[FlankPlace, ...]) -> Discretisation:
+            found = remesh(flanks)
+            return without_floor(found, [k for k, name in enumerate(found.elements.beam) if name in beams])
+
+        stiff = replace(stiff, remesh=remesh_stiff)
     return stiff, correct(stiff, at.x, at.drive) or at
 
 
@@ -153,4 +189,4 @@ def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
         return False
     elements = np.flatnonzero(mesh.floored)
     force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
-    return bool((force * mesh.elements.axial[elements].max(axis=1) > FLOOR_STRAIN).any())
+    return bool((force * mesh.axial[elements].max(axis=1) > FLOOR_STRAIN).any())

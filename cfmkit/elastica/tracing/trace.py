@@ -11,16 +11,19 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.changes import ContactChange
-from cfmkit.elastica.contact.follow import follow_in_contact
+from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
+from cfmkit.elastica.contact.joined_pieces import StatesOfPiece, join_pieces
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
+from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
 from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
@@ -48,9 +51,6 @@ MAX_RAISED_ERROR, MAX_RAISED_MOTION = 1e-2, 0.05
 """Error of a path, and motion of its points, up to which it is raised to a higher degree as it is."""
 NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
-MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
-MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: it locks
-WHOLE = 0.15  # share of a beam from which on a taut element is cut again
 EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
 SAME_PLACE = 1e-9  # share of the range within which a point lies at a bifurcation
 SAME_END = 1e-3  # share of the range within which two paths end alike
@@ -65,9 +65,11 @@ class DegreeAndPieces:
     pieces: int = 1
     tension: Mapping[str, float] | None = None
 
-    def arrays(self, network: Network, drive: Drive, fits: BeamFits | None = None) -> Discretisation:
-        """Return the arrays of a network, whose beams may be fitted already."""
-        return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits)
+    def arrays(
+        self, network: Network, drive: Drive, fits: BeamFits | None = None, flanks: tuple[FlankPlace, ...] = ()
+    ) -> Discretisation:
+        """Return the arrays of a network, whose beams may be fitted already, and whose sides may touch at places."""
+        return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits, flanks=flanks)
 
 
 class TraceAttempt(NamedTuple):
@@ -136,7 +138,9 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
         path = attempt.path
         if is_stretched(path.mesh, path.at.z):
             return attempt
-        taut = _tension(path, resolution.tension or {})
+        # where a path locks against a contact forces grow beyond all bounds: no layer resolves that
+        locks = bool(network.contacts) and path.status is PathStatus.LIMIT_POINT
+        taut = find_tension(path.take(path.at_requested) if locks else path, resolution.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
             degree = max(_plain_degree(tolerance), DEGREE_OF_LAYERS)
             resolution = replace(resolution, tension={**(resolution.tension or {}), **taut}, degree=degree)
@@ -309,8 +313,14 @@ def trace_on(
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
     arrays = resolution.arrays(network, drive, fits)
-    start = find_start(arrays, control)
+    sides = any(isinstance(contact, BeamOnObstacle) for contact in network.contacts)
+
+    def remesh(flanks: tuple[FlankPlace, ...]) -> Discretisation:
+        return resolution.arrays(network, drive, arrays.fits, flanks)
+
+    start = find_start(arrays, control, remesh if sides else None)
     events, first, points = list[PathEvent](), start.first, list[Point]()
+    meshes = [(0, start.problem.mesh)]  # number of the first point of each piece, and its arrays
     changes: dict[int, list[ContactChange]] = {}  # by the points they are at
     ending = PathStop(WhyStopped.LOST, 0.0)
     unit = arrays.scales.drive
@@ -319,6 +329,8 @@ def trace_on(
         for item in follow_in_contact(start.problem, start.at, drive.points / unit, options, start.branch):
             if isinstance(item, Point):
                 points.append(item)
+            elif isinstance(item, Remeshed):
+                meshes.append((len(points), item.problem.mesh))
             elif isinstance(item, ContactChange):
                 changes.setdefault(len(points) - 1, []).append(item)
                 stabler = points[-1].at._replace(unstable=min(item.before, item.after))
@@ -337,16 +349,16 @@ def trace_on(
     if events:
         points = [_at_event(point, events, drive, unit) for point in points]
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
-    path = _path(network, drive, start, points, told, status, message)
+    path = _path(network, drive, _states(start, meshes, points), points, told, status, message)
     if changes:
         touched = tuple(
-            ContactEvent(one.kind, one.number, one.at.drive * unit, one.before, one.after)
+            ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after)
             for found in changes.values()
             for one in found
         )
         marked = read_only(np.isin(np.arange(len(points)), list(changes)), np.bool_)
         path = replace(path, contact_events=touched, at_contact=marked)
-    path = _without_locked_points(path)
+    path = drop_locked_points(path)
     branches = tuple(point.branch for point in points[: len(path)])
     return TraceAttempt(path, resolution, start, first, tuple(events), branches)
 
@@ -361,25 +373,36 @@ def _options(drive: Drive, control: Control, unit: float) -> Options:
     )  # fmt: skip
 
 
+def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points: list[Point]) -> Equilibria:
+    """Return the states of all points on one network of elements."""
+    pieces = []
+    ends = [first for first, _ in meshes[1:]] + [len(points)]
+    for (first, arrays), end in zip(meshes, ends, strict=True):
+        drives = np.array([point.at.drive for point in points[first:end]])
+        z: Any = arrays.base + drives[:, None] * arrays.rate
+        z[:, arrays.free] = np.array([point.at.x for point in points[first:end]]).reshape(len(drives), len(arrays.free))
+        pieces.append(StatesOfPiece(arrays, z, drives))
+    if len(pieces) == 1 or start.problem.remesh is None:
+        return Equilibria(*pieces[0])
+    drives = np.concatenate([piece.drive for piece in pieces])
+    return Equilibria(*join_pieces([piece for piece in pieces if len(piece.drive)], start.problem.remesh), drives)
+
+
 def _path(
-    network: Network, drive: Drive, start: DriveStart, points: list[Point], events: tuple[Event, ...],
+    network: Network, drive: Drive, states: Equilibria, points: list[Point], events: tuple[Event, ...],
     status: PathStatus, message: str,
 ) -> Path:  # fmt: skip
-    arrays = start.problem.mesh
-    drives = np.array([point.at.drive for point in points])
-    z: Any = arrays.base + drives[:, None] * arrays.rate
-    z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
     path = Path(
-        network, drive, Equilibria(arrays, z, drives),
+        network, drive, states,
         unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
         requested=read_only(np.array([point.target for point in points]), np.int64),
-        branch=_name_branches([point.branch for point in points], arrays.scales.drive),
+        branch=_name_branches([point.branch for point in points], states.mesh.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points)), np.bool_),
     )  # fmt: skip
     efforts = np.array([point.at.effort for point in points])
     if not isinstance(drive, Loading) and np.isfinite(efforts).all():  # the solver has them already
-        vars(path)["effort"] = read_only(efforts * (arrays.scales.moment / arrays.scales.drive))
+        vars(path)["effort"] = read_only(efforts * (states.mesh.scales.moment / states.mesh.scales.drive))
     return path
 
 
@@ -444,7 +467,8 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
     if not attempt.events or not (folds or control.branch == "primary"):
         return True
     limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
-    drives = _relocate(attempt, replace(attempt.start.problem, mesh=finer))
+    moves = finer.moving is not None  # then events are on other elements
+    drives = None if moves else _relocate(attempt, replace(attempt.start.problem, mesh=finer))
     if drives is not None:
         places = np.array([event.drive for event in attempt.events])
         return bool(np.abs(places - drives).max() * path.mesh.scales.drive <= limit)
@@ -461,38 +485,3 @@ def _span(path: Path) -> float:
 def _range(drive: Drive) -> float:
     points = drive.points
     return max(float(points.max()), 0.0) - min(float(points.min()), 0.0)
-
-
-def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
-    """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
-    e, found = path.mesh.elements, dict[str, float]()
-    if not len(path):
-        return {}
-    whole = _tautness(path)
-    if not whole.max() > TAUT:
-        return {}
-    resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
-    for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
-        if right - left > WHOLE and resolved[number] * (right - left) > TAUT:
-            found[beam] = max(found.get(beam, 0.0), float(resolved[number]))
-    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
-
-
-def _tautness(path: Path) -> FloatArray:
-    """Return L sqrt(N/EI) at every point with the length of an element's beam, (n, e)."""
-    e = path.mesh.elements
-    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
-    bending = (e.rigidity * e.weight).sum(axis=1) * e.length
-    lengths = dict.fromkeys(e.beam, 0.0)
-    for beam, length in zip(e.beam, e.length.tolist(), strict=True):
-        lengths[beam] += length
-    return np.asarray(np.sqrt(force / bending) * [lengths[beam] for beam in e.beam])
-
-
-def _without_locked_points(path: Path) -> Path:
-    """Return a path that ends early up to where a beam that does not stretch is pulled straight: there forces soar."""
-    rigid = ~path.mesh.elements.axial.any(axis=1)
-    if path.status is PathStatus.COMPLETE or not len(path) or not rigid.any():
-        return path
-    locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
-    return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

@@ -9,7 +9,17 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
-from cfmkit.elastica.model.contact import Contact, NodeOnObstacle, ObstacleEdge, Stop, arc, circle, line, polyline
+from cfmkit.elastica.model.contact import (
+    BeamOnObstacle,
+    Contact,
+    NodeOnObstacle,
+    ObstacleEdge,
+    Stop,
+    arc,
+    circle,
+    line,
+    polyline,
+)
 from cfmkit.specs.spec import Model, PositiveLength, Requirement
 from cfmkit.specs.units import Angle, Length, RotationalStiffness, Stiffness, format_short
 
@@ -20,6 +30,7 @@ Fault = tuple[tuple[str | int, ...], str]
 Mechanism = Any
 """The block `mechanism`, which imports this file."""
 OVERLAP = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
+HELD_SUPPORTS = ("clamped", "pinned")  # supports of nodes that are held in place
 LONGEST_POLYLINE = 200  # corners
 
 
@@ -89,7 +100,12 @@ class ObstacleBase(Model):
     nodes: dict[str, Annotated[Length, Field(ge=0)]] | None = Field(
         None,
         description="nodes that may touch it, with the radius of their round pads: {tip: 2 mm}; default: all free "
-        "ends of beams, with half the thickness there",
+        "ends of beams, and ends of the beams that may touch it, with half the thickness there",
+    )
+    beams: tuple[str, ...] | None = Field(
+        None,
+        description="beams whose sides may touch it, anywhere along their lengths; default: all, none where nodes or "
+        "a stiffness are stated",
     )
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(
         None, description="of the obstacle at a pad; default: it is rigid"
@@ -202,12 +218,35 @@ def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
         outline = obstacle.outline()
         for node, radius in pads_of(mechanism, obstacle).items():
             found.append(NodeOnObstacle(name, node, outline, radius, obstacle.stiffness or math.inf))
+        found.extend(BeamOnObstacle(name, beam, outline) for beam in sides_of(mechanism, obstacle))
     return tuple(found)
 
 
+def sides_of(mechanism: Mechanism, obstacle: ObstacleBase) -> tuple[str, ...]:
+    """Return the beams whose sides may touch an obstacle."""
+    if obstacle.beams is not None:
+        return obstacle.beams
+    return () if obstacle.nodes is not None or obstacle.stiffness is not None else tuple(mechanism.beams)
+
+
 def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]:
-    """Return the nodes that may touch an obstacle, with the radii of their pads [m]."""
-    return obstacle.nodes if obstacle.nodes is not None else free_ends(mechanism)
+    """Return the nodes that may touch an obstacle, with the radii of their pads [m].
+
+    Where the sides of beams may touch it, so may their ends, but for those that are held in place.
+    """
+    if obstacle.nodes is None and obstacle.beams is None and obstacle.stiffness is not None:
+        return free_ends(mechanism)
+    pads = dict(obstacle.nodes) if obstacle.nodes is not None else free_ends(mechanism)
+    for name in sides_of(mechanism, obstacle):
+        if name not in mechanism.beams:
+            continue
+        beam, thickness = mechanism.beams[name], mechanism.of_beams("thickness")[name]
+        for node, last in ((beam.start, False), (beam.end, True)):
+            if mechanism.nodes[node].support not in HELD_SUPPORTS:
+                half = 0.5 * (thickness[-1 if last else 0][1] if isinstance(thickness, tuple) else thickness)
+                stated = pads.get(node, 0.0) if obstacle.nodes is None or node not in obstacle.nodes else math.inf
+                pads[node] = max(stated, half) if math.isfinite(stated) else pads[node]
+    return pads
 
 
 def free_ends(mechanism: Mechanism) -> dict[str, float]:
@@ -230,8 +269,9 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
     size = max(math.dist(one.at, other.at) for one in mechanism.nodes.values() for other in mechanism.nodes.values())
     for name, obstacle in mechanism.obstacles.items():
         place = ("obstacles", name, obstacle.kind)
+        yield from _side_faults(mechanism, obstacle, place)
         pads = pads_of(mechanism, obstacle)
-        if not pads:
+        if not pads and not sides_of(mechanism, obstacle):
             yield (*place, "nodes"), "no beam ends freely: state the nodes that may touch it, such as {tip: 2 mm}"
         outline = obstacle.outline()
         for node, radius in pads.items():
@@ -264,6 +304,24 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
         yield (key,), "contact is not supported under loads that turn with their node: leave out 'follows'"
 
 
+def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str | int, ...]) -> Iterator[Fault]:
+    """Yield what is wrong with the sides of beams on an obstacle."""
+    if obstacle.beams and obstacle.stiffness is not None:
+        yield (*place, "stiffness"), "an obstacle that sides of beams touch is rigid: leave it out, or state 'nodes'"
+    outline, thickness = obstacle.outline(), mechanism.of_beams("thickness")
+    for name in sides_of(mechanism, obstacle):
+        if name not in mechanism.beams:
+            continue
+        profile = thickness[name]
+        most = max(value for _, value in profile) if isinstance(profile, tuple) else profile
+        if outline.smallest_hollow <= 0.5 * most:
+            yield (
+                place,
+                f"its hollow of {format_short(outline.smallest_hollow, 'length')} is too tight for beam {name!r}, half "
+                f"as thick as {format_short(most, 'length')}",
+            )
+
+
 def _column_faults(mechanism: Mechanism) -> Iterator[Fault]:
     seen = {f"{name}_force" for name in mechanism.beams}
     for place, column in column_names(mechanism):
@@ -277,8 +335,8 @@ def column_names(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], 
     for name in mechanism.stops:
         yield ("stops", name), f"stop_{name}_force"
     for name, obstacle in mechanism.obstacles.items():
-        for node in pads_of(mechanism, obstacle):
-            yield ("obstacles", name, obstacle.kind), f"{name}_{node}_force"
+        for toucher in (*pads_of(mechanism, obstacle), *sides_of(mechanism, obstacle)):
+            yield ("obstacles", name, obstacle.kind), f"{name}_{toucher}_force"
 
 
 def contact_requirement_faults(mechanism: Mechanism, requirements: Sequence[Requirement]) -> Iterator[Fault]:

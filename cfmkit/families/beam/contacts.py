@@ -11,9 +11,12 @@ import numpy as np
 
 from cfmkit.arrays import LazyMapping
 from cfmkit.curves import Column
-from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
+from cfmkit.elastica.contact.side_gaps import SideGaps, Stage
+from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
-from cfmkit.families.beam.contact_spec import column_names, pads_of
+from cfmkit.errors import InputError
+from cfmkit.families.beam.contact_spec import OVERLAP, column_names, pads_of, sides_of
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Path
     from cfmkit.elastica.model.contact import Contact
     from cfmkit.elastica.results.path import ContactEvent
+    from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.solution import Solution
 
@@ -46,18 +50,49 @@ LARGEST_FORCE = (
 N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners
 PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
+ROUNDING_OF_GAP = 1e-9  # mean beam lengths: a clamped end that lies on an obstacle stays there
 NEAR_GAP = 0.01  # share of the thinnest beam's thickness below which a gap that stays open is reported
 OUT_OF_REACH = 10.0  # largest motions of a pad from an obstacle, from which on it is reported
 MOST_NAMED = 6
 
 
+def refuse_sides_in_obstacles(assembly: Assembly) -> None:
+    """Refuse beams that lie in an obstacle before any load.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        With the beam, the obstacle, the depth and the place.
+    """
+    network = assembly.network
+    sides = [contact for contact in network.contacts if isinstance(contact, BeamOnObstacle)]
+    if not sides:
+        return
+    mesh = discretise(network, assembly.drive())
+    rest = np.zeros((1, mesh.size))
+    for contact in sides:
+        least = SideGaps(mesh, contact, ()).find_least(rest[0], Stage(np.zeros(1)))
+        depth = -least.gap * mesh.scales.length
+        if depth > OVERLAP * mesh.scales.length:
+            place = float(np.ravel(mesh.fits[contact.beam].arc(least.parameter))[0])
+            raise InputError(
+                f"mechanism.obstacles.{contact.name}: beam {contact.beam!r} lies {format_short(depth, 'length')} in"
+                f"side it at {place:.0%} of its length before any load"
+            )
+
+
 # -- forces ------------------------------------------------------------------------------------------------------------
 def groups(contacts: tuple[Contact, ...]) -> dict[tuple[str, str], list[int]]:
-    """Return the numbers of the contacts by name and node: of a stop, or of one pad on an obstacle."""
+    """Return the numbers of the contacts by name and node or beam: of a stop, or of what touches an obstacle."""
     found: dict[tuple[str, str], list[int]] = {}
     for number, contact in enumerate(contacts):
-        found.setdefault((contact.name, contact.node), []).append(number)
+        found.setdefault((contact.name, toucher(contact)), []).append(number)
     return found
+
+
+def toucher(contact: Contact) -> str:
+    """Return the node or the beam that touches."""
+    return contact.beam if isinstance(contact, BeamOnObstacle) else contact.node
 
 
 def signed_force(path: Path, numbers: list[int]) -> FloatArray:
@@ -78,8 +113,19 @@ def named_force(path: Path, name: str) -> FloatArray:
 def contact_columns(solution: Solution) -> LazyColumns:
     """Return the force of each stop and each pad at every point of the curve, and what happens there; when read."""
     known = LazyMapping(("all",), lambda _: _columns(solution))
-    names = [column for _, column in column_names(solution.spec.mechanism)] if solution.path.network.contacts else []
+    names = _column_names(solution) if solution.path.network.contacts else []
     return {name: partial(lambda own: known["all"][own], name) for name in [*names, *(["event"] if names else [])]}
+
+
+def _column_names(solution: Solution) -> list[str]:
+    """Return the names of all columns: of the side of a beam also those of where it touches."""
+    forces = [column for _, column in column_names(solution.spec.mechanism)]
+    contacts, names = solution.path.network.contacts, list[str]()
+    for column, numbers in zip(forces, groups(contacts).values(), strict=True):
+        names.append(column)
+        if isinstance(contacts[numbers[0]], BeamOnObstacle):
+            names += [f"{column.removesuffix('force')}{end}" for end in ("from", "to")]
+    return names
 
 
 def _columns(solution: Solution) -> dict[str, Column]:
@@ -87,8 +133,12 @@ def _columns(solution: Solution) -> dict[str, Column]:
     names = [column for _, column in column_names(solution.spec.mechanism)]
     columns = {}
     for column, numbers in zip(names, groups(path.network.contacts).values(), strict=True):
-        turns = path.network.contacts[numbers[0]].turns
-        columns[column] = Column(signed_force(path, numbers)[keep], "torque" if turns else "force")
+        contact = path.network.contacts[numbers[0]]
+        columns[column] = Column(signed_force(path, numbers)[keep], "torque" if contact.turns else "force")
+        if isinstance(contact, BeamOnObstacle):
+            places = path.contact_places(numbers[0])[keep]
+            for end, values in zip(("from", "to"), places.T, strict=True):
+                columns[f"{column.removesuffix('force')}{end}"] = Column(values, "ratio")
     marks = np.full(len(path), "", dtype=object)
     for event in path.contact_events:
         point = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
@@ -98,7 +148,7 @@ def _columns(solution: Solution) -> dict[str, Column]:
 
 def _mark(path: Path, event: ContactEvent) -> str:
     contact = path.network.contacts[event.number]
-    name = contact.name if isinstance(contact, Stop) else f"{contact.name} {contact.node}"
+    name = contact.name if isinstance(contact, Stop) else f"{contact.name} {toucher(contact)}"
     return f"{name} {event.kind}"
 
 
@@ -179,7 +229,7 @@ FINDINGS = {
     "blocked": "a rigid contact leaves the drive no way to go on: the curve ends there",
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
-    "side_in_obstacle": "the side of a beam passes through an obstacle: only pads of nodes touch it",
+    "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
 }
 
 
@@ -205,17 +255,23 @@ def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterat
 
 def describe(contact: Contact) -> str:
     """Return what a contact is called."""
-    return f"{contact.node!r} on {contact.name!r}" if isinstance(contact, NodeOnObstacle) else f"stop {contact.name!r}"
+    return f"stop {contact.name!r}" if isinstance(contact, Stop) else f"{toucher(contact)!r} on {contact.name!r}"
 
 
 def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
     contact, path = solution.path.network.contacts[event.number], solution.path
     if event.kind == "blocks":
         return ""
-    if isinstance(contact, NodeOnObstacle):
-        if event.kind == "begins":
-            return f"contact begins at {place} between {contact.node!r} and {contact.name!r}"
-        return f"{contact.node!r} leaves {contact.name!r} at {place}"
+    if not isinstance(contact, Stop):
+        what = toucher(contact)
+        sentences = {
+            "begins": f"contact begins at {place} between {what!r} and {contact.name!r}",
+            "ends": f"{what!r} leaves {contact.name!r} at {place}",
+            "moves": f"the contact on {contact.name!r} moves between an end and the side of {what!r} at {place}",
+            "spreads": f"contact spreads at {place}: {what!r} lies along {contact.name!r} from there on",
+            "closes": f"{what!r} no longer lies along {contact.name!r} at {place}",
+        }
+        return sentences[event.kind]
     if event.kind == "ends":
         return f"stop {contact.name!r} is left at {place}"
     last = float(path.contact_force(event.number)[solution.keep[-1]])
@@ -232,15 +288,19 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
         if number in touched or contact.turns or path.contact_force(number).any():
             continue
         gap = path.contact_gap(number)
-        least, moved = float(gap.min()), float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
-        if 0 < least < NEAR_GAP * thin:
+        if isinstance(contact, BeamOnObstacle):
+            moved = float(np.hypot(*np.moveaxis(path.line_motion(contact.beam), -1, 0)).max())
+        else:
+            moved = float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
+        least = float(gap.min())
+        if ROUNDING_OF_GAP * path.mesh.scales.length < least < NEAR_GAP * thin:
             where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
             yield "near_contact", f"{where}: tolerances of that size decide whether they touch"
-        elif isinstance(contact, NodeOnObstacle) and least > OUT_OF_REACH * moved:
+        elif not isinstance(contact, Stop) and least > OUT_OF_REACH * moved:
             yield (
                 "obstacle_out_of_reach",
-                f"{contact.node!r} comes no nearer to {contact.name!r} than {format_short(least, 'length')}, and moves "
-                f"by {format_short(moved, 'length')} only",
+                f"{toucher(contact)!r} comes no nearer to {contact.name!r} than {format_short(least, 'length')}, and "
+                f"moves by {format_short(moved, 'length')} only",
             )
 
 
@@ -249,15 +309,18 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
     path, mechanism, keep = solution.path, solution.spec.mechanism, solution.keep
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()
-        pads = pads_of(mechanism, obstacle)
+        pads, sides = pads_of(mechanism, obstacle), sides_of(mechanism, obstacle)
         for beam, own in path.network.beams.items():
+            if beam in sides:
+                continue
             found = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
             places = np.stack([found.x, found.y], axis=-1)
             depth = 0.5 * thickest_of(own.section) - outline.distance(places).value
             slack = PENETRATION * thickest_of(own.section)
             # an elastic obstacle yields at its pads, and the beam with them
             yields = max((float(-path.contact_gap(k).min()) for k, one in enumerate(path.network.contacts)
-                          if one.name == name and one.node in pads), default=0.0)  # fmt: skip
+                          if isinstance(one, NodeOnObstacle) and one.name == name and one.node in pads),
+                         default=0.0)  # fmt: skip
             deep = depth > slack + max(yields, 0.0)
             if deep.any():
                 first = int(deep.any(axis=1).argmax())
@@ -265,5 +328,6 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
                 yield (
                     "side_in_obstacle",
                     f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "
-                    f"at {place:.0%} of its length: only the pads of {', '.join(map(repr, pads))} touch it",
+                    f"at {place:.0%} of its length, where it does not touch: only with {', '.join(map(repr, pads))}; "
+                    "list it in 'beams'",
                 )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
@@ -215,13 +215,14 @@ def _supports(solution: Solution, ax: Axes) -> None:
 def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, float], poses: list[int]) -> None:
     """Draw obstacles, bars of stops at the ends of their gaps, and node and rim of each pad that touches in a pose."""
     path, size = solution.path, max(box[2] - box[0], box[3] - box[1])
-    outlines = {
-        contact.name: contact.outline for contact in path.network.contacts if isinstance(contact, NodeOnObstacle)
-    }
+    outlines = {contact.name: contact.outline for contact in path.network.contacts if not isinstance(contact, Stop)}
     for name, outline in outlines.items():
         for number, line in enumerate(_both(solution, outline.lines(2 * size))):
             parts.edge(ax, line, f"obstacle-{name}-{number}", color=INK, linewidth=1.8, zorder=1.6)
     for number, contact in enumerate(path.network.contacts):
+        if isinstance(contact, BeamOnObstacle):
+            _touching_side(solution, ax, number, poses)
+            continue
         node = path.network.nodes[contact.node]
         if isinstance(contact, Stop) and contact.direction is not None:
             along = np.array([np.cos(contact.direction), np.sin(contact.direction)])
@@ -244,6 +245,29 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
             rim = contact.radius * np.column_stack([np.cos(turn), np.sin(turn)])
             for image, line in enumerate(_both(solution, [place + rim])):
                 parts.edge(ax, line, f"pad-{number}-{pose}-{image}", color=color, linewidth=0.8, zorder=4.4)
+
+
+def _touching_side(solution: Solution, ax: Axes, number: int, poses: list[int]) -> None:
+    """Mark where the side of a beam touches: a dot, or a thick line along what lies on the obstacle."""
+    path = solution.path
+    contact: Any = path.network.contacts[number]
+    touching = path.contact_places(number)
+    for color, pose in zip(_colors(len(poses)), poses, strict=True):
+        point = int(solution.keep[pose])
+        if np.isnan(touching[point, 0]):
+            continue
+        along = path.places(contact.beam)
+        sampled = along[point] if along.ndim > 1 else along
+        line = path.shape(contact.beam, point)
+        first, last = touching[point].tolist()
+        shares = np.linspace(first, last, 2 + 30 * int(last > first))
+        places = np.column_stack([np.interp(shares, sampled, line[:, k]) for k in (0, 1)])
+        for image, copy in enumerate(_both(solution, [places])):
+            gid = f"side-{number}-{pose}-{image}"
+            if np.ptp(shares) > 0:
+                parts.edge(ax, copy, gid, color=color, linewidth=3.0, zorder=4.4)
+            else:
+                ax.plot(*parts.mm(copy[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="", gid=gid)
 
 
 def reactions(result: Result) -> Figure:

@@ -92,6 +92,8 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
     for name, obstacle in mechanism.obstacles.items():
         for node in obstacle.nodes or ():
             yield ("obstacles", name, obstacle.kind, "nodes", node), "node", node
+        for number, side in enumerate(obstacle.beams or ()):
+            yield ("obstacles", name, obstacle.kind, "beams", number), "beam", side
     driving = mechanism.drive.loads if isinstance(mechanism.drive, LoadsDrive) else ()
     for place, loads in ((("loads",), mechanism.loads), (("drive", "loads", "loads"), driving)):
         for index, load in enumerate(loads):

@@ -24,7 +24,7 @@ from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
-from cfmkit.families.beam.contacts import contact_columns, contact_values
+from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_sides_in_obstacles
 from cfmkit.families.beam.curve_along_its_motion import travel_of
 from cfmkit.families.beam.findings import findings_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
@@ -107,6 +107,7 @@ def solve(spec: BeamSpec) -> Solution:
     assembly = assemble(spec)
     _refuse_tight_coils(assembly)
     _refuse_torn_beams(assembly)
+    refuse_sides_in_obstacles(assembly)
     path = trace(assembly.network, assembly.drive(), assembly.control())
     keep, ends = _kept(assembly, path)
     return Solution(assembly, path, keep, ends)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import PathStatus
-from cfmkit.elastica.mechanics.discretise import discretise, without_floor
+from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.similar_arrays import without_floor
 from cfmkit.families.beam.taut_beams import taut_beams
 from cfmkit.specs.units import format_short
 

@@ -1,0 +1,459 @@
+"""Changes of contacts of the sides of beams: they begin, end, move from and to the ends of beams, part and join.
+
+Each change is located by its own equations: a contact that begins has no force and no gap; one that moves from the end
+of a beam into it, or back, is tangent there; one that parts has a gap whose curvature vanishes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween, describe
+from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
+from cfmkit.elastica.contact.side_conditions import NEW_PLACE
+from cfmkit.elastica.contact.side_gaps import Stage
+from cfmkit.elastica.mechanics.discretise import FlankPlace
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.contact import NodeOnObstacle
+from cfmkit.numerics.continuation.path import PathStop, WhyStopped
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
+
+BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
+N_SECANTS, ZERO_LEVEL = 12, 1e-13
+RATE_STEP = 1e-6  # motion by which rates of conditions are differentiated
+FROM_ROOT, BESIDE_ROOT = 1e-3, 1e-2  # of a beam from a clamped end on the obstacle: what lies there first; a point
+BEGINS_TO_LIE = "{names} begins to lie on it along a length at {{place}}: {why}"
+MEETS_WHOLE = "{names} is met along the whole length at {{place}}: no place touches first"
+REACHES_MARK = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
+CONTACTS_MEET = "two contacts of beam {beam!r} meet at {{place}}"
+NO_WAY = "no equilibrium was found behind the change of the contact of {names} at {{place}}"
+
+
+def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | PathStop | None:
+    """Return where a condition on a side is first violated within a step; None if that is not found."""
+    condition = piece.sides.all[row - len(piece.whole.mesh.contacts)]
+    unstable = step.first.unstable
+    if condition.kind == "touch":
+        return _locate_touch(piece, step, row, condition)
+    at = step.bisect(row)
+    if at is None:
+        return None
+    if condition.kind == "tangent" and _is_parallel(piece, condition, at):
+        return PathStop(WhyStopped.LOST, at.drive, MEETS_WHOLE.format(names=describe(condition.item)))
+    if condition.kind == "pinch":
+        return PathStop(WhyStopped.LOST, at.drive, CONTACTS_MEET.format(beam=condition.item.beam))
+    number = _side_number(piece, condition)
+    if condition.kind in ("wraps", "pulls"):
+        number = condition.number if condition.kind == "wraps" else number
+        kind_of_lie: Literal["spreads", "closes"] = "spreads" if condition.kind == "wraps" else "closes"
+        return ContactChange(kind_of_lie, condition.number, at, unstable, unstable, number, condition)
+    if condition.kind in ("tangent", "spreads"):
+        kind: Literal["moves", "spreads"] = "moves" if condition.kind == "tangent" else "spreads"
+        return ContactChange(kind, condition.number, at, unstable, unstable, number, condition)
+    if condition.kind == "end" and condition.mark in (0.0, 1.0) and condition.last in piece.sides.roots(condition.item):
+        beyond = piece.with_flanks(_remaining_places(piece, condition.number), piece.closed - {condition.number})
+        begin, wanted = piece.carry(at, beyond), ("wraps", condition.last)
+    elif condition.kind == "end":
+        onto = _move_onto_node(piece, condition)
+        if onto is None:
+            return PathStop(WhyStopped.LOST, at.drive, REACHES_MARK.format(
+                names=piece.say(condition.number), mark=_mark(piece, condition)))  # fmt: skip
+        beyond = onto
+        begin, wanted = _pass_force_on(piece, at, beyond, condition.number), ("tangent", condition.last)
+    else:
+        beyond = _join_contacts(piece, condition, at)
+        begin, wanted = _pass_force_on(piece, at, beyond, condition.number, condition.number + 1), ("spreads", False)
+    exact = _zero_of(beyond, begin, _find(beyond, condition, wanted))
+    if exact is None:
+        return None
+    kind_of: Literal["moves", "closes"] = "moves" if wanted[0] == "tangent" else "closes"
+    return ContactChange(kind_of, condition.number, exact, unstable, unstable, number, condition, beyond)
+
+
+def _side_number(piece: PieceOfPath, condition: SideCondition) -> int:
+    return next(k for k, item in enumerate(piece.whole.mesh.fits.network.contacts) if item is condition.item)
+
+
+def _mark(piece: PieceOfPath, condition: SideCondition) -> str:
+    """Return what a contact has come to."""
+    beam = piece.whole.mesh.fits.network.beams[condition.item.beam]
+    if condition.mark in (0.0, 1.0):
+        return f"node {beam.end if condition.last else beam.start!r}"
+    return f"a corner or a step of the beam at {condition.mark:.3g} of it"
+
+
+def _locate_touch(
+    piece: PieceOfPath, step: StepBetween, row: int, condition: SideCondition
+) -> ContactChange | PathStop | None:
+    """Return where a side begins to touch."""
+    share = step.crossing(row)
+    if share is None:
+        return None
+    x, drive = step.at(share)
+    guess = step.first._replace(x=x, drive=float(drive))
+    if _is_parallel(piece, condition, guess):
+        return PathStop(WhyStopped.LOST, guess.drive, MEETS_WHOLE.format(names=describe(condition.item)))
+    for _ in range(2):
+        stage = Stage.from_problem(piece.whole, np.array([guess.drive]))
+        least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
+        between = _contact_around(piece, condition, least.parameter)
+        if between is not None:
+            at = step.bisect(row)
+            return None if at is None else ContactChange(
+                "spreads", between, at, step.first.unstable, step.first.unstable, condition.number,
+                condition._replace(kind="lies", number=between))  # fmt: skip
+        if 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
+            flanks = [*piece.flanks, FlankPlace(condition.number, least.parameter)]
+            beyond = piece.with_flanks(flanks, piece.closed)
+            begin_guess = beyond.shrink(piece.carry(guess, beyond))
+            number = _new_side(piece, beyond, condition.number, least.parameter)
+            border = np.zeros(len(begin_guess.x) + 1)
+            border[beyond.slot_in_own(number)] = 1.0
+            state = beyond.own.equations.solve(begin_guess.x, begin_guess.drive, border, 0.0)
+            if state is not None and np.isfinite(state.rate).all():
+                at = beyond.grow(begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate))
+                back = beyond.carry(at, piece)
+                if -BESIDE_SHARE <= step.share_of(back) <= 1 + BESIDE_SHARE:
+                    return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
+                                         condition.number, condition, beyond)  # fmt: skip
+        elif _pads_at(piece, condition, least.parameter):  # it is the node that begins to touch
+            return None
+        closer = step.bisect(row)
+        if closer is None:
+            return None
+        guess = closer
+    return None
+
+
+def _is_parallel(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> bool:
+    stage = Stage.from_problem(piece.whole, np.array([at.drive]))
+    return piece.sides.gaps_of(condition.item).is_parallel(piece.whole.values(at.x, at.drive), stage)
+
+
+def _new_side(piece: PieceOfPath, beyond: PieceOfPath, number: int, parameter: float) -> int:
+    """Return the number in the arrays of a contact at a place."""
+    mesh = beyond.whole.mesh
+    sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0 and contact.number == number]
+    return min(sides, key=lambda k: abs(mesh.elements.cuts[mesh.contacts[k].element, 1] - parameter))
+
+
+def _move_onto_node(piece: PieceOfPath, condition: SideCondition) -> PieceOfPath | None:
+    """Return the piece in which the node at the end of a beam touches instead of its side; None if none may."""
+    pads = _pads_at(piece, condition, 1.0 if condition.last else 0.0)
+    if not pads or condition.mark not in (0.0, 1.0):
+        return None
+    return piece.with_flanks(
+        _remaining_places(piece, condition.number), (piece.closed - {condition.number}) | {pads[0]}
+    )
+
+
+def _pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[int]:
+    """Return the numbers of the pads on the same obstacle of the node at the end of a beam that is near."""
+    mesh = piece.whole.mesh
+    beam = mesh.fits.network.beams[condition.item.beam]
+    node = beam.end if end > 0.5 else beam.start
+    return [
+        k
+        for k, contact in enumerate(mesh.contacts)
+        if isinstance(contact.item, NodeOnObstacle)
+        and contact.item.name == condition.item.name
+        and contact.item.node == node
+    ]
+
+
+def _remaining_places(piece: PieceOfPath, *numbers: int) -> list[FlankPlace]:
+    """Return the places at which sides touch but for some contacts, and what lay on an obstacle beside these."""
+    mesh = piece.whole.mesh
+    return [
+        FlankPlace(
+            contact.number,
+            float(mesh.elements.cuts[contact.element, 1]),
+            0 if k + contact.laid in numbers else contact.laid,
+        )
+        for k, contact in enumerate(mesh.contacts)
+        if contact.slide >= 0 and k not in numbers
+    ]
+
+
+def _lay_anew(piece: PieceOfPath, number: int, laid: int) -> PieceOfPath:
+    """Return the piece in which the side beside a contact lies on its obstacle, or does not."""
+    mesh = piece.whole.mesh
+    return piece.with_flanks([
+        FlankPlace(contact.number, float(mesh.elements.cuts[contact.element, 1]), laid if k == number else contact.laid)
+        for k, contact in enumerate(mesh.contacts)
+        if contact.slide >= 0
+    ], piece.closed)  # fmt: skip
+
+
+def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: float) -> int | None:
+    """Return the contact at an end of a free part of a side between two contacts.
+
+    One of these may be a clamped end on the obstacle. None if the part may touch at a point: a straight beam at a
+    straight wall.
+    """
+    mesh, item = piece.whole.mesh, condition.item
+    of_beam = piece.sides_of(item.beam)
+    sides = [(k, mesh.contacts[k]) for k in of_beam]
+    before = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] < parameter]
+    after = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] > parameter]
+    roots = piece.sides.roots(item)
+    if not may_lie(piece, item, parameter):
+        return None
+    if before and after:
+        pair = before[-1], after[0]
+        return pair[0] if all(mesh.contacts[k].item is item for k in pair) else None
+    if after and not before and False in roots and mesh.contacts[after[0]].item is item:
+        return after[0]
+    if before and not after and True in roots and mesh.contacts[before[-1]].item is item:
+        return before[-1]
+    return None
+
+
+def _join_contacts(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath:
+    """Return the piece in which two contacts are one."""
+    z, mesh = piece.whole.values(at.x, at.drive), piece.whole.mesh
+    pair = mesh.contacts[condition.number], mesh.contacts[condition.number + 1]
+    middle = 0.5 * float(sum(z[contact.slide] for contact in pair))
+    flanks = [*_remaining_places(piece, condition.number, condition.number + 1), FlankPlace(pair[0].number, middle)]
+    return piece.with_flanks(flanks, piece.closed)
+
+
+def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath, *numbers: int) -> PathEquilibrium:
+    """Return a guess in another piece, whose new contact bears the forces of some that are left."""
+    mesh, z = beyond.whole.mesh, piece.whole.values(at.x, at.drive)
+    begin_guess = piece.carry(at, beyond)
+    force = sum(float(z[piece.whole.mesh.contacts[k].unknown]) for k in numbers)
+    full = beyond.whole.values(begin_guess.x, begin_guess.drive)
+    idle = [
+        contact.unknown
+        for k, contact in enumerate(mesh.contacts)
+        if k in beyond.closed and full[contact.unknown] == 0.0
+    ]
+    full[idle] = force / max(len(idle), 1)
+    return begin_guess._replace(x=full[mesh.free])
+
+
+def _find(beyond: PieceOfPath, condition: SideCondition, wanted: tuple[str, bool]) -> int:
+    """Return the row of a condition on the same side."""
+    kind, last = wanted
+    sided = kind in ("tangent", "wraps")
+    rows = (
+        k
+        for k, row in enumerate(beyond.sides.all)
+        if row.kind == kind and row.item is condition.item and not (sided and row.last != last)
+    )
+    return len(beyond.whole.mesh.contacts) + next(rows)
+
+
+def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquilibrium | None:
+    """Return the equilibrium at which a condition is just met, near a guess: by secants of the drive."""
+    at = piece.own.solve(piece.shrink(begin).x, begin.drive)
+    if at is None:
+        return None
+    drives, values = list[float](), list[float]()
+    for _ in range(N_SECANTS):
+        whole = piece.grow(at)
+        value = piece.row_value(whole, row)
+        drives.append(at.drive)
+        values.append(value)
+        if abs(value) < ZERO_LEVEL:
+            return whole
+        slope = (
+            (values[-1] - values[-2]) / (drives[-1] - drives[-2]) if len(values) > 1 else row_rate(piece, whole, row)
+        )
+        if slope == 0 or not np.isfinite(slope):
+            return None
+        goal = at.drive - value / slope
+        if goal == at.drive or (len(values) > 3 and abs(value) >= abs(values[-2])):
+            return whole
+        solved = piece.own.solve(at.x + (goal - at.drive) * at.rate, goal)
+        if solved is None:
+            return None
+        at = solved
+    return piece.grow(at)
+
+
+def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
+    """Return how a row of `PieceOfPath.values` changes with the drive at an equilibrium."""
+    step = RATE_STEP / max(1.0, float(np.abs(at.rate).max(initial=0.0)))
+    sides = [at._replace(x=at.x + way * at.rate, drive=at.drive + way) for way in (step, -step)]
+    ahead, behind = (piece.row_value(side, row) for side in sides)
+    return (ahead - behind) / (2 * step)
+
+
+def enter_side_change(
+    piece: PieceOfPath, change: ContactChange, sense: float
+) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
+    """Return the piece behind a change of a side, its start, the sense of the drive, and whether it has turned."""
+    condition = change.condition
+    if condition is not None and condition.kind in ("wraps", "spreads", "lies"):
+        why = why_not_laid(piece, condition.item)
+        curved = condition.kind == "wraps" or may_lie(piece, condition.item, 0.5)
+        if why and curved:
+            names = f"beam {condition.item.beam!r} on {condition.item.name!r}"
+            return PathStop(WhyStopped.LOST, change.at.drive, BEGINS_TO_LIE.format(names=names, why=why))
+    lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
+                    if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
+    if condition is None:  # a contact of a side ends
+        item = piece.whole.mesh.contacts[change.number]
+        beyond = piece.with_flanks(_remaining_places(piece, change.number), piece.closed - {change.number})
+        begin_guess = beyond.shrink(piece.carry(change.at, beyond))
+        at = beyond.own.solve(begin_guess.x, begin_guess.drive)
+        if at is None:
+            return lost
+        row = len(beyond.whole.mesh.contacts) + next(
+            k for k, contact in enumerate(beyond.sides.all) if contact.kind == "touch" and contact.number == item.number
+        )
+        whole = beyond.grow(at)
+        grows = row_rate(beyond, whole, row)
+    elif change.piece is not None:  # begins, moves onto a node, joins another
+        beyond = change.piece
+        begin_guess = beyond.shrink(change.at)
+        at = beyond.own.solve(begin_guess.x, begin_guess.drive)
+        if at is None:
+            return lost
+        whole = beyond.grow(at)
+        if condition.kind == "touch":
+            grows = beyond.grows_along(whole, change.number)
+        else:
+            wanted = ("spreads", False)
+            if condition.kind == "end":
+                rooted = condition.last in beyond.sides.roots(condition.item)
+                wanted = ("wraps" if rooted else "tangent", condition.last)
+            grows = row_rate(beyond, whole, _find(beyond, condition, wanted))
+    else:
+        ways = {"tangent": _move_into_beam, "spreads": _part_contact, "wraps": _lie_from_root}
+        part = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
+        if part is None:
+            return lost
+        beyond, whole, grows = part
+    turned = bool(grows * sense < 0)
+    return beyond, whole, (-sense if turned else sense), turned
+
+
+Entered = tuple[PieceOfPath, "PathEquilibrium", float]
+
+
+def _move_into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None:
+    """Return the piece in which a side touches instead of the node at its end, and how the way from there grows."""
+    condition: Any = change.condition
+    place = 1 - NEW_PLACE if condition.last else NEW_PLACE
+    beyond = piece.with_flanks([*piece.flanks, FlankPlace(change.contact, place)], piece.closed - {change.number})
+    number = _new_side(piece, beyond, change.contact, place)
+    begin = _pass_force_on(piece, change.at, beyond, change.number)
+    slide = beyond.slot_in_own(number, slide=True)
+    at = _solve_at_level(beyond, begin, {slide: 1.0}, place)
+    if at is None:
+        return None
+    return beyond, beyond.grow(at), float(at.rate[slide]) * (-1.0 if condition.last else 1.0)
+
+
+def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
+    """Return the piece in which a contact has parted into two, and how the way between them grows."""
+    mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
+    side_contact = mesh.contacts[change.number]
+    item: Any = side_contact.item
+    middle = float(z[side_contact.slide])
+    x, y, turn, _ = mesh.attachments.unknowns[side_contact.place]
+    angle = float(np.real(mesh.fits[item.beam].angle(middle, middle))) + float(z[turn])
+    force = 0.5 * sum(z[mesh.elements.unknowns[side_contact.element + k, -2:]] for k in (0, 1))
+    place = mesh.attachments.origin[side_contact.place] + z[[x, y]]
+    lies = may_lie(piece, item, middle) and presses_where_it_spreads(piece, item, place, force, angle)
+    lies = lies and not free
+    both = [FlankPlace(change.contact, middle + side * NEW_PLACE, int(lies and side < 0)) for side in (-1.0, 1.0)]
+    beyond = piece.with_flanks([*_remaining_places(piece, change.number), *both], piece.closed)
+    first, last = (_new_side(piece, beyond, change.contact, contact.parameter) for contact in both)
+    begin = _pass_force_on(piece, change.at, beyond, change.number)
+    new = beyond.whole.mesh
+    full = beyond.whole.values(begin.x, begin.drive)
+    for number, contact in zip((first, last), both, strict=True):
+        full[new.contacts[number].slide] = contact.parameter
+        full[new.contacts[number].unknown] = 0.5 * float(z[side_contact.unknown])
+    if lies:
+        guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
+    begin = begin._replace(x=full[new.free])
+    low, high = (beyond.slot_in_own(number, slide=True) for number in (first, last))
+    at = _solve_at_level(beyond, begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
+    if lies and (at is None or not presses(beyond, at)):
+        return _part_contact(piece, change, free=True)
+    return None if at is None else (beyond, beyond.grow(at), float(at.rate[high] - at.rate[low]))
+
+
+def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False) -> Entered | None:
+    """Return the piece in which a side lies from a clamped end on, or touches beside it, and how that grows."""
+    condition: Any = change.condition
+    mesh, z, item = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive), condition.item
+    side_contact = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+    element, end = (side_contact[-1], 1) if condition.last else (side_contact[0], 0)
+    angle = float(np.real(mesh.fits[item.beam].angle(float(end), 0.5))) + float(
+        z[mesh.elements.unknowns[element, 3 + 4 * end]]
+    )
+    force = z[mesh.elements.unknowns[element, -2:]]
+    place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, end])]).place[0]
+    lies = presses_where_it_spreads(piece, item, place, force, angle) and not free
+    first = FROM_ROOT if lies else BESIDE_ROOT
+    parameter, laid = (1 - first, 1) if condition.last else (first, -1)
+    beyond = piece.with_flanks(
+        [*piece.flanks, FlankPlace(change.contact, parameter, laid if lies else 0)], piece.closed
+    )
+    number = _new_side(piece, beyond, change.contact, parameter)
+    begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
+    full = beyond.whole.values(begin.x, begin.drive)
+    if lies:
+        at = new.contacts[number].element + (laid > 0)
+        guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
+    slide = beyond.slot_in_own(number, slide=True)
+    solved = _solve_at_level(beyond, begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
+    if lies and (solved is None or not presses(beyond, solved)):
+        return _lie_from_root(piece, change, free=True)
+    if solved is None:
+        return None
+    return beyond, beyond.grow(solved), float(solved.rate[slide]) * (-1.0 if condition.last else 1.0)
+
+
+def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | None:
+    """Return the piece in which a free part lies on an obstacle, or one that lay there is free; the drive goes on."""
+    condition: Any = change.condition
+    mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
+    contact = mesh.contacts[change.number]
+    item: Any = contact.item
+    sides = [k for k, contact in enumerate(mesh.contacts) if contact.slide >= 0 and contact.item.beam == item.beam]  # type: ignore[union-attr]
+    if condition.kind == "lies":
+        laid = -1 if change.number == sides[0] and False in piece.sides.roots(item) else 1
+        laid = laid if laid < 0 or change.number == sides[-1] or change.number + 1 in sides else -1
+    else:
+        laid = contact.laid
+    element = contact.element + (laid > 0)
+    beyond = _lay_anew(piece, change.number, laid if condition.kind == "lies" else 0)
+    begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
+    full = beyond.whole.values(begin.x, begin.drive)
+    side_contact = mesh.elements.unknowns[element]
+    inside = float(mesh.elements.cuts[element].mean())
+    angle = float(np.real(mesh.fits[item.beam].angle(inside, inside))) + 0.5 * float(
+        z[side_contact[3]] + z[side_contact[7]]
+    )
+    along = np.array([np.cos(angle), np.sin(angle)])
+    if condition.kind == "lies":
+        guess_laid(new, full, element, float(z[side_contact[-2:]] @ along))
+    else:
+        full[new.elements.unknowns[element, -2:]] = z[side_contact[-2]] * along
+    at = beyond.own.solve(full[new.free][beyond.own_mask], change.at.drive)
+    return None if at is None else (beyond, beyond.grow(at), sense)
+
+
+def _solve_at_level(piece: PieceOfPath, begin: PathEquilibrium, row: dict[int, float], level: float) -> Any:
+    """Return the equilibrium of a piece at which a combination of its unknowns has a value."""
+    begin_guess = piece.shrink(begin)
+    border = np.zeros(len(begin_guess.x) + 1)
+    for slot, factor in row.items():
+        border[slot] = factor
+    state = piece.own.equations.solve(begin_guess.x, begin_guess.drive, border, level)
+    if state is None or not np.isfinite(state.rate).all():
+        return None
+    return begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate, unstable=state.unstable,
+                         effort=state.effort)  # fmt: skip

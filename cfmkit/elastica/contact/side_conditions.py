@@ -1,0 +1,246 @@
+"""Conditions on a piece of a path of the sides of beams, each a number that must not become negative.
+
+touch: the least gap of a side to an obstacle, away from where it touches. tangent: a pad at the end of a beam touches
+as long as the beam runs away from the obstacle; then the contact moves into the beam. end: the way of a contact to the
+end of its beam. spreads: the curvature of the gap at a contact; then it parts into two, between which the side lies on
+the obstacle. closes: the way between two of these. wraps: the curvature of the gap at a clamped end that lies on
+the obstacle; then the side lies down from there. pulls: the tension of what lies on a round obstacle, which presses it
+on; a side that is pushed along it leaves it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.contact.side_gaps import SideGaps, Stage
+from cfmkit.elastica.mechanics.element_tables import smooth_marks
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
+from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.beam_fits import beam_end_at
+from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+
+ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
+NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins
+ROUNDING_OF_KIND = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
+             "wraps": 1e-9, "pulls": 1e-9}  # fmt: skip
+"""By how much each kind of condition may be negative."""
+
+
+class SideCondition(NamedTuple):
+    """A condition, and what it is of."""
+
+    kind: Literal["touch", "tangent", "end", "closes", "spreads", "pinch", "wraps", "pulls", "lies"]
+    number: int  # touch: in `Network.contacts`; else that of the contact in the arrays, of two the first
+    item: BeamOnObstacle
+    last: bool = False  # tangent, end: the last end of the beam
+    mark: float = 0.0  # end: parameter of it
+
+
+@dataclass(frozen=True, eq=False)
+class SideConditions:
+    """All conditions on the sides of beams with one set of contacts."""
+
+    mesh: Discretisation
+    closed: frozenset[int]  # contacts of the arrays that touch
+
+    @cached_property
+    def all(self) -> tuple[SideCondition, ...]:
+        """The conditions in order."""
+        return tuple(self._find())
+
+    def _find(self) -> Iterator[SideCondition]:
+        mesh = self.mesh
+        sides = [(k, contact) for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
+        for number, item in enumerate(mesh.fits.network.contacts):
+            if not isinstance(item, BeamOnObstacle):
+                continue
+            yield SideCondition("touch", number, item)
+            beam = mesh.fits.network.beams[item.beam]
+            elements = [contact for _, contact in sides if contact.item.beam == item.beam]  # type: ignore[union-attr]
+            for last in self.roots(item):
+                if not elements or elements[-1 if last else 0].item is not item:
+                    yield SideCondition("wraps", number, item, last)
+            for k in sorted(self.closed):
+                pad = mesh.contacts[k].item
+                if isinstance(pad, NodeOnObstacle) and pad.name == item.name and not np.isfinite(item.stiffness):
+                    for last, node in ((False, beam.start), (True, beam.end)):
+                        if pad.node == node and not np.isfinite(pad.stiffness):
+                            yield SideCondition("tangent", k, item, last)
+        for k, contact in sides:
+            side: Any = contact.item
+            marks = smooth_marks(mesh.fits.network.beams[side.beam], mesh.fits[side.beam])
+            place = float(mesh.elements.cuts[contact.element, 1])
+            low, high = max(m for m in marks if m < place), min(m for m in marks if m > place)
+            before, after = ([neighbour for _, neighbour in sides if neighbour.item.beam == side.beam  # type: ignore[union-attr]
+                              and (neighbour.element > contact.element) == above and neighbour is not contact]
+                             for above in (False, True))  # fmt: skip
+            if not any(low < mesh.elements.cuts[neighbour.element, 1] for neighbour in before):
+                yield SideCondition("end", k, side, False, low)
+            if not any(high > mesh.elements.cuts[neighbour.element, 1] for neighbour in after):
+                yield SideCondition("end", k, side, True, high)
+            if contact.laid and len(side.outline.radius):
+                yield SideCondition("pulls", k, side)
+            if not contact.laid and not any(neighbour.item is side for neighbour in before[-1:] + after[:1]):
+                yield SideCondition("spreads", k, side)
+        for (k, contact), (_, neighbour) in itertools.pairwise(sides):
+            if contact.item.beam == neighbour.item.beam:  # type: ignore[union-attr]
+                kind: Literal["closes", "pinch"] = "closes" if contact.item is neighbour.item else "pinch"
+                yield SideCondition(kind, k, contact.item)  # type: ignore[arg-type]
+
+    def roots(self, item: BeamOnObstacle) -> tuple[bool, ...]:
+        """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
+        if item not in self._roots:
+            self._roots[item] = tuple(last for last in (False, True) if self._lies_at(item, last))
+        return self._roots[item]
+
+    @cached_property
+    def _roots(self) -> dict[BeamOnObstacle, tuple[bool, ...]]:
+        return {}
+
+    def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
+        mesh, network = self.mesh, self.mesh.fits.network
+        beam, fitted = network.beams[item.beam], mesh.fits[item.beam]
+        name, joint = (beam.end, beam.end_joint) if last else (beam.start, beam.start_joint)
+        support = network.nodes[name].support
+        if network.moved(name) or joint != "rigid" or not (support.along and support.across and support.rotation):
+            return False
+        marks = smooth_marks(beam, fitted)
+        inside = 0.5 * (marks[-2] + marks[-1] if last else marks[0] + marks[1])
+        angle = float(np.real(fitted.angle(float(last), inside)))
+        edge = item.outline.distance(np.real(np.array(beam_end_at(network, item.beam, int(last)))))
+        half = 0.5 * float(np.real(beam.section.thickness_at(float(last), inside)))
+        slope = float(edge.normal[0] * np.cos(angle) + edge.normal[1] * np.sin(angle))
+        return abs(float(edge.value) - half) < ON_OBSTACLE * mesh.scales.length and abs(slope) < ON_OBSTACLE
+
+    def gaps_of(self, item: BeamOnObstacle) -> SideGaps:
+        """Return the gaps of a side, with what touches already."""
+        if item not in self._gaps:
+            mesh, touched = self.mesh, list[int]()
+            elements = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+            beam = mesh.fits.network.beams[item.beam]
+            for number, contact in enumerate(mesh.contacts):
+                if contact.item.name != item.name:
+                    continue
+                if contact.slide >= 0 and contact.item is item:
+                    touched += [contact.element, contact.element + 1]
+                elif isinstance(contact.item, NodeOnObstacle) and number in self.closed:
+                    touched += [elements[0]] * (contact.item.node == beam.start) + [elements[-1]] * (
+                        contact.item.node == beam.end
+                    )
+            touched += [elements[-1] if last else elements[0] for last in self.roots(item)]
+            laid = [
+                contact.element + (contact.laid > 0)
+                for contact in mesh.contacts
+                if contact.laid and contact.item is item
+            ]
+            self._gaps[item] = SideGaps(mesh, item, tuple(touched), tuple(laid))
+        return self._gaps[item]
+
+    @cached_property
+    def _gaps(self) -> dict[BeamOnObstacle, SideGaps]:
+        return {}
+
+    @cached_property
+    def roundings(self) -> FloatArray:
+        """By how much each may be negative."""
+        return np.array([ROUNDING_OF_KIND[condition.kind] for condition in self.all])
+
+    def values(self, z: FloatArray, stage: Stage) -> FloatArray:
+        """Return the values of all conditions in n states (n, size), (conditions, n)."""
+        return np.array([self.value(condition, z, stage) for condition in self.all]).reshape(len(self.all), len(z))
+
+    def value(self, condition: SideCondition, z: FloatArray, stage: Stage) -> FloatArray:
+        """Return the values of a condition in n states, (n,)."""
+        if condition.kind == "touch":
+            return self.gaps_of(condition.item).least(z, stage)
+        if condition.kind == "wraps":
+            return self._curvature_at_root(condition, z)
+        contact = self.mesh.contacts[condition.number]
+        if condition.kind == "pulls":
+            return self._pull(contact, z)
+        if condition.kind == "tangent":
+            return self._run_away(contact, condition, z)
+        if condition.kind == "spreads":
+            return self._relative_curvature(contact, z)
+        if condition.kind in ("closes", "pinch"):
+            following = self.mesh.contacts[condition.number + 1]
+            return np.asarray(z[:, following.slide] - z[:, contact.slide] - NEW_PLACE)
+        return np.asarray((condition.mark - z[:, contact.slide]) * (1.0 if condition.last else -1.0) - 0.5 * NEW_PLACE)
+
+    def _pull(self, contact: ContactAt, z: FloatArray) -> FloatArray:
+        """Return the tension along a round obstacle, positive if it presses the side on."""
+        mesh = self.mesh
+        element = contact.element + (contact.laid > 0)
+        x, y, _, _ = mesh.attachments.unknowns[contact.place]
+        place = mesh.attachments.origin[contact.place] + z[:, [x, y]]
+        bulge = contact.item.outline.distance(place * mesh.scales.length).curvature  # type: ignore[union-attr]
+        return np.asarray(np.sign(bulge) * z[:, mesh.elements.unknowns[element, -2]])
+
+    def _curvature_at_root(self, condition: SideCondition, z: FloatArray) -> FloatArray:
+        """Return the curvature of the gap at an end that lies on the obstacle."""
+        mesh, item = self.mesh, condition.item
+        elements = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
+        element, side = (elements[-1], 1) if condition.last else (elements[0], 0)
+        moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]
+        inside, at = float(mesh.elements.cuts[element].mean()), np.array([float(side)])
+        slopes = shape_functions(mesh.degree, at)[1][0]
+        columns = [3, 7, *range(8, mesh.degree + 7)]
+        length = np.reshape(moved.length, (-1, len(moved.beam)))[:, element]
+        bend = z[:, moved.unknowns[element, columns]] @ slopes / length
+        speed = float(np.real(fitted.speed(at, inside) + np.zeros(1))[0]) / mesh.scales.length
+        sides = [float(np.real(fitted.angle(at + step, inside) + np.zeros(1))[0]) for step in (PLACE_STEP, -PLACE_STEP)]
+        bend = bend + (sides[0] - sides[1]) / (2 * PLACE_STEP) / speed
+        place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, side])]).place[:, 0]
+        edge = item.outline.distance(place * mesh.scales.length)
+        angle = 0.5 * sum(sides) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
+        rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
+        return np.asarray(bend * rises + edge.curvature * mesh.scales.length * rises**2)
+
+    def _run_away(self, pad: ContactAt, condition: SideCondition, z: FloatArray) -> FloatArray:
+        """Return how much the side of a beam runs away from the obstacle from a pad at its end."""
+        mesh = self.mesh
+        elements = [k for k, name in enumerate(mesh.elements.beam) if name == condition.item.beam]
+        element, side = (elements[-1], 1) if condition.last else (elements[0], 0)
+        fitted = mesh.fits[condition.item.beam]
+        inside = float(mesh.elements.cuts[element].mean())
+        angle = float(np.real(fitted.angle(float(side), inside))) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
+        place = poses(mesh.attachments, z, [pad.place]).place[:, 0]
+        normal = condition.item.outline.distance(place * mesh.scales.length).normal
+        along = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
+        return np.asarray(-along if condition.last else along)
+
+    def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
+        """Return the curvature of the gap along a beam at a contact."""
+        mesh, item = self.mesh, contact.item
+        moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]  # type: ignore[union-attr]
+        inside = float(mesh.elements.cuts[contact.element].mean())
+        columns = [3, 7, *range(8, mesh.degree + 7)]
+        total = np.zeros(len(z))
+        for number, end in ((contact.element, 1.0), (contact.element + 1, 0.0)):
+            slopes = shape_functions(mesh.degree, np.array([end]))[1][0]
+            total += (
+                z[:, moved.unknowns[number, columns]]
+                @ slopes
+                / np.reshape(moved.length, (-1, len(moved.beam)))[:, number]
+            )
+        parameter, length = z[:, contact.slide], mesh.scales.length
+        speed = np.real(fitted.speed(parameter, inside)) / length
+        angles = [np.real(fitted.angle(parameter + step, inside)) for step in (PLACE_STEP, 0.0, -PLACE_STEP)]
+        bend = 0.5 * total + (angles[0] - angles[2]) / (2 * PLACE_STEP) / speed
+        x, y, turn, _ = mesh.attachments.unknowns[contact.place]
+        edge = item.outline.distance((mesh.attachments.origin[contact.place] + z[:, [x, y]]) * length)  # type: ignore[union-attr]
+        angle = angles[1] + z[:, turn]
+        rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
+        return np.asarray(bend * rises + edge.curvature * length * rises**2)

@@ -1,0 +1,386 @@
+"""Places along the sides of beams in many states: how near they are to obstacles, and states on other elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.section import Taper
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.problem import NetworkProblem
+    from cfmkit.elastica.model.contact import BeamOnObstacle
+
+N_ALONG = 33  # places of an element at which the gap of its side is measured
+NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
+PARALLEL_GAP = 1e-9  # mean beam lengths by which the gap along a beam changes that is parallel to an obstacle
+N_ROUNDS, SLOPE_LEVEL = (
+    20,
+    1e-9,
+)  # of the search for the place of a least gap, and the slope there: its square is the error
+GAP_RESOLUTION = 1e-13
+BESIDE_CONTACT = 1e-7  # mean beam lengths by which a side may lie in an obstacle beside a contact: rounding
+
+
+class SideStates(NamedTuple):
+    """States at k places of m elements in n states, (n, m, k) each unless said otherwise; dimensionless."""
+
+    place: Any  # (n, m, k, 2)
+    turn: Any  # rotation from rest
+    angle: Any  # of the tangent
+    ahead: Any  # arc length to the end of the element
+    parameter: Any
+
+
+class Stage(NamedTuple):
+    """Places of n states on the way: the drive (n,), and the share of what is constant, (n, 1, 1) or 1."""
+
+    drive: FloatArray
+    share: Any = 1.0
+
+    @classmethod
+    def from_problem(cls, problem: NetworkProblem, ways: FloatArray) -> Stage:
+        """Return the stage at places of the way of a problem, (n,)."""
+        return cls(np.zeros(len(ways)), ways[:, None, None]) if problem.ramp else cls(ways)
+
+    def take(self, some: Any) -> Stage:
+        """Return the stage of some of the states."""
+        return Stage(self.drive[some], self.share if np.isscalar(self.share) else self.share[some])
+
+
+def side_states(mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> SideStates:
+    """Return the states at fractions (k,) of elements (m,) in n states (n, size); contacts stand at their places."""
+    moved = with_places(mesh, z)
+    whole, rule, at = moved.elements, basis(mesh.degree), _rows_at(mesh.degree, fractions)
+    fields = energy.fields(moved, z, *stage)
+    rotation = z[:, whole.unknowns[elements]][..., energy.rotation_columns(mesh.degree)]
+    speed = np.broadcast_to(whole.weight, (len(z), *whole.weight.shape[-2:]))[:, elements] / rule.weights
+    angle = np.broadcast_to(whole.angle, (len(z), *whole.angle.shape[-2:]))[:, elements]
+    start = poses(mesh.attachments, z, whole.ends[elements, 0]).place[:, :, None]
+    slope = np.stack([fields.slope_x[:, elements], fields.slope_y[:, elements]], axis=-1) * speed[..., None]
+    turn = rotation @ at.values.T
+    cuts = whole.cuts if whole.moved_cuts is None else whole.moved_cuts
+    cuts = np.broadcast_to(cuts, (len(z), *cuts.shape[-2:]))[:, elements]
+    length = np.broadcast_to(whole.length, (len(z), whole.length.shape[-1]))[:, elements]
+    return SideStates(
+        start + np.einsum("kq,nmqd->nmkd", at.integrals, slope),
+        turn,
+        angle @ at.interpolation.T + turn,
+        length[..., None] - speed @ at.integrals.T,
+        cuts[..., :1] + (cuts[..., 1:] - cuts[..., :1]) * fractions,
+    )
+
+
+class _RowsAtPlaces(NamedTuple):
+    """Matrices from an element's unknowns, and values at its Gauss points, to places on it."""
+
+    values: FloatArray
+    integrals: FloatArray
+    interpolation: FloatArray
+
+
+@lru_cache(maxsize=64)
+def _series_matrix(degree: int) -> FloatArray:
+    """Return the matrix from values at the Gauss points to Legendre coefficients."""
+    places = basis(degree).places
+    return read_only(np.linalg.inv(legendre.legvander(2 * places - 1, len(places) - 1)))
+
+
+def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
+    """Return the matrices at any places, (n, ...): shapes, integrals from values at Gauss points, interpolation."""
+    series = _series_matrix(degree)
+    x, count = 2 * places - 1, len(series)
+    polynomials = legendre.legvander(x, count)
+    order = np.arange(1, count)
+    primitives = np.concatenate([x[:, None] + 1, (polynomials[:, 2:] - polynomials[:, :-2]) / (2 * order + 1)], axis=1)
+    shapes = np.empty((len(x), degree + 1))
+    shapes[:, 0], shapes[:, 1] = (1 - x) / 2, (1 + x) / 2
+    order = np.arange(2, degree + 1)
+    shapes[:, 2:] = (polynomials[:, 2 : degree + 1] - polynomials[:, : degree - 1]) / np.sqrt(4 * order - 2)
+    return _RowsAtPlaces(shapes, primitives @ series / 2, polynomials[:, :count] @ series)
+
+
+class LeastGap(NamedTuple):
+    """The least gap of the side of a beam."""
+
+    gap: float  # mean beam lengths
+    parameter: float
+
+
+@dataclass(frozen=True, eq=False)
+class SideGaps:
+    """Gaps of the side of one beam to one obstacle, away from where it touches already."""
+
+    mesh: Discretisation
+    item: BeamOnObstacle
+    touched: tuple[int, ...]  # elements that end where a node or the side touches this obstacle
+    laid: tuple[int, ...] = ()  # elements that lie on it
+
+    @cached_property
+    def elements(self) -> Any:
+        """Elements of the beam, (m,)."""
+        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == self.item.beam])
+
+    @cached_property
+    def fractions(self) -> FloatArray:
+        """Places of an element at which gaps are measured."""
+        return 0.5 * (1 - np.cos(np.pi * np.arange(N_ALONG) / (N_ALONG - 1)))
+
+    @cached_property
+    def slack(self) -> FloatArray:
+        """By how much each element may lie in the obstacle, (m,)."""
+        beside = np.where(np.isin(self.elements, self.touched), BESIDE_CONTACT, 0.0)
+        return np.where(np.isin(self.elements, self.laid), 1.0, beside)
+
+    def half_thickness(self, parameter: Any, element: int) -> Any:
+        """Return half the thickness at parameters of an element, in mean beam lengths."""
+        mesh, name = self.mesh, self.item.beam
+        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
+        section = mesh.fits.network.beams[name].section
+        along = fitted.arc(np.clip(parameter, 0.0, 1.0)), float(np.real(fitted.arc(inside)))
+        return 0.5 * (np.real(section.thickness_at(*along)) + 0.0 * parameter) / mesh.scales.length
+
+    def _taper(self, parameter: Any, element: int) -> Any:
+        """Return the slope of half the thickness along the unloaded beam."""
+        mesh, name = self.mesh, self.item.beam
+        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
+        if not isinstance(mesh.fits.network.beams[name].section.thickness, Taper):
+            return np.zeros(np.shape(parameter))
+        sides = [self.half_thickness(parameter + step, element) for step in (PLACE_STEP, -PLACE_STEP)]
+        return (sides[0] - sides[1]) / (2 * PLACE_STEP) / (fitted.speed(parameter, inside) / mesh.scales.length)
+
+    def measure(self, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> tuple[Any, Any, SideStates]:
+        """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
+        seen = side_states(self.mesh, z, stage, elements, fractions)
+        values = self.item.outline.distance(seen.place * self.mesh.scales.length)
+        half = np.stack(
+            [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
+        )
+        slope = values.normal[..., 0] * np.cos(seen.angle) + values.normal[..., 1] * np.sin(seen.angle)
+        taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
+        slope = slope - np.stack(taper, axis=1)
+        return values.value / self.mesh.scales.length - half, slope, seen
+
+    def is_parallel(self, z: FloatArray, stage: Stage) -> bool:
+        """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
+        return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
+
+    def least(self, z: FloatArray, stage: Stage) -> FloatArray:
+        """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
+
+        It is exact where it is below `NEAR_GAP`, and above it otherwise.
+        """
+        gap, rows, _ = self._dips(z, stage)
+        values = (gap + self.slack[:, None]).min(axis=(1, 2))
+        for state, row, value in zip(rows.state, rows.row, self._refine(z, stage, rows)[0], strict=True):
+            values[state] = min(values[state], value + self.slack[row])
+        return np.asarray(values)
+
+    def find_least(self, z: FloatArray, stage: Stage) -> LeastGap:
+        """Return the least gap of one state (size,) exactly: where the side is parallel to the obstacle."""
+        gap, rows, seen = self._dips(z[None], stage)
+        slack = self.slack[:, None]
+        row, place = np.unravel_index(int((gap[0] + slack).argmin()), gap[0].shape)
+        best, least = (
+            float((gap[0] + slack).min()),
+            LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place])),
+        )
+        for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
+            if value + self.slack[number] <= best:
+                indices = self._measure_at(
+                    self._take_element(z[None], stage, int(self.elements[number])), np.array([fraction])
+                )
+                best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
+        return least
+
+    def _dips(self, z: FloatArray, stage: Stage) -> tuple[Any, _Dips, SideStates]:
+        """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
+        gap, slope, seen = self.measure(z, stage, self.elements, self.fractions)
+        step = -np.diff(seen.ahead, axis=-1)
+        low, high = slope[..., :-1] * step, slope[..., 1:] * step
+        dips = (low < 0) & (high > 0)
+        share = np.where(dips, (gap[..., 1:] - high - gap[..., :-1]) / np.where(dips, low - high, 1.0), 0.0)
+        bound = gap[..., :-1] + share * low  # where the tangents at both places meet
+        allowed = gap + self.slack[:, None]
+        lower = (
+            bound + self.slack[:, None] < np.minimum(allowed.min(axis=(1, 2)), NEAR_GAP)[:, None, None] - GAP_RESOLUTION
+        )
+        dips_near = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
+        state, row, place = dips_near
+        return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
+
+    def _refine(self, z: FloatArray, stage: Stage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
+        """Return the least gaps of dips and their places on their elements, where the slope is zero (Illinois)."""
+        a, b = self.fractions[dips.place], self.fractions[dips.place + 1]
+        low, high = dips.low.copy(), dips.high.copy()
+        value, best = np.full(len(a), np.inf), 0.5 * (a + b)
+        for row in np.unique(dips.row).tolist():
+            indices = np.flatnonzero(dips.row == row)
+            chosen = dips.state[indices]
+            states = self._take_element(z[chosen], stage.take(chosen), int(self.elements[row]))
+            for _ in range(N_ROUNDS):
+                middle = b[indices] - high[indices] * (b[indices] - a[indices]) / (high[indices] - low[indices])
+                seen = self._measure_at(states, middle)
+                value[indices], best[indices] = seen.gap, middle
+                if np.abs(seen.slope).max() < SLOPE_LEVEL:
+                    break
+                below = seen.slope < 0
+                high[indices] = np.where(below, 0.5 * high[indices], seen.slope)
+                low[indices] = np.where(below, seen.slope, 0.5 * low[indices])
+                a[indices], b[indices] = np.where(below, middle, a[indices]), np.where(below, b[indices], middle)
+        return value, best
+
+    def _take_element(self, z: FloatArray, stage: Stage, element: int) -> _ElementStates:
+        """Return what gaps at places of an element are made of, in n states."""
+        moved = with_places(self.mesh, z)
+        e, count = moved.elements, len(z)
+        fields = energy.fields(moved, z, *stage)
+        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / basis(self.mesh.degree).weights
+        cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
+        return _ElementStates(
+            element,
+            poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
+            fields.slope_x[:, element] * speed,
+            fields.slope_y[:, element] * speed,
+            z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)],
+            np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element],
+            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element],
+        )
+
+    def _measure_at(self, states: _ElementStates, fraction: FloatArray) -> _Beside:
+        """Return gap, slope and parameter at one place of an element in each of n states."""
+        values, upto, through = _rows_at(self.mesh.degree, fraction)
+        x = states.start[:, 0] + (states.x * upto).sum(axis=1)
+        y = states.start[:, 1] + (states.y * upto).sum(axis=1)
+        angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
+        parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
+        length = self.mesh.scales.length
+        edge = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
+        slope = edge.normal[:, 0] * np.cos(angle) + edge.normal[:, 1] * np.sin(angle)
+        slope = slope - self._taper(parameter, states.element)
+        return _Beside(edge.value / length - self.half_thickness(parameter, states.element), slope, parameter)
+
+
+class _ElementStates(NamedTuple):
+    """One element in n states: its start, slopes of its line and angle at Gauss points, rotation, cuts."""
+
+    element: int
+    start: FloatArray  # (n, 2)
+    x: FloatArray  # (n, q)
+    y: FloatArray
+    rotation: FloatArray  # (n, degree + 1)
+    angle: FloatArray  # (n, q) unloaded
+    cuts: FloatArray  # (n, 2)
+
+
+class _Dips(NamedTuple):
+    """Between a place of an element and the next the gap has a least value."""
+
+    state: Any
+    row: Any  # of the element
+    place: Any
+    low: FloatArray  # slopes of the gap at both
+    high: FloatArray
+
+
+class _Beside(NamedTuple):
+    """Gap of a side in n states."""
+
+    gap: FloatArray
+    slope: FloatArray
+    parameter: FloatArray
+
+
+def least_side_gaps(mesh: Discretisation, item: BeamOnObstacle, z: FloatArray, drive: FloatArray) -> FloatArray:
+    """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
+    return SideGaps(mesh, item, ()).least(z, Stage(drive))
+
+
+def carry(
+    old: Discretisation, z: FloatArray, stage: Stage, new: Discretisation, places: FloatArray | None = None
+) -> FloatArray:
+    """Return a state (size,) of a network on other elements of the same degree: fields are evaluated anew.
+
+    Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (k,) are those of the
+    contacts of sides of the new elements, if they are not those that these were made for.
+    """
+    values = np.zeros(new.size, z.dtype)
+    for name, place in new.nodes.items():
+        values[new.attachments.unknowns[place]] = z[old.attachments.unknowns[old.nodes[name]]]
+    moved = with_places(old, z).elements
+    cuts = moved.cuts if moved.moved_cuts is None else moved.moved_cuts
+    fresh = new.elements.cuts
+    if places is not None and new.moving is not None:
+        fresh = fresh.copy()
+        fresh[new.moving.elements] = new.moving.fixed + new.moving.shares @ places
+    rule, columns = basis(new.degree), energy.rotation_columns(new.degree)
+    bubbles = np.linalg.pinv(rule.values[:, 2:])
+    for beam in new.fits:
+        before = np.array([k for k, name in enumerate(old.elements.beam) if name == beam])
+        after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
+        for k, side in ((0, 0), (-1, 1)):
+            ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
+            values[new.attachments.unknowns[ends[1]]] = z[old.attachments.unknowns[ends[0]]]
+        if len(before) == len(after) and np.array_equal(cuts[before], fresh[after]):
+            indices = new.elements.unknowns[after]
+            values[indices[:, 8:]] = z[old.elements.unknowns[before, 8:]]
+            for k in after[:-1].tolist():
+                old_place = old.attachments.unknowns[old.elements.ends[before[0] + k - after[0], 1]]
+                new_place = new.attachments.unknowns[new.elements.ends[k, 1]]
+                values[new_place] = z[old_place]
+                values[new_place[:2]] += _origin(old, int(old.elements.ends[before[0] + k - after[0], 1])) - _origin(
+                    new, int(new.elements.ends[k, 1])
+                )
+            continue
+        for k in after.tolist():
+            left, right = fresh[k]
+            at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
+            place, turn, force = _sample(old, z, stage, before, cuts, at)
+            end = int(new.elements.ends[k, 1])
+            if k != after[-1]:
+                x, y, body, _ = new.attachments.unknowns[end]
+                values[[x, y]], values[body] = place[-1] - _origin(new, end), turn[-1]
+            indices = new.elements.unknowns[k]
+            rest = turn[:-2] - turn[-2] * rule.values[:, 0] - turn[-1] * rule.values[:, 1]
+            values[indices[columns[2:]]] = bubbles @ rest
+            values[indices[-2:]] = force[-1]
+    number_of = {contact.number: contact.unknown for contact in old.contacts if contact.slide < 0}
+    for contact in new.contacts:
+        if contact.slide < 0:
+            values[contact.unknown] = z[number_of[contact.number]]
+        else:
+            values[contact.slide], values[contact.flag] = fresh[contact.element, 1], contact.laid
+    return values
+
+
+def _origin(mesh: Discretisation, place: int) -> FloatArray:
+    return np.asarray(mesh.attachments.origin[place] + mesh.attachments.arm[place])
+
+
+def _sample(
+    mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, cuts: FloatArray, at: FloatArray
+) -> tuple[Any, Any, Any]:
+    """Return place, rotation and section force of a beam at parameters, (m, 2), (m,), (m, 2)."""
+    place, turn, force = np.empty((len(at), 2)), np.empty(len(at)), np.empty((len(at), 2))
+    ends = cuts[elements, 1]
+    home = np.minimum(np.searchsorted(ends, at, side="left"), len(elements) - 1)
+    for k in np.unique(home).tolist():
+        number, indices = int(elements[k]), home == k
+        left, right = cuts[number]
+        fractions = np.clip((at[indices] - left) / (right - left), 0.0, 1.0)
+        seen = side_states(mesh, z[None], stage, np.array([number]), fractions)
+        place[indices], turn[indices] = seen.place[0, 0], seen.turn[0, 0]
+        load = energy.line_load(mesh, *stage)[0, number]
+        force[indices] = z[mesh.elements.unknowns[number, -2:]] + load * seen.ahead[0, 0][:, None]
+    return place, turn, force

@@ -1,0 +1,445 @@
+"""Equations of a network whose beams touch obstacles with their sides: the places of these contacts are unknowns.
+
+A contact at the parameter S of a beam ends an element there. Its rows are the gap g = 0 and the tangency n . t = 0 of
+the beam to the obstacle (beside a slope of the thickness: n . t = dr/ds). The change of all residuals with S, at held
+coefficients of the rotation, is a difference: of elements that are polynomials it has ten digits, and Newton's method
+needs fewer. The matrix is not symmetric: the stationarity f n . t = 0, which would make it so, says nothing where a
+contact begins.
+
+The number of unstable directions comes from another, symmetric matrix, in which all places are held: with the force f
+of a contact and the curvature g'' of its gap along the beam, tangency is a constraint of the stiffness f / g''. So P is
+taken at the least gap along the beam, not at a gap that follows a material point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.contact.equations import GapBounds, without_contacts
+from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, compute_moved_tables
+from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.mechanics.poses import poses
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+
+SMALLEST_ELEMENT = 1e-9  # of a beam: shorter ones have no equations
+NEUTRAL_STIFFNESS = (
+    1e-6  # stiffness of the motions [EI/L^3] below which a direction counts as stable: exactly critical ones do
+)
+SMALLEST_FORCE = 1e-12  # of a contact that begins, in the curvature of its gap over its force
+
+
+class LinearisedSides(LinearEquations):
+    """The equations at some unknowns, and what their stability is counted from."""
+
+    frozen: FloatArray  # (m, m) symmetric, with places of contacts held
+    n_laid: int  # elements that lie on obstacles: each has one force
+
+
+class LaidPart(NamedTuple):
+    """An element that lies on an obstacle: which, where it does, and the curvature that it takes on."""
+
+    element: int
+    contact: ContactAt  # at one of its ends
+    curvature: float
+
+
+class SideAt(NamedTuple):
+    """The side of a beam at a contact: gap, tangency, and their derivatives."""
+
+    gap: float
+    tangency: float
+    gap_row: FloatArray  # (3,) by x, y of the body and the rotation
+    tangency_row: FloatArray  # (3,)
+    hessian: FloatArray  # (3, 3) of the gap
+    by_place: tuple[float, float]  # of gap and tangency at held x, y and rotation
+    unknowns: Any  # (3,)
+    curvature: float  # of the gap along the beam
+    rises: float  # normal . across, 1 or -1 where it is tangent
+    bulge: float  # curvature of the obstacle there
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingEquations(NumpyEquations):
+    """Equations of a network with contacts of the sides of beams, and of nodes."""
+
+    plain: NumpyEquations = field(kw_only=True)  # without contacts; its elements are moved to where contacts are
+    watched: GapBounds | None = field(init=False)
+    slots: Any = field(init=False)  # (size,) number of every unknown among the free ones, -1 where it is held
+
+    def __post_init__(self) -> None:
+        """Number the free unknowns."""
+        super().__post_init__()
+        slots = np.full(self.mesh.size, -1)
+        slots[self.mesh.free] = np.arange(len(self.mesh.free))
+        object.__setattr__(self, "slots", slots)
+        nodes = tuple(contact for contact in self.mesh.contacts if contact.slide < 0)
+        watched = GapBounds(replace(self.mesh, contacts=nodes)) if nodes else None
+        object.__setattr__(self, "watched", watched)
+
+    @classmethod
+    def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
+        """Return the equations of a network; `make` returns those of one whose elements stand still."""
+        e = mesh.elements
+        names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
+        if e.weight.ndim > 2:  # of several states: those of the first
+            first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
+            e = e._replace(**first, moved_cuts=None)
+        copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
+        indices = e._replace(**copies)
+        whole = replace(mesh, elements=indices)
+        return cls(whole, ramp, plain=make(replace(without_contacts(whole), moving=None), ramp))
+
+    def rebase(self, base: FloatArray) -> SlidingEquations:
+        """Return the equations with other values of the unknowns that are held, (size,)."""
+        return SlidingEquations(replace(self.mesh, base=base), self.ramp, plain=self.plain.rebase(base))
+
+    # -- places --------------------------------------------------------------------------------------------------------
+    @property
+    def _sides(self) -> list[ContactAt]:
+        return [contact for contact in self.mesh.contacts if contact.slide >= 0]
+
+    def move_to(self, places: FloatArray) -> bool:
+        """Move the elements of the equations without contacts to places; return False where one would vanish."""
+        assert self.mesh.moving is not None
+        tables = compute_moved_tables(self.mesh, places)
+        cuts = tables.pop("moved_cuts")
+        if not (cuts[:, 1] - cuts[:, 0] > SMALLEST_ELEMENT).all():
+            return False
+        self.plain.refill(self.mesh.moving.elements, tables)
+        return True
+
+    def find_laid_parts(self, z: FloatArray) -> list[LaidPart]:
+        """Return the elements that lie on obstacles; the elements stand at their places."""
+        edge = []
+        for contact in self._sides:
+            side = contact.laid if contact.closed is not None else int(np.rint(z[contact.flag]))
+            if not side:
+                continue
+            seen = self.side_at(contact, z)
+            # of the line on which the middle of the beam lies once the gap is closed
+            bulge = seen.bulge / (1 - seen.bulge * seen.gap) if seen.bulge else 0.0
+            edge.append(LaidPart(contact.element + (side > 0), contact, -float(np.sign(seen.rises)) * bulge))
+        return edge
+
+    def _lay(self, parts: list[LaidPart]) -> None:
+        """Take the energy of elements that lie on obstacles out of the equations without contacts."""
+        e = self.plain.mesh.elements
+        for part in parts:
+            rows = np.array([part.element])
+            names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
+            tables = {name: getattr(e, name)[rows] for name in names}
+            for name in ("weight", "ahead", "length"):
+                tables[name] = 0.0 * tables[name]
+            self.plain.refill(rows, tables)
+
+    def _drop_tension(self, z: FloatArray, parts: list[LaidPart]) -> FloatArray:
+        """Return unknowns in which nothing pulls along an obstacle."""
+        if not parts:
+            return z
+        edge = z.copy()
+        for part in parts:
+            edge[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
+        return edge
+
+    def _compute_laid_rows(self, part: LaidPart, z: FloatArray) -> tuple[Any, FloatArray, FloatArray]:
+        """Return unknowns, residual and its derivatives (9, 9) of an element that lies on an obstacle.
+
+        They are x, y and rotation of both ends, the tension, and a force that is none; the places are held.
+        """
+        mesh = self.mesh
+        indices = mesh.elements.unknowns[part.element]
+        item: Any = part.contact.item
+        fitted, section = mesh.fits[item.beam], mesh.fits.network.beams[item.beam].section
+        cuts = mesh.elements.cuts[part.element] if mesh.moving is None else self._cuts_of(part.element, z)
+        inside = float(mesh.elements.cuts[part.element].mean())
+        scale = mesh.scales
+        speed = float(np.real(fitted.speed(np.array([inside]), inside) + np.zeros(1))[0]) / scale.length
+        rest = np.real(fitted.angle(cuts, inside)) + 0.0 * cuts
+        bend = float(rest[1] - rest[0]) / ((cuts[1] - cuts[0]) * speed)
+        rigidity = float(np.real(section.rigidities(np.array([inside]), inside)[0][0])) / (
+            scale.force * scale.length**2
+        )
+        axial = float(self.mesh.axial[part.element, 0])
+        moment, length = rigidity * (part.curvature - bend), float(cuts[1] - cuts[0]) * speed
+        unknowns = np.array(
+            [indices[0], indices[1], indices[3], indices[4], indices[5], indices[7], indices[-2], indices[-1]]
+        )
+        angle = rest + z[indices[[3, 7]]]
+        along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        tension, idle = z[indices[-2]], z[indices[-1]]
+        ends = mesh.elements.ends[part.element]
+        if part.curvature:
+            reach = (angle[1] - angle[0]) / part.curvature
+        else:
+            place = [poses(mesh.attachments, z, [int(end)]).place[0] for end in ends]
+            reach = along[0] @ (place[1] - place[0])
+        residual, slopes = np.zeros(8), np.zeros((8, 8))
+        residual[0:2], residual[3:5] = -tension * along[0], tension * along[1]
+        residual[2], residual[5] = -moment, moment
+        residual[6], residual[7] = reach - length * (1 + axial * tension), idle
+        slopes[0:2, 6], slopes[3:5, 6] = -along[0], along[1]
+        slopes[0:2, 2], slopes[3:5, 5] = -tension * across[0], tension * across[1]
+        if part.curvature:
+            slopes[6, 5], slopes[6, 2] = 1 / part.curvature, -1 / part.curvature
+        else:
+            slopes[6, 3:5], slopes[6, 0:2] = along[0], -along[0]
+            slopes[6, 2] = across[0] @ (place[1] - place[0])
+        slopes[6, 6], slopes[7, 7] = -length * axial, 1.0
+        return unknowns, residual, slopes
+
+    def _cuts_of(self, element: int, z: FloatArray) -> FloatArray:
+        """Return where an element begins and ends."""
+        moving: Any = self.mesh.moving
+        row = int(np.flatnonzero(np.asarray(moving.elements) == element)[0])
+        return np.asarray(moving.fixed[row] + moving.shares[row] @ z[moving.places])
+
+    def side_at(self, contact: ContactAt, z: FloatArray) -> SideAt:
+        """Return the side of a beam at a contact; the elements stand at their places."""
+        mesh, item = self.mesh, contact.item
+        length, parameter = mesh.scales.length, float(z[contact.slide])
+        x, y, turn, _ = mesh.attachments.unknowns[contact.place]
+        place = mesh.attachments.origin[contact.place] + z[[x, y]]
+        slope, bend, radius, taper = self._beam_at(contact, parameter)
+        angle = slope[0] + float(z[turn])
+        along = np.array([np.cos(angle), np.sin(angle)])
+        across = np.array([-along[1], along[0]])
+        edge = item.outline.distance(place * length)  # type: ignore[union-attr]
+        normal = np.asarray(edge.normal, float)
+        sideways = np.array([normal[1], -normal[0]])
+        bulge = float(edge.curvature) * length * np.outer(sideways, sideways)
+        rises = float(normal @ across)
+        hessian = np.zeros((3, 3))
+        hessian[:2, :2] = bulge
+        curvature = self._curvature(contact, z, bend) * rises + float(along @ bulge @ along)
+        return SideAt(
+            float(edge.value) / length - radius, float(normal @ along) - taper, np.append(normal, 0.0),
+            np.append(bulge @ along, rises), hessian, (-taper * slope[2], rises * slope[1]), [x, y, turn], curvature,
+            rises, float(edge.curvature) * length,
+        )  # fmt: skip
+
+    def _beam_at(self, contact: ContactAt, parameter: float) -> tuple[tuple[float, float, float], float, float, float]:
+        """Return the unloaded angle, its slope and ds/dt by the parameter, curvature, half thickness and its slope."""
+        mesh, item = self.mesh, contact.item
+        beam, fitted = mesh.fits.network.beams[item.beam], mesh.fits[item.beam]  # type: ignore[union-attr]
+        inside, step, length = float(mesh.elements.cuts[contact.element].mean()), PLACE_STEP, mesh.scales.length
+        t = np.array([parameter - step, parameter, parameter + step])
+        angle = np.real(fitted.angle(t, inside)) + 0.0 * t
+        speed = float(np.real(fitted.speed(np.array([parameter]), inside) + np.zeros(1))[0]) / length
+        along = (fitted.arc(np.clip(t, 0, 1)), float(np.real(fitted.arc(inside))))
+        half = 0.5 * (np.real(beam.section.thickness_at(*along)) + 0.0 * t) / length
+        turning, tapering = (angle[2] - angle[0]) / (2 * step), float(half[2] - half[0]) / (2 * step)
+        return (float(angle[1]), float(turning), speed), float(turning) / speed, float(half[1]), tapering / speed
+
+    def _curvature(self, contact: ContactAt, z: FloatArray, unloaded: float) -> float:
+        """Return the curvature of the loaded beam at a contact: the mean of both elements that meet there."""
+        e, curvatures = self.plain.mesh.elements, list[float]()
+        columns = [3, 7, *range(8, self.mesh.degree + 7)]
+        for number, end in ((contact.element, 1.0), (contact.element + 1, 0.0)):
+            if e.length[number]:  # else it lies on the obstacle
+                slopes = shape_functions(self.mesh.degree, np.array([end]))[1][0]
+                curvatures.append(float(slopes @ z[e.unknowns[number, columns]]) / float(e.length[number]))
+        return unloaded + sum(curvatures) / max(len(curvatures), 1)
+
+    # -- equations -----------------------------------------------------------------------------------------------------
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+        """Return the equations linearised at some unknowns; not a number where elements vanish."""
+        mesh, plain, count, slots = self.mesh, self.plain, self.plain.n, self.slots
+        n, z = self.n, np.asarray(self.values(free, way))
+        moved = mesh.base if self.ramp else mesh.rate
+        sides = self._sides
+        places = z[[contact.slide for contact in sides]]
+        if not self.move_to(places):
+            nowhere = LinearisedSides(np.full(n, np.nan), np.eye(n), np.zeros(n))
+            nowhere.frozen, nowhere.n_laid = np.eye(n), 0
+            return nowhere
+        laid = self.find_laid_parts(z)
+        self._lay(laid)
+        bare = self._drop_tension(z, laid)[mesh.free][:count]
+        at = plain.linearise(bare, way)
+        residual, change, tangent = np.zeros(n), np.zeros(n), np.zeros((n, n))
+        residual[:count], change[:count], tangent[:count, :count] = at.residual, at.change, at.tangent
+        for part in laid:
+            self._lay_rows(part, z, residual, tangent)
+        rows: list[tuple[Any, FloatArray, float]] = []  # of the symmetric matrix: unknowns, row, pivot
+        self._add_nodes(z, moved, residual, change, tangent, rows)
+        for number, contact in enumerate(sides):
+            force, place, flag = slots[contact.unknown], slots[contact.slide], slots[contact.flag]
+            tangent[flag, flag] = 1.0
+            if contact.closed is not None:
+                residual[flag] = z[contact.flag] - contact.laid
+            if not self.is_pressing(contact, z):
+                residual[force], tangent[force, force], tangent[place, place] = -free[force], -1.0, 1.0
+                continue
+            side, value = self.side_at(contact, z), float(z[contact.unknown])
+            indices = slots[side.unknowns]
+            residual[indices] -= value * side.gap_row
+            tangent[np.ix_(indices, indices)] -= value * side.hessian
+            tangent[indices, force] -= side.gap_row
+            residual[force], residual[place] = -side.gap, side.tangency
+            tangent[force, indices] -= side.gap_row
+            tangent[place, indices] += side.tangency_row
+            tangent[force, place], tangent[place, place] = -side.by_place[0], side.by_place[1]
+            tangent[:count, place] += self._differentiate_by_place(bare, way, z, number, laid)
+            rows.append((indices, -side.gap_row, 0.0))
+            bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
+            stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
+            rows.append((indices, side.tangency_row, stiffness))
+        self.move_to(places)
+        at = LinearisedSides(residual, tangent, change)
+        at.frozen, at.n_laid = self._frozen(tangent, rows, laid, z), len(laid)
+        return at
+
+    def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
+        """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
+        indices = self.mesh.elements.unknowns[part.element]
+        inner = self.slots[indices[8:]]
+        residual[inner] = z[indices[8:]]
+        tangent[inner], tangent[:, inner] = 0.0, 0.0
+        tangent[inner, inner] = 1.0
+        unknowns, rows, slopes = self._compute_laid_rows(part, z)
+        slots = self.slots[unknowns]
+        held = slots < 0
+        residual[slots[6]] = tangent[slots[6], slots[6]] = 0.0
+        residual[slots[7]] = tangent[slots[7], slots[7]] = 0.0
+        residual[slots[~held]] += rows[~held]
+        tangent[np.ix_(slots[~held], slots[~held])] += slopes[np.ix_(~held, ~held)]
+
+    def is_pressing(self, contact: ContactAt, z: FloatArray) -> bool:
+        """Return True if the side of a beam counts as touching: as it was set, or where it has a force."""
+        return contact.closed if contact.closed is not None else bool(z[contact.unknown] > 0)
+
+    def _add_nodes(
+        self, z: FloatArray, moved: FloatArray, residual: FloatArray, change: FloatArray, tangent: FloatArray,
+        rows: list[tuple[Any, FloatArray, float]],
+    ) -> None:  # fmt: skip
+        """Add the contacts of nodes."""
+        if self.watched is None:
+            return
+        far = self.watched.are_open(z)
+        for number, contact in enumerate(self.watched.mesh.contacts):
+            slot = self.slots[contact.unknown]
+            if far[number] or contact.closed is False:
+                if slot >= 0:
+                    residual[slot], tangent[slot, slot] = -z[contact.unknown], -1.0
+                continue
+            term = press(self.mesh, contact, z)
+            slots = self.slots[term.unknowns]
+            indices = slots >= 0
+            pushed = slots[indices]
+            residual[pushed] += term.gradient[indices]
+            tangent[np.ix_(pushed, pushed)] += term.hessian[np.ix_(indices, indices)]
+            change[pushed] += term.hessian[indices] @ moved[term.unknowns]
+            rows.append((pushed[pushed != slot], term.hessian[-1, :-1][indices[:-1]], float(term.hessian[-1, -1])))
+
+    def _differentiate_by_place(
+        self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]
+    ) -> FloatArray:
+        """Return the change of the residuals without contacts with one of the places."""
+        sides, unknown = [], self._sides[number].slide
+        for step in (PLACE_STEP, -PLACE_STEP):
+            beside = z.copy()
+            beside[unknown] += step
+            if not self.move_to(beside[[contact.slide for contact in self._sides]]):
+                return np.full(len(free), np.nan)
+            self._lay(laid)
+            residual = np.array(self.plain.linearise(free, way).residual)
+            for part in laid:
+                unknowns, rows, _ = self._compute_laid_rows(part, beside)
+                slots = self.slots[unknowns]
+                residual[slots[6:]] = 0.0
+                residual[slots[slots >= 0]] += rows[slots >= 0]
+            sides.append(residual)
+        return np.asarray((sides[0] - sides[1]) / (2 * PLACE_STEP))
+
+    def _frozen(
+        self, tangent: FloatArray, rows: list[tuple[Any, FloatArray, float]], laid: list[LaidPart], z: FloatArray
+    ) -> FloatArray:
+        """Return the symmetric matrix of motions, section forces and conditions with all places held.
+
+        Of an element that lies on an obstacle there is its length, a constraint.
+        """
+        count = self.plain.n
+        whole = np.zeros((count + len(rows), count + len(rows)))
+        whole[:count, :count] = tangent[:count, :count]
+        for part in laid:
+            unknowns, _, slopes = self._compute_laid_rows(part, z)
+            slots = self.slots[unknowns]
+            some = slots >= 0
+            whole[np.ix_(slots[some], slots[some])] -= slopes[np.ix_(some, some)]
+            pulled = np.where(np.arange(8) < 6, slopes[:, 6], 0.0)
+            whole[slots[6], slots[some]] += pulled[some]
+            whole[slots[some], slots[6]] += pulled[some]
+            whole[slots[6], slots[6]] += slopes[6, 6]
+            whole[slots[7], slots[7]] = 1.0
+        motions = np.flatnonzero(self.plain.mesh.free < self.mesh.n_motions)
+        whole[motions, motions] += NEUTRAL_STIFFNESS
+        for number, (indices, row, pivot) in enumerate(rows, start=count):
+            whole[number, indices] = whole[indices, number] = row
+            whole[number, number] = pivot
+        return whole
+
+    def count_unstable(self, at: LinearEquations) -> int:
+        """Return the number of unstable directions at a held drive, with places of contacts held."""
+        from scipy.linalg import lapack
+
+        assert isinstance(at, LinearisedSides)
+        factors, pivots, _ = lapack.dsytrf(at.frozen, lower=1)
+        single = pivots > 0
+        negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
+        forces = int((self.plain.mesh.free >= self.mesh.n_motions).sum()) - at.n_laid
+        return negative - forces - (len(at.frozen) - self.plain.n)
+
+    # -- gradients -----------------------------------------------------------------------------------------------------
+    def gradient(self, free: Any, way: Any) -> Any:
+        """Return the gradient by all unknowns, (size,); where they are complex by a difference along that step."""
+        if np.iscomplexobj(free) or np.iscomplexobj(way):
+            steps, ahead = np.imag(free), float(np.imag(way))
+            size = max(float(np.abs(steps).max(initial=0.0)), abs(ahead), np.finfo(float).tiny)
+            share = PLACE_STEP / size
+            sides = [
+                self.gradient(np.real(free) + sign * share * steps, float(np.real(way)) + sign * share * ahead)
+                for sign in (1.0, -1.0)
+            ]
+            return 0.5 * (sides[0] + sides[1]) + 1j * (sides[0] - sides[1]) / (2 * share)
+        drive, share = self.factors(way)
+        return self.evaluate_gradient(np.asarray(self.values(free, way)), drive, share)
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size)."""
+        return np.array([self.evaluate_gradient(*pair) for pair in zip(z, drive, strict=True)]).reshape(z.shape)
+
+    def evaluate_gradient(self, z: FloatArray, drive: float, share: float = 1.0) -> FloatArray:
+        """Return the gradient of one state by all unknowns; that by places is zero."""
+        self.move_to(z[[contact.slide for contact in self._sides]])
+        laid = self.find_laid_parts(z)
+        self._lay(laid)
+        total = np.array(self.plain.evaluate(self._drop_tension(z, laid), drive, share)[0])
+        for part in laid:
+            unknowns, rows, _ = self._compute_laid_rows(part, z)
+            total[self.mesh.elements.unknowns[part.element, -2:]] = 0.0
+            np.add.at(total, unknowns, rows)
+        for contact in self.mesh.contacts:
+            if not z[contact.unknown]:
+                continue
+            if contact.slide < 0:
+                term = press(self.mesh, contact, z)
+                total[term.unknowns] += term.gradient
+                continue
+            side = self.side_at(contact, z)
+            total[side.unknowns] -= z[contact.unknown] * side.gap_row
+            total[contact.unknown] -= side.gap
+        return total
+
+
+MOVED_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")

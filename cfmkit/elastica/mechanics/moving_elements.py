@@ -1,0 +1,83 @@
+"""Elements whose ends are places of contacts on a beam: their tables at any of these places.
+
+The bending moment has a kink where a contact presses: there an element ends, so that polynomials keep their accuracy.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics.element_tables import smooth_marks, smooth_tables
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
+
+
+PLACE_STEP = 1e-6  # of a beam's parameter, by which is differentiated
+
+
+def compute_moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
+    """Return the tables of the elements in `mesh.moving`, (..., r, q), with contacts at some places (..., k)."""
+    moving = mesh.moving
+    assert moving is not None
+    cuts = moving.fixed + np.einsum("rck,...k->...rc", moving.shares, places)
+    wide = mesh.elements.curl is not None
+    tables_by_name: dict[str, Any] = {}
+    for rows, beam, inside in _parts(mesh):
+        fitted, section = mesh.fits[beam], mesh.fits.network.beams[beam]
+        tables = smooth_tables(section, fitted, mesh.scales, mesh.degree, cuts[..., rows, :], inside, wide)
+        for name, values in tables.items():
+            inner = values.shape[len(cuts.shape) - 1 :]
+            table = tables_by_name.setdefault(name, np.empty((*cuts.shape[:-1], *inner)))
+            table[(..., rows, *(slice(None),) * len(inner))] = values
+    floor = mesh.floor[moving.elements]
+    if floor.any():
+        tables_by_name["axial"] = tables_by_name["axial"] + floor[:, None]
+    return tables_by_name | {"moved_cuts": cuts}
+
+
+def with_places(mesh: Discretisation, z: Any) -> Discretisation:
+    """Return the arrays with contacts at their places in states (..., size): tables of elements are (..., e, q)."""
+    return mesh if mesh.moving is None else replace(mesh, elements=move_elements(mesh, z))
+
+
+def move_elements(mesh: Discretisation, z: Any) -> BeamElements:
+    """Return the elements with contacts at their places in states (..., size)."""
+    e, moving = mesh.elements, mesh.moving
+    assert moving is not None
+    moved = compute_moved_tables(mesh, z[..., moving.places])
+    changed: dict[str, Any] = {}
+    for name, values in moved.items():
+        table_at_rest = e.cuts if name == "moved_cuts" else getattr(e, name)
+        rank = 1 if name == "length" else 2
+        first = table_at_rest.reshape(-1, *table_at_rest.shape[-rank:])[0]
+        whole = np.broadcast_to(first, (*z.shape[:-1], *first.shape)).copy()
+        whole[(..., moving.elements, *(slice(None),) * (rank - 1))] = values
+        changed[name] = whole
+    laid = np.zeros((*z.shape[:-1], len(e.beam)), bool)
+    for contact in mesh.contacts:
+        if contact.slide >= 0:
+            for side in (-1, 1):
+                laid[..., contact.element + (side > 0)] |= np.rint(z[..., contact.flag]) == side
+    changed["laid"] = laid if laid.any() else None
+    return e._replace(**changed)
+
+
+def _parts(mesh: Discretisation) -> list[tuple[Any, str, float]]:
+    """Return rows of `mesh.moving` in each smooth part of each beam, its name and a place inside the part."""
+    if _parts not in mesh.known:
+        assert mesh.moving is not None
+        numbers, parts = np.asarray(mesh.moving.elements), []
+        for beam in dict.fromkeys(mesh.elements.beam[number] for number in numbers):
+            middles = mesh.elements.cuts[numbers].mean(axis=1)
+            of_beam = np.array([mesh.elements.beam[number] == beam for number in numbers])
+            for begin, end in itertools.pairwise(smooth_marks(mesh.fits.network.beams[beam], mesh.fits[beam])):
+                rows = np.flatnonzero(of_beam & (begin <= middles) & (middles < end))
+                if len(rows):
+                    parts.append((rows, beam, 0.5 * (begin + end)))
+        mesh.known[_parts] = parts
+    return mesh.known[_parts]  # type: ignore[no-any-return]

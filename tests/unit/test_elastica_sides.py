@@ -1,0 +1,291 @@
+"""Sides of beams that touch obstacles, at places that are unknowns, in units of L and F0 = EI/L^2.
+
+The numbers are of independent shooting (DOP853 between 1e-11 and 2e-14) and closed forms (mpmath); see docs/contact.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    PathStatus,
+    PointLoad,
+    Section,
+    Support,
+    arc,
+    guided,
+    trace,
+)
+from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
+
+DOWN = -np.pi / 2
+HALF = 0.005  # half the thickness: radii of the references are those of the centre line
+THIN = Section(1.2e7, 1.0, 2 * HALF, axial=False, shear=False)  # EI = 1
+EXACT = Control(tolerance=1e-9)
+TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
+
+
+def leaf(*contacts, support=CLAMPED, at=(0.0, 0.0), angle=0.0, section=THIN):
+    """Return a straight leaf of length 1 from `root` to `tip`."""
+    end = at[0] + np.cos(angle), at[1] + np.sin(angle)
+    nodes = {"root": Node(*at, support), "tip": Node(*end)}
+    return Network(nodes, {"leaf": Beam("root", "tip", section)}, contacts=contacts)
+
+
+def side(name, outline, beam="leaf"):
+    return BeamOnObstacle(name, beam, outline)
+
+
+def at_drive(path, drive):
+    """Return the number of the first point at a drive."""
+    return int(np.flatnonzero(np.abs(path.drive - drive) < 1e-12)[0])
+
+
+def tip_at(path, point):
+    node = path.network.nodes["tip"]
+    return path.motion("tip")[point, :2] + [node.x, node.y]
+
+
+def check_complementarity(path):
+    """Forces press, nothing lies in an obstacle, and what is apart has no force."""
+    for number in range(len(path.network.contacts)):
+        force, gap = path.contact_force(number), path.contact_gap(number)
+        assert force.min() > -1e-9 * max(1.0, force.max())
+        assert gap.min() > -1e-9
+        assert np.minimum(gap, force).max() < 1e-8
+
+
+ROUND = 0.05 - HALF
+APEX = -0.1 + np.sqrt(2) * ROUND  # of a roof whose ridge is rounded about (0.5, -0.1)
+PINS = {
+    "disc": circle((0.5, -0.1), ROUND),
+    "fillet": polyline([(-0.5, APEX - 1), (0.5, APEX), (1.5, APEX - 1)], ROUND),
+}
+
+
+@pytest.mark.parametrize("pin", PINS)
+def test_a_pin_under_a_leaf_has_the_force_and_the_place_of_shooting_both_ways(pin):
+    path = trace(leaf(side("pin", PINS[pin])), Loading(TIP_LOAD, np.array([0.25, 0.5, 1, 2, 3, 1, 0.4])), EXACT)
+    begin, end = path.contact_events
+    assert (begin.kind, end.kind) == ("begins", "ends")
+    assert begin.drive == pytest.approx(0.476636638220007, abs=1e-11)
+    assert end.drive == pytest.approx(begin.drive, abs=1e-11)
+    known = {1.0: (1.224370708397327, 0.513876161308937), 3.0: (5.552993116405933, 0.520254278889554)}
+    for load, (force, place) in known.items():
+        point = at_drive(path, load)
+        assert path.contact_force(0)[point] == pytest.approx(force, rel=1e-10)
+        assert path.contact_places(0)[point] == pytest.approx([place, place], rel=1e-10)
+    assert tip_at(path, at_drive(path, 3.0)) == pytest.approx((0.932836562878431, -0.285087474732345), abs=1e-10)
+    assert path.stable.all()
+    check_complementarity(path)
+
+
+def test_a_tip_on_a_floor_becomes_tangent_and_lies_flank_on_and_goes_back():
+    floor = line((0, -HALF), 0.0)
+    net = leaf(NodeOnObstacle("floor", "tip", floor, HALF), side("floor", floor),
+               support=guided(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9)  # fmt: skip
+    path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.2, 0.25, 0.3, 0.25, 0.1, 0.05])), EXACT)
+    known = [0.13898439286123, 0.448837794092424, 0.598397552260931, 0.936966252247794, 0.598397552260931]
+    assert path.effort[path.at_requested] == pytest.approx([*known, known[0], 0.0], rel=1e-10, abs=1e-12)
+    kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
+    assert kinds == ("begins", "moves", "moves", "ends")
+    tangent, begin = 0.284386717407804, 0.4 - np.sin(np.pi / 9)
+    assert drives == pytest.approx([begin, tangent, tangent, begin], abs=1e-11)
+    assert path.contact_places(1)[at_drive(path, 0.3)][0] == pytest.approx(0.864952518930985, rel=1e-9)
+    check_complementarity(path)
+
+
+def test_a_tip_on_a_floor_that_stretches_has_the_forces_of_shooting():
+    floor = line((0, -0.025), 0.0)
+    section = Section(12 / 0.05**3, 1.0, 0.05, axial=True, shear=False)
+    net = leaf(NodeOnObstacle("floor", "tip", floor, 0.025), side("floor", floor),
+               support=guided(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9, section=section)  # fmt: skip
+    path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.3])), EXACT)
+    assert path.effort[path.at_requested] == pytest.approx([0.13897712353818, 0.936909515319372], rel=1e-9)
+    assert path.contact_places(1)[-1, 0] == pytest.approx(0.864983588188324, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("radius", "onset", "known"),
+    [
+        (1.0, 1.06723164373704953, {
+            2.0: (0.39524362684601514, (0.88503304412791888, -0.41321894597679186)),
+            4.0: (0.65267151409608263, (0.85731099269312176, -0.44602151849218636)),
+            8.0: (0.80612051212628843, (0.84660682986180773, -0.45579885195620522)),
+        }),
+        (0.5, 2.54509723698775048, {4.0: (0.1998403214625088, (None, -0.64299750901244334))}),
+    ],
+)  # fmt: skip
+def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known):
+    drive = Loading(TIP_LOAD, np.array([1.0, 2, 4, 8, 4, 2, 0.5]))
+    path = trace(leaf(side("drum", circle((0, -radius), radius - HALF))), drive, EXACT)
+    assert path.status is PathStatus.COMPLETE
+    kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
+    assert kinds == ("spreads", "closes")
+    assert drives == pytest.approx([onset, onset], rel=1e-9)
+    for load, (wrapped, tip) in known.items():
+        point = at_drive(path, load)
+        assert path.contact_places(0)[point] == pytest.approx([0.0, wrapped], rel=1e-10)
+        if tip[0] is not None:
+            assert tip_at(path, point)[0] == pytest.approx(tip[0], abs=1e-10)
+        assert tip_at(path, point)[1] == pytest.approx(tip[1], abs=1e-10)
+    bent = path.states("leaf").moment[at_drive(path, 4.0), :5]
+    assert bent == pytest.approx(np.full(5, -1 / radius), rel=1e-9)  # along the drum it has its curvature
+
+
+@pytest.mark.slow  # it ends where a search for a path that goes on fails
+def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
+    walls = side("top", line((0, 0.05 + HALF), np.pi)), side("bottom", line((0, -0.05 - HALF), 0.0))
+    nodes = {"root": Node(0, 0, Support(True, True, False)), "tip": Node(1, 0, Support(False, True, False))}
+    net = Network(nodes, {"leaf": Beam("root", "tip", THIN)}, contacts=walls)
+    euler = np.pi**2
+    drive = Loading(
+        (PointLoad("tip", -1.0),), euler * np.array([0.5, 1.001, 2.0, 3.0, 3.9, 5.0, 8.0, 12.0, 15.0, 16.0])
+    )
+    path = trace(net, drive, EXACT)
+    first, flat = (event.drive / euler for event in path.contact_events)
+    assert first == pytest.approx(1.00310705881604, abs=1e-9)
+    assert flat == pytest.approx(3.984869364316, abs=1e-7)
+    assert path.events[-1].drive / euler == pytest.approx(15.8743698018842, abs=1e-7)
+    assert path.status is PathStatus.JUMPS
+    assert "buckles away" in path.message
+
+
+def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
+    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(1, 1, Support(False, False, True))}
+    net = Network(
+        nodes, {"leaf": Beam("root", "tip", THIN, arc(np.pi / 2))}, contacts=(side("floor", line((0, -HALF), 0)),)
+    )
+    path = trace(net, Displacement("tip", DOWN, np.array([0.1, 0.2, 0.35, 0.4, 0.5, 0.35, 0.1])), EXACT)
+    known = [0.587165757200244, 1.057650189060502, 1.698863931470137, 1.993805586239256, 2.871080044184531]
+    assert path.effort[path.at_requested] == pytest.approx([*known, known[2], known[0]], rel=1e-10)
+    flat = [path.contact_places(0)[at_drive(path, drive), 1] * np.pi / 2 for drive in (0.35, 0.4, 0.5)]
+    assert flat == pytest.approx([0.148310576897689, 0.257732557659012, 0.476576519181660], rel=1e-9)
+    assert path.contact_events[0].drive == pytest.approx(1 - 0.7177700110461, abs=1e-7)
+
+
+@pytest.mark.slow
+def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
+    held = Support(True, True, True, displacement=(-0.02, 0, 0))
+    nodes = {"root": Node(0, 0, CLAMPED), "mid": Node(0.5, 0), "tip": Node(1, 0, held)}
+    beams = {"leaf": Beam("root", "mid", THIN), "other": Beam("mid", "tip", THIN)}
+    net = Network(nodes, beams, contacts=(side("pin", circle((0.25, -0.07), 0.05 - HALF)),))
+    drive = Loading((PointLoad("mid", 0, -1.0, 0.02),), np.array([2.0, 10, 20]))
+    path = trace(net, drive, replace(EXACT, through_folds=True, sign=-1))
+    (begin,) = path.contact_events
+    assert begin.drive == pytest.approx(7.04366432533202, abs=1e-9)
+    assert (begin.before, begin.after) == (1, 0)
+    limits = [event.drive for event in path.events if event.kind == "limit point"]
+    assert limits == pytest.approx([14.40636701968, begin.drive, 11.12776960427], abs=1e-8)
+
+
+def test_a_compressed_leaf_between_arcs_touches_at_a_point_and_does_not_lie_where_it_would_be_pulled():
+    net = leaf(side("low", circle((0, -1.0), 1 - HALF)), side("up", circle((0, 1.0), 1 - HALF)))
+    net = replace(net, loads=(PointLoad("tip", -0.95 * np.pi**2 / 4, 0.0),))
+    path = trace(net, Displacement("tip", DOWN, np.array([0.05, 0.2, 0.3, 0.4, 0.43, 0.45])), EXACT)
+    known = [
+        0.007735992349689,
+        0.039352758581935,
+        0.078266985739326,
+        0.195876053911287,
+        0.619199645915576,
+        2.353162735807857,
+    ]
+    assert path.effort[path.at_requested] == pytest.approx(known, rel=1e-9)
+    assert path.contact_events[0].drive == pytest.approx(0.3770120208, abs=1e-8)
+    places = [path.contact_places(0)[at_drive(path, drive)] for drive in (0.4, 0.43, 0.45)]
+    assert places == pytest.approx(
+        np.repeat([[0.254452975264562], [0.501362191006068], [0.702146185556468]], 2, axis=1), rel=1e-9
+    )
+
+
+def test_a_small_disc_beside_the_way_of_a_leaf_is_found():
+    """The leaf sweeps over a pin that is a fortieth of the way of its middle."""
+    net = leaf(side("pin", circle((0.6, -0.12), 0.01)))
+    path = trace(net, Loading(TIP_LOAD, np.array([4.0])), EXACT)
+    assert path.contact_events[0].kind == "begins"
+    assert path.contact_gap(0).min() > -1e-10
+    assert path.contact_places(0)[-1, 0] == pytest.approx(0.6, abs=0.05)
+
+
+def test_a_leaf_that_cannot_lie_on_a_disc_ends_with_the_reason():
+    section = replace(THIN, axial=True, shear=True)
+    net = leaf(side("drum", circle((0, -1.0), 1 - HALF)), section=section)
+    path = trace(net, Loading(TIP_LOAD, np.array([0.5, 4.0])), EXACT)
+    assert path.status is PathStatus.LOST
+    assert "begins to lie on it along a length" in path.message
+    assert "shear" in path.message
+
+
+def layout(seed):
+    """Return a cantilever among up to three discs and a floor, and a load out and back."""
+    rng = np.random.default_rng(seed)
+    contacts = []
+    for number in range(int(rng.integers(1, 4))):
+        x, radius = rng.uniform(0.25, 0.95), rng.uniform(0.03, 0.15)
+        y = -rng.uniform(0.02, 0.35) * x * x - 0.01 - radius
+        disc = circle((x, y), radius)
+        contacts += [side(f"d{number}", disc), NodeOnObstacle(f"d{number}", "tip", disc, HALF)]
+    if rng.integers(2):
+        floor = line((0, -rng.uniform(0.15, 0.4)), 0.0)
+        contacts += [side("floor", floor), NodeOnObstacle("floor", "tip", floor, HALF)]
+    up = np.linspace(0, 1, 7)[1:] * rng.uniform(1, 5)
+    load = (PointLoad("tip", 0.2 * rng.normal(), -1.0),)
+    return leaf(*contacts), Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
+
+
+@pytest.mark.slow  # seconds each
+@pytest.mark.parametrize("seed", range(8))
+def test_a_random_layout_of_discs_returns_to_its_own_points_and_keeps_every_condition(seed):
+    path = trace(*layout(seed), Control(tolerance=1e-8))
+    assert path.status is PathStatus.COMPLETE
+    check_complementarity(path)
+    moved = path.motion("tip")[path.at_requested]
+    assert moved[:5] == pytest.approx(moved[10:5:-1], abs=1e-9)
+
+
+def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_of_the_residual():
+    net = leaf(side("drum", circle((0, -1.0), 1 - HALF)), side("pin", circle((0.7, -0.4), 0.1)))
+    mesh = discretise(net, Loading(TIP_LOAD, np.array([1.0])), flanks=[FlankPlace(0, 0.3, -1), FlankPlace(1, 0.6)])
+    mesh = replace(mesh, contacts=tuple(one._replace(closed=True) for one in mesh.contacts))
+    own = equations(mesh)
+    free = 0.1 * np.random.default_rng(0).normal(size=own.n)
+    for one, place, force, flag in zip(mesh.contacts, (0.3, 0.6), (0.7, 0.4), (-1, 0), strict=True):
+        free[own.slots[[one.slide, one.unknown, one.flag]]] = place, force, flag
+    at, step = own.linearise(free, 0.7), 1e-6
+    sides = [own.linearise(free + step * unit, 0.7).residual - own.linearise(free - step * unit, 0.7).residual
+             for unit in np.eye(own.n)]  # fmt: skip
+    slopes = np.array(sides).T / (2 * step)
+    drum = mesh.contacts[0]
+    near = np.ones(own.n, bool)
+    near[own.slots[mesh.elements.unknowns[0, -2]]] = False  # its curvature is that of the closed gap: exact there
+    assert slopes[near] == pytest.approx(at.tangent[near], abs=1e-6)
+    assert drum.laid == -1
+
+
+@pytest.mark.parametrize("with_pad", [False, True])
+def test_a_leaf_parallel_to_a_floor_ends_with_the_reason(with_pad):
+    floor = line((0, -HALF), 0.0)
+    pads = (NodeOnObstacle("floor", "tip", floor, HALF),) if with_pad else ()
+    net = leaf(*pads, side("floor", floor), support=guided(np.pi / 2), at=(0.0, 0.1))
+    path = trace(net, Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
+    assert path.status is PathStatus.LOST
+    assert path.message == "beam 'leaf' on 'floor' is met along the whole length at 0.1: no place touches first"
+
+
+def test_a_constant_load_may_close_a_contact_of_a_side_before_the_drive_moves():
+    net = replace(leaf(side("pin", PINS["disc"])), loads=(PointLoad("tip", 0.0, -1.0),))
+    path = trace(net, Loading((PointLoad("tip", 0.0, -1.0),), np.array([0.0, 2.0])), EXACT)
+    assert path.contact_force(0)[[0, -1]] == pytest.approx([1.224370708397327, 5.552993116405933], rel=1e-9)
