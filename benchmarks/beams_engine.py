@@ -27,7 +27,7 @@ from cfmkit.elastica import (
     Polynomial,
     Section,
     gradient,
-    guided,
+    slider_support,
     trace,
     trace_many,
 )
@@ -47,7 +47,7 @@ def lan(x: Any = SHAPE) -> Network:
         "n2": Node(x[12] * cm, 0, CLAMPED),
         "n3": Node(x[0] * cm, x[1] * cm),
         "n4": Node(x[2] * cm, x[3] * cm),
-        "n5": Node(0.25 * cm, 4 * cm, guided(np.pi / 2)),
+        "n5": Node(0.25 * cm, 4 * cm, slider_support(np.pi / 2)),
     }
     ends = [("n1", "n3", 0.4592), ("n2", "n3", 1.6382), ("n3", "n4", -4.081), ("n4", "n5", 2.394)]
     beams = {
@@ -64,7 +64,10 @@ def cantilever() -> Network:
 def v_beam() -> Network:
     length, angle = 35 * MM, np.radians(7)
     section = Section(1477e6, 6 * MM, 1 * MM)
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+    }
     return Network(nodes, {"v": Beam("wall", "d", section)})
 
 

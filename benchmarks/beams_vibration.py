@@ -25,7 +25,7 @@ from cfmkit.elastica import (
     Path,
     Polynomial,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.vibration import NetworkMasses, frequencies
@@ -40,13 +40,13 @@ def cantilever() -> Network:
 
 
 def v_beam() -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "top": Node(60 * MM, 6 * MM, guided(np.pi / 2))}
+    nodes = {"a": Node(0, 0, CLAMPED), "top": Node(60 * MM, 6 * MM, slider_support(np.pi / 2))}
     return Network(nodes, {"x": Beam("a", "top", SECTION)})
 
 
 def lan() -> Network:
     places = {"n1": (2.5, 0.0), "n2": (34.5, 0.0), "n3": (30.5, 18.77), "n4": (12.44, 24.0), "n5": (2.5, 40.0)}
-    supports = {"n1": {"support": CLAMPED}, "n2": {"support": CLAMPED}, "n5": {"support": guided(np.pi / 2)}}
+    supports = {"n1": {"support": CLAMPED}, "n2": {"support": CLAMPED}, "n5": {"support": slider_support(np.pi / 2)}}
     nodes = {name: Node(x * MM, y * MM, **supports.get(name, {})) for name, (x, y) in places.items()}
     shapes = (
         ("n1", "n3", (0.4592, 1.3092, -1.5707)),

@@ -22,7 +22,7 @@ from timing import best
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax
-from cfmkit.families.slider_crank.unit_springs import along_crank, crank_efforts
+from cfmkit.families.slider_crank.unit_springs import crank_efforts, curves_along_crank
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 MILLION, SIDE = 1_000_000, 32
@@ -46,12 +46,12 @@ def eq_10(angle: np.ndarray, rates: np.ndarray) -> np.ndarray:
 def slsqp(seed: int) -> float:
     """Return the error of [B, eq. 8] that scipy's SLSQP ends with, from one random start."""
     travel = 0.35 * np.arange(1, 101)
-    from cfmkit.families.slider_crank.unit_springs import along_slider
+    from cfmkit.families.slider_crank.unit_springs import curves_along_slider
 
     def error(values: np.ndarray) -> float:
         r1, lead, *rates = values
         link = Linkage(r1, float(np.hypot(100, 60)) - r1, 60.0)
-        units = along_slider(link, link.stretched_angle + lead, 1, travel)
+        units = curves_along_slider(link, link.stretched_angle + lead, 1, travel)
         force = np.array([*rates, 0.0]) @ units.effort
         return float(np.sqrt(np.nanmean((force - 1.5) ** 2))) if np.isfinite(force).all() else 10.0
 
@@ -71,7 +71,9 @@ def main() -> None:
     )
 
     window = np.linspace(0.866, 4.866, 101)
-    goal = RateGoal(along_crank(link, np.radians(-5.0), np.radians(window)).effort.T, np.ones(101), np.full(4, np.inf))
+    goal = RateGoal(
+        curves_along_crank(link, np.radians(-5.0), np.radians(window)).effort.T, np.ones(101), np.full(4, np.inf)
+    )
     print(f"minimax rates, 101 places    {1e3 * best(lambda: minimax(goal), 20):7.2f} ms")
 
     spec = cfmkit.load(CONFIGS / "slider_crank_li2019.yaml")

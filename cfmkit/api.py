@@ -195,9 +195,9 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     record = family(spec.family)
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
-    from cfmkit.studies.design_with_margins_and_verification import delivered
+    from cfmkit.studies.design_with_margins_and_verification import run_design
 
-    return delivered(spec, record.design, run or Run())
+    return run_design(spec, record.design, run or Run())
 
 
 def evaluate(
@@ -264,13 +264,13 @@ def check(spec: AnySpec, changes: Iterable[str] = ()) -> tuple[Problem, ...]:
     >>> [problem.path for problem in cfmkit.check("configs/cam.yaml", ["mechanism.roller_radius=16 kg"])]
     ['mechanism.roller_radius']
     """
-    from cfmkit.runs.specfile import bind, changed, read_spec
+    from cfmkit.runs.specfile import apply_options, bind, read_spec
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.yamlio import read_document
 
     try:
         if isinstance(spec, Spec):
-            bind(changed(read_document(dumps(spec), spec.name), _each_change(changes)))
+            bind(apply_options(read_document(dumps(spec), spec.name), _each_change(changes)))
         else:
             bind(read_spec(os.fspath(_path_of(spec)), _each_change(changes)))
     except SpecError as error:
@@ -349,10 +349,10 @@ def export(
     >>> sorted(cfmkit.export("configs/cam.yaml"))[:3]
     ['cam-left.csv', 'cam-right.csv', 'cam.dxf']
     """
-    from cfmkit.runs.exported_files import exported
+    from cfmkit.runs.exported_files import export_files
 
     spec = spec_of(spec)
-    made, _, failed = exported(spec, kerf, tolerance, format)
+    made, _, failed = export_files(spec, kerf, tolerance, format)
     for name, error in failed.items():
         warnings.warn(f"{name} is not made: {error}", stacklevel=2)
     drawn = Named(made)

@@ -73,7 +73,7 @@ class Named(dict[str, T]):
 
     def __repr__(self) -> str:
         """Return the first values by name, and how many more there are."""
-        return "{" + _joined([f"{name!r}: {brief(value)}" for name, value in self.items()]) + "}"
+        return "{" + _join_texts([f"{name!r}: {brief(value)}" for name, value in self.items()]) + "}"
 
 
 class Several(tuple[T, ...]):
@@ -83,7 +83,7 @@ class Several(tuple[T, ...]):
 
     def __repr__(self) -> str:
         """Return the first values, and how many more there are."""
-        return "(" + _joined([brief(value) for value in self]) + ")"
+        return "(" + _join_texts([brief(value) for value in self]) + ")"
 
 
 class LazyMapping(Mapping[str, T]):
@@ -141,7 +141,7 @@ class LazyMapping(Mapping[str, T]):
 
     def __repr__(self) -> str:
         """Return the names; nothing is computed for a text."""
-        return f"<values by name: {_joined(list(self._names))}>"
+        return f"<values by name: {_join_texts(list(self._names))}>"
 
 
 class LazySequence(Sequence[T]):
@@ -201,12 +201,16 @@ class ShortRepr:
     def __repr__(self) -> str:
         """Return the fields, each with a short text."""
         reported = [f"{item.name}={brief(getattr(self, item.name))}" for item in fields(self)]  # type: ignore[arg-type]
-        return f"<{type(self).__name__}: {_joined(reported)}>"
+        return f"<{type(self).__name__}: {_join_texts(reported)}>"
 
 
-def named(values: Any) -> Any:
+def shorten_values(values: Any) -> Any:
     """Return values by name, and those within them, with short texts."""
-    return Named({name: named(value) for name, value in values.items()}) if isinstance(values, Mapping) else values
+    return (
+        Named({name: shorten_values(value) for name, value in values.items()})
+        if isinstance(values, Mapping)
+        else values
+    )
 
 
 def brief(value: Any) -> str:
@@ -240,7 +244,7 @@ def _array(values: Any) -> str:
     return f"array of {shape}" + (f": {known.min():.4g} ... {known.max():.4g}" if len(known) else "")
 
 
-def _joined(texts: list[str]) -> str:
+def _join_texts(texts: list[str]) -> str:
     """Return texts in a row, as many as there is room for."""
     count = sum(end <= LONGEST for end in accumulate(len(text) + 2 for text in texts))
     more = len(texts) - count

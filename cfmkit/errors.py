@@ -32,7 +32,7 @@ _LONG_WORD = re.compile(r"\S{400,}")
 """Longer than the paths of files that people have; names of keys, files and options stand without quotes."""
 
 
-def shortened(message: str) -> str:
+def shorten_quotes(message: str) -> str:
     """Return a message in which whatever somebody gave is quoted only as far as he needs to recognise it."""
     quoted = _LONG_QUOTE.sub(lambda found: f"{found['quote']}{found['text'][:47]}...{found['quote']}", message)
     return _words_shortened(quoted)
@@ -44,10 +44,10 @@ def _words_shortened(text: str) -> str:
 
 def visible(text: str) -> str:
     """Return text on one line, escaped where it cannot be seen: no name may command a terminal."""
-    return text if text.isprintable() else "".join(char if char.isprintable() else _escaped(char) for char in text)
+    return text if text.isprintable() else "".join(char if char.isprintable() else _escape(char) for char in text)
 
 
-def _escaped(char: str) -> str:
+def _escape(char: str) -> str:
     return f"\\x{ord(char):02x}" if ord(char) < 256 else f"\\u{ord(char):04x}"
 
 
@@ -106,7 +106,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         """Keep the message short, whatever it quotes."""
-        object.__setattr__(self, "message", shortened(self.message))
+        object.__setattr__(self, "message", shorten_quotes(self.message))
 
     def __str__(self) -> str:
         """Return the one line that the user reads: ``file:line:col: path: message``."""
@@ -196,4 +196,4 @@ def lines_of(error: BaseException) -> tuple[str, ...]:
     """Return what standard error shows of an exception; faults of a file start with their place, as editors want it."""
     if isinstance(error, SpecError):
         return tuple(map(str, error.problems))
-    return (f"error    {shortened(sentence_of(error))}",)
+    return (f"error    {shorten_quotes(sentence_of(error))}",)

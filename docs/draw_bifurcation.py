@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cfmkit
-from cfmkit.plots.style import BLUE, GREY, INK, VERMILLION, axes_mm, new_figure, png, styled
+from cfmkit.plots.style import BLUE, GREY, INK, VERMILLION, apply_style, axes_mm, new_figure, png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def _draw(ax: Axes, curve: Any, values: Any, mask: Any, color: str) -> None:
             ax.plot(1e3 * curve.motion[part], values[part], look, color=color, linewidth=1.5)
 
 
-@styled
+@apply_style
 def diagram(*changes: str) -> Figure:
     """Return the diagram: rotation of the eye and force, over the displacement."""
     primary = solved("analysis.branch=primary", *changes)

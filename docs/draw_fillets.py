@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cfmkit
-from cfmkit.plots.style import BLUE, VERMILLION, axes_mm, new_figure, png, styled
+from cfmkit.plots.style import BLUE, VERMILLION, apply_style, axes_mm, new_figure, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ def solved(radius: float) -> tuple[float, float, float]:
     return float(metrics["force_mean"].value), 1e-6 * float(metrics["stress_max"].value), error
 
 
-@styled
+@apply_style
 def trade(rows: list[tuple[float, float, float]]) -> Figure:
     """Return the figure: mean force and largest stress over the radius of the fillets."""
     figure = new_figure(160.0, 74.0)

@@ -84,11 +84,11 @@ def _command(name: str) -> Any:
     )
     callback.__annotations__ = {field.name: hints[field.name] for field in fields}
     app = typer.Typer(**_STYLE)
-    app.command(name, help=_unwrapped(inspect.getdoc(module.run) or ""), epilog=_example(module))(callback)
+    app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=_example(module))(callback)
     return _plain(typer.main.get_command(app))
 
 
-def _unwrapped(text: str) -> str:
+def _unwrap_paragraphs(text: str) -> str:
     """Return a docstring with one line for each paragraph: typer keeps the ends of lines of all but the first.
 
     Examples
@@ -110,11 +110,11 @@ def _plain(command: Any) -> Any:
     helped = command.get_help_option
 
     def help_option(ctx: Any) -> Any:
-        return _untyped(helped(ctx))
+        return _drop_types(helped(ctx))
 
     command.get_help_option = help_option
     for item in command.params:
-        _convert_if_given(_untyped(item))
+        _convert_if_given(_drop_types(item))
     return command
 
 
@@ -130,7 +130,7 @@ def _convert_if_given(item: Any) -> None:
     item.process_value = process_value
 
 
-def _untyped(item: Any) -> Any:
+def _drop_types(item: Any) -> Any:
     if getattr(item, "is_flag", False) or getattr(item, "count", False):
         item.metavar = ""
     elif getattr(item, "param_type_name", "") == "argument":
@@ -156,7 +156,7 @@ ALONE = ("--figure",)
 """Options whose value may be left out; typer has none of that kind, so an empty value is written for it."""
 
 
-def _spelled(arguments: list[str]) -> list[str]:
+def _spell_out_empty_values(arguments: list[str]) -> list[str]:
     """Return arguments with an empty value where one is left out.
 
     Examples
@@ -177,7 +177,9 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
         Of typer's kind, if it is malformed.
     """
     try:
-        call = _plain(typer.main.get_command(app)).main(_spelled(arguments), "cfmkit", standalone_mode=False)
+        call = _plain(typer.main.get_command(app)).main(
+            _spell_out_empty_values(arguments), "cfmkit", standalone_mode=False
+        )
     except SystemExit:
         # The reader of the help text has left, or typer has answered a shell.
         return None

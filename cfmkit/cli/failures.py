@@ -14,7 +14,7 @@ import typer
 from cfmkit import errors
 from cfmkit.documents.document import Document
 from cfmkit.documents.json_document import envelope
-from cfmkit.errors import ExitCode, OutputError, SpecError, StoppedBySignal, shortened
+from cfmkit.errors import ExitCode, OutputError, SpecError, StoppedBySignal, shorten_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -60,7 +60,7 @@ def go_on(fresh: bool) -> str:
     return f"run the same command again{' without --fresh' if fresh else ''} to continue"
 
 
-def told(error: BaseException, terminal: Terminal) -> Document:
+def report_failure(error: BaseException, terminal: Terminal) -> Document:
     """Report an error to the user, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
@@ -71,7 +71,7 @@ def told(error: BaseException, terminal: Terminal) -> Document:
 
 def fail(error: BaseException, terminal: Terminal) -> ExitCode:
     """Report what ended the command; return the exit code."""
-    answer = told(error, terminal)
+    answer = report_failure(error, terminal)
     if terminal.json:
         # What could not be written may be this very output.
         with suppress(OutputError):
@@ -109,10 +109,10 @@ def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
         for problem in error.problems:
             yield {name: value for name, value in asdict(problem).items() if name != "text"}
     else:
-        yield {"message": shortened(_reported(error))}
+        yield {"message": shorten_quotes(_message_of(error))}
 
 
-def _reported(error: BaseException) -> str:
+def _message_of(error: BaseException) -> str:
     if isinstance(error, ParserError):
         return _of_the_parser(error)
     if isinstance(error, Stopped):

@@ -97,13 +97,13 @@ def _run(given: list[str]) -> ExitCode:
     except Stopped as stop:
         return fail(stop, terminal)
     except Exception as error:
-        return _failed(Stopped.last or error, terminal)
+        return _report_error(Stopped.last or error, terminal)
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
-    call = parse(program(_before_the_verb, TEXT, EPILOG), given)
+    call = parse(program(_accept_global_options, TEXT, EPILOG), given)
     if call is None:
-        streams.put("")
+        streams.write_output("")
         return ExitCode.OK
     output = replace(
         terminal,
@@ -134,9 +134,9 @@ def _locks_of(options: Any) -> AbstractContextManager[None]:
     """Return the context of a verb: in it folders are locked, unless an option says otherwise."""
     if not getattr(options, "no_lock", False):
         return nullcontext()
-    from cfmkit.store.lock import without_locks
+    from cfmkit.store.lock import disable_locks
 
-    return without_locks()
+    return disable_locks()
 
 
 def _tell_more() -> None:
@@ -149,7 +149,7 @@ def _tell_more() -> None:
     log.setLevel(logging.INFO)
 
 
-def _failed(error: BaseException, terminal: Terminal) -> ExitCode:
+def _report_error(error: BaseException, terminal: Terminal) -> ExitCode:
     """Report an error; a signal may arrive while that is done."""
     try:
         return fail(error, terminal)
@@ -190,12 +190,12 @@ def _again(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], 
     timer.start()
 
 
-def _before_the_verb(
+def _accept_global_options(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> Any:
     if version:
-        streams.put(f"cfmkit {__version__}\n")
+        streams.write_output(f"cfmkit {__version__}\n")
         raise typer.Exit
     if ctx.invoked_subcommand is None:
         ctx.fail("a command is missing")

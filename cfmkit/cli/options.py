@@ -48,11 +48,11 @@ def option(
     **more
         What else typer takes.
     """
-    check = None if low is None else _at_least(low)
+    check = None if low is None else _require_at_least(low)
     return typer.Option(*names, metavar=metavar, help=text, show_default=shown, callback=check, **more)
 
 
-def _at_least(low: int) -> Callable[[int | None], int | None]:
+def _require_at_least(low: int) -> Callable[[int | None], int | None]:
     """Return what lets a number pass that is neither too small nor too large for a signed integer of 64 bits."""
 
     def check(value: int | None) -> int | None:

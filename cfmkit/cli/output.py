@@ -59,10 +59,10 @@ class Terminal:
 
     def show(self, *blocks: Block) -> None:
         """Print blocks to standard output."""
-        from cfmkit.documents.terminal import printed
+        from cfmkit.documents.terminal import print_blocks
 
         ascii_only = not streams.speaks_utf8(sys.stdout)
-        streams.put(printed(blocks, self.width, sys.stdout.isatty(), ascii_only))
+        streams.write_output(print_blocks(blocks, self.width, sys.stdout.isatty(), ascii_only))
 
     def show_page(self, document: Document) -> None:
         """Print the page of a document to standard output."""
@@ -73,7 +73,7 @@ class Terminal:
     def show_json(self, data: Mapping[str, Any]) -> None:
         """Print one JSON document to standard output."""
         ascii_only = not streams.speaks_utf8(sys.stdout)
-        streams.put(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
+        streams.write_output(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
 
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""

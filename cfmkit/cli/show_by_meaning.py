@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit.cli.guide import compile_phrases, look_for, read_terms, search
 from cfmkit.cli.show_topics import KINDS
-from cfmkit.documents.document import Document, Paragraph, field, listed
+from cfmkit.documents.document import Document, Paragraph, field, record_table
 
 if TYPE_CHECKING:
     import re
@@ -50,11 +50,13 @@ def explain_by_meaning(word: str) -> Document | None:
         if targets:
             yield Paragraph("see", ", ".join(targets))
         meaning = field("meaning", wraps=True)
-        yield from listed("terms", meanings, (field("name", "word"), meaning))
-        yield from listed("names", names[:MAX_NAMES], (field("name", wraps=True), field("kind"), meaning))
+        yield from record_table("terms", meanings, (field("name", "word"), meaning))
+        yield from record_table("names", names[:MAX_NAMES], (field("name", wraps=True), field("kind"), meaning))
         if (more := len(names) - MAX_NAMES) > 0:
             yield Paragraph("more", f"{more} names; --json has all")
-        yield from listed("pages", pages[:MAX_PAGES], (field("page", "cfmkit docs"), field("section", wraps=True)))
+        yield from record_table(
+            "pages", pages[:MAX_PAGES], (field("page", "cfmkit docs"), field("section", wraps=True))
+        )
 
     return Document({"look_for": [*targets], "terms": meanings, "names": names, "pages": pages}, blocks())
 

@@ -14,7 +14,7 @@ from cfmkit import families
 from cfmkit.cli.guide import list_terms
 from cfmkit.cli.show_materials import materials_page_parts, properties
 from cfmkit.cli.show_stock import stock_page_parts
-from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, listed
+from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, record_table
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def explain(name: str | None) -> Document:
         return TOPICS[name][1]()
     if name in families.names() or name in families.clashing():
         return family_page(name)
-    if (known := found(name)) is not None:
+    if (known := find_page(name)) is not None:
         return known
     from cfmkit.specs.yamlio import did_you_mean
 
@@ -56,17 +56,17 @@ def explain(name: str | None) -> Document:
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 
-def skipped(name: str | None) -> tuple[str, ...]:
+def list_skipped_families(name: str | None) -> tuple[str, ...]:
     """Return the families of other packages that are missing from a page on all families; none for other pages."""
     whole = name not in {*families.names(), "units", "metrics", "materials", "stock"}
-    return families.skipped() if whole else ()
+    return families.list_skipped() if whole else ()
 
 
 def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Document:
     def blocks() -> Iterator[Block]:
         yield TextLine((Span(title, LABEL), Span(f"  {text}")))
         for section in sections:
-            yield from listed(*section)
+            yield from record_table(*section)
 
     return Document(data, blocks())
 
@@ -222,7 +222,7 @@ def _default(key: Record) -> str:
     return "required" if key["required"] else str(key["default"])
 
 
-def found(name: str) -> Document | None:
+def find_page(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
     for kind, (records, fields) in KINDS.items():
@@ -299,7 +299,7 @@ def _measured_in(unit: str) -> list[str]:
     return [one.name for one in DIMENSIONS.values() if one.unit and border_size(one.name).powers == powers]
 
 
-def _gathered(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
+def _gather_records(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
     known: dict[str, list[dict[str, Any]]] = {}
     for name, record in pairs:
         known.setdefault(name, []).append(record)
@@ -309,7 +309,7 @@ def _gathered(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
 def _materials() -> Records:
     from cfmkit.stock import MATERIALS
 
-    return _gathered((name, asdict(one)) for one in MATERIALS.values() for name in (one.name, *one.aliases))
+    return _gather_records((name, asdict(one)) for one in MATERIALS.values() for name in (one.name, *one.aliases))
 
 
 def _metrics() -> Records:
@@ -319,19 +319,21 @@ def _metrics() -> Records:
 
     known = [(one.name, border_unit(one.dimension), one.definition) for one in definitions(None)]
     known += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]
-    return _gathered((name, {"name": name, "unit": unit, "definition": definition}) for name, unit, definition in known)
+    return _gather_records(
+        (name, {"name": name, "unit": unit, "definition": definition}) for name, unit, definition in known
+    )
 
 
 def _values() -> Records:
     """Return the values of the families, of the causes that they find in a measured loop, and of recordings."""
-    from cfmkit.experiment.value_definitions import recorded
+    from cfmkit.experiment.value_definitions import define_recorded_values
     from cfmkit.specs.units import border_unit
 
     every = families.records()
     known = [(record.name, record.values) for record in every]
     known += [(record.name, import_module(record.attribution).DEFINITIONS) for record in every if record.attribution]
-    known.append(("recordings", recorded("torque") | recorded("force")))
-    return _gathered(
+    known.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
+    return _gather_records(
         (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})
         for name, values in known
         for key, (dimension, definition) in values.items()
@@ -354,7 +356,7 @@ def _spec_keys() -> Records:
             for name in {key.path, key.path.rpartition(".")[2].removesuffix("[]")}:
                 yield name, reported
 
-    return _gathered(named())
+    return _gather_records(named())
 
 
 def _findings() -> Records:
@@ -365,7 +367,7 @@ def _findings() -> Records:
     known = [(record.name, record.findings) for record in families.records()]
     known += [("recordings", findings.FINDINGS), ("calibrate", calibration.FINDINGS)]
     known += [("correct", correction.FINDINGS), *FINDINGS.items()]
-    return _gathered(
+    return _gather_records(
         (key, {"name": key, "family": name, "meaning": meaning})
         for name, meanings in known
         for key, meaning in meanings.items()
@@ -377,13 +379,13 @@ def _units() -> Records:
 
     keys = ("symbol", "name", "dimension", "si", "input_only")
     each = [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
-    return _gathered((str(unit[key]), unit) for unit in each for key in ("symbol", "name"))
+    return _gather_records((str(unit[key]), unit) for unit in each for key in ("symbol", "name"))
 
 
 def _dimensions() -> Records:
     from cfmkit.specs.units import DIMENSIONS
 
-    return _gathered(
+    return _gather_records(
         (one.name, {"name": one.name, "unit": one.unit, "meaning": one.description, "example": one.example})
         for one in DIMENSIONS.values()
         if one.unit
@@ -392,7 +394,9 @@ def _dimensions() -> Records:
 
 def _references() -> Records:
     each = references()
-    return _gathered((name, one) for one in each for name in {one["name"], re.sub(r"-[0-9]{4}$", "", one["name"])})
+    return _gather_records(
+        (name, one) for one in each for name in {one["name"], re.sub(r"-[0-9]{4}$", "", one["name"])}
+    )
 
 
 _ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))

@@ -21,7 +21,7 @@ def prepare() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def put(text: str) -> None:
+def write_output(text: str) -> None:
     """Write to standard output; where its reader has left (``| head``) the rest is dropped.
 
     Raises

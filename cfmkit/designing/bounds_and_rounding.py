@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-def rounded(values: FloatArray, bounds: FloatArray, digits: int, unit: float = 1.0) -> FloatArray:
+def round_within_bounds(values: FloatArray, bounds: FloatArray, digits: int, unit: float = 1.0) -> FloatArray:
     """Return numbers with so many decimals of a unit, kept within their bounds (n, 2).
 
     Examples
@@ -24,7 +24,7 @@ def rounded(values: FloatArray, bounds: FloatArray, digits: int, unit: float = 1
     return np.clip(whole, *bounds.T)
 
 
-def at_bounds(values: FloatArray, bounds: FloatArray, close: float, share: float = 0.0) -> NDArray[np.int_]:
+def find_active_bounds(values: FloatArray, bounds: FloatArray, close: float, share: float = 0.0) -> NDArray[np.int_]:
     """Return at which end of its bounds each number is: -1 at the lowest, 1 at the highest, 0 between.
 
     Parameters
@@ -52,7 +52,7 @@ AROUND = 0.25
 """How far a value may move from that of a design, as a share of it: twice as far one mechanism becomes another."""
 
 
-def around(value: float, low: float | None = None, high: float | None = None) -> tuple[float, float]:
+def range_about(value: float, low: float | None = None, high: float | None = None) -> tuple[float, float]:
     """Return the range about the value of a design in which it may move, cut where limits are given.
 
     Examples

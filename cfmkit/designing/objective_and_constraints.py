@@ -49,7 +49,7 @@ def worst(rows: Iterable[LimitRows]) -> float:
     return max((-float(one.values.min(initial=0.0)) for one in rows), default=0.0)
 
 
-def missed(rows: Iterable[LimitRows], allowed: float) -> list[Missed]:
+def list_missed_limits(rows: Iterable[LimitRows], allowed: float) -> list[Missed]:
     """Return the limits that are missed by more than what counts as nothing, the worst first."""
     found: dict[str, Missed] = {}
     for one in rows:
@@ -61,7 +61,7 @@ def missed(rows: Iterable[LimitRows], allowed: float) -> list[Missed]:
     return sorted(found.values(), key=lambda one: (-one.by, one.name, one.about))
 
 
-def held(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
+def list_active_rows(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
     """Yield what holds a design: the rows that are nearly zero and move with it, as ``limit: about``."""
     for one in rows:
         about = one.about()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-def measured(result: Result, window: tuple[float, float], *names: str) -> list[float | None]:
+def measure_metrics(result: Result, window: tuple[float, float], *names: str) -> list[float | None]:
     """Return metrics [SI] that the analysis of a design measures over a window [m or rad]; None if it cannot."""
     if not result.curves:
         return [None] * len(names)
@@ -21,7 +21,7 @@ def measured(result: Result, window: tuple[float, float], *names: str) -> list[f
     return [found[name].value for name in names]
 
 
-def searched(
+def search_values(
     numbers: Mapping[str, tuple[float | None, str, str]],
     model: str,
     window: tuple[float, float],

@@ -311,7 +311,9 @@ class _Parts:
         return np.array(out)
 
 
-def drawn(problem: RobustProblem, found: RobustResult, count: int, worst: bool = False, most: int = 25) -> RobustResult:
+def optimise_on_samples(
+    problem: RobustProblem, found: RobustResult, count: int, worst: bool = False, most: int = 25
+) -> RobustResult:
     """Return values for which drawn parts, each solved itself, are good: from a design that first order led to.
 
     Parameters

@@ -84,10 +84,10 @@ class OneStart:
     def __call__(self, number: int) -> dict[str, Any]:
         """Return the record; what was found is empty where there is nothing."""
         found = self.search(number)
-        return {"found": {} if found is None else recorded(found), "late": self.clock.late()}
+        return {"found": {} if found is None else to_record(found), "late": self.clock.late()}
 
 
-def recorded(found: Any) -> dict[str, Any]:
+def to_record(found: Any) -> dict[str, Any]:
     """Return a dataclass of numbers, words and arrays as it is noted: arrays as lists, enumerations by name."""
 
     def plain(value: Any) -> Any:
@@ -96,7 +96,7 @@ def recorded(found: Any) -> dict[str, Any]:
     return {one.name: plain(getattr(found, one.name)) for one in fields(found)}
 
 
-def restored(kind: type[Anything], record: Mapping[str, Any]) -> Anything:
+def from_record(kind: type[Anything], record: Mapping[str, Any]) -> Anything:
     """Return the dataclass that was noted: lists are arrays again, names of members stay names."""
     return kind(**{name: np.array(value) if isinstance(value, list) else value for name, value in record.items()})
 
@@ -121,7 +121,7 @@ class Done:
     lost: tuple[str, ...]  # why processes died
 
 
-def done(stage: Stage, means: Means, clock: Clock, tell: Callable[[Mapping[int, dict[str, Any]]], None]) -> Done:
+def run_stage(stage: Stage, means: Means, clock: Clock, tell: Callable[[Mapping[int, dict[str, Any]]], None]) -> Done:
     """Return what the jobs of a stage led to, as far as the time allows.
 
     Parameters

@@ -73,11 +73,11 @@ def command(kind: str, properties: Mapping[str, Any], message: str) -> str:
     >>> command("error", {"file": "a,b.yaml", "line": "3"}, "100 % wrong")
     '::error file=a%2Cb.yaml,line=3::100 %25 wrong'
     """
-    reported = ",".join(f"{key}={_escaped(str(value), ':,')}" for key, value in properties.items())
-    return f"::{kind} {reported}::{_escaped(message)}"
+    reported = ",".join(f"{key}={_escape(str(value), ':,')}" for key, value in properties.items())
+    return f"::{kind} {reported}::{_escape(message)}"
 
 
-def _escaped(text: str, more: str = "") -> str:
+def _escape(text: str, more: str = "") -> str:
     text = visible(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
     for char in more:
         text = text.replace(char, f"%{ord(char):02X}")

@@ -53,7 +53,7 @@ def document_of(
         title=message(entries),
         summary=f"{reused} reused" if reused else "",
         tables=(PageTable("", columns, tuple(_row(one) for one in entries)), *_warnings(entries)),
-        notes=(*_missed(entries), *(_changes(compared) if compared else ())),
+        notes=(*_missed_notes(entries), *(_changes(compared) if compared else ())),
         files=files,
     )
 
@@ -65,7 +65,7 @@ def _warnings(entries: Sequence[Entry]) -> Iterator[PageTable]:
         yield PageTable("warnings", (GridColumn(wraps=False), GridColumn(wraps=False), GridColumn()), rows, 0)
 
 
-def _missed(entries: Sequence[Entry]) -> Iterator[Note]:
+def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
     for one in entries:
         for requirement in one.missed if one.verb and not one.errors else ():
             reported = requirement["sentence"].removesuffix(": missed")

@@ -104,13 +104,13 @@ def verdict(ok: bool | None) -> Span:
     return Span("") if ok is None else Span("ok", GOOD) if ok else Span("MISSED", BAD)
 
 
-def within(bounds: Mapping[str, Any]) -> str:
+def format_bounds(bounds: Mapping[str, Any]) -> str:
     """Return the bounds ``min`` and ``max`` of a requirement, as far as it has them."""
     low = [f">= {bounds['min']}"] if bounds["min"] is not None else []
     return " and ".join([*low, *([f"<= {bounds['max']}"] if bounds["max"] is not None else [])])
 
 
-def spaced(name: str) -> str:
+def name_in_words(name: str) -> str:
     """Return a name of the files as people write it."""
     return name.replace("_", " ")
 
@@ -128,7 +128,7 @@ def field(name: str, head: str | None = None, wraps: bool = False) -> Field:
     return Field(name if head is None else head, lambda record: str(record[name]), wraps)
 
 
-def listed(heading: str, records: Iterable[Record], fields: Sequence[Field]) -> Iterator[Block]:
+def record_table(heading: str, records: Iterable[Record], fields: Sequence[Field]) -> Iterator[Block]:
     """Yield a table of records under its heading; nothing where there are none."""
     rows = [[one.cell(record) for one in fields] for record in records]
     if not rows:
@@ -176,10 +176,10 @@ def next_command(*words: str) -> TextLine:
 
 def command_line(*words: str) -> str:
     """Return a command as it is typed, on one line whatever its words hold."""
-    return " ".join(map(_quoted, words))
+    return " ".join(map(_quote, words))
 
 
-def _quoted(word: str) -> str:
+def _quote(word: str) -> str:
     import shlex
 
     if word.isprintable():

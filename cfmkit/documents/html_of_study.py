@@ -184,18 +184,18 @@ def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequenc
             line[1].append(float(row[y]))
     if not points or x is None or y is None:
         return {}
-    drawn = {number: {name: _drawn(line) for name, line in lines.items()} for number, lines in points.items()}
+    drawn = {number: {name: _simplify_branch(line) for name, line in lines.items()} for number, lines in points.items()}
     return {"x": head[x], "y": head[y], "points": drawn}
 
 
-def _drawn(line: list[list[float]]) -> list[list[float]]:
+def _simplify_branch(line: list[list[float]]) -> list[list[float]]:
     """Return a branch without the points that its drawing does not need: no line moves by more than a fifth of a pixel.
 
     Of each stretch the point furthest from the line between the ends divides it, until none is further than that.
     """
     places = np.array(line).T
     if len(places) < 3:
-        return _rounded(line)
+        return _round_points(line)
     span = np.ptp(np.vstack([places, [places[0, 0], 0.0]]), axis=0)
     pixels = places / np.where(span > 0, span, 1.0) * _PIXELS
     keep = np.zeros(len(places), bool)
@@ -211,10 +211,10 @@ def _drawn(line: list[list[float]]) -> list[list[float]]:
             middle = first + 1 + furthest
             keep[middle] = True
             stretches += [(first, middle), (middle, last)]
-    return _rounded(places[keep].T.tolist())
+    return _round_points(places[keep].T.tolist())
 
 
-def _rounded(line: list[list[float]]) -> list[list[float]]:
+def _round_points(line: list[list[float]]) -> list[list[float]]:
     return [[float(f"{value:.5g}") for value in along] for along in line]
 
 

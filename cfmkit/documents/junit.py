@@ -120,7 +120,7 @@ def clean(text: str) -> str:
     return NOT_XML.sub("\N{REPLACEMENT CHARACTER}", "\n".join(map(visible, text.split("\n"))))
 
 
-def prepared(path: str, option: str = "--junit") -> Callable[[bytes], None]:
+def prepare_file(path: str, option: str = "--junit") -> Callable[[bytes], None]:
     """Return what writes a file; its folder is made now, and a folder in its place is reported now.
 
     Raises

@@ -48,7 +48,7 @@ def _lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterat
     if troubles:
         yield from ("", "### What is wrong", "", *troubles)
     if compared is not None:
-        yield from _compared(compared)
+        yield from _comparison_lines(compared)
 
 
 def _mark(one: Entry) -> str:
@@ -66,7 +66,7 @@ def _troubles(one: Entry) -> Iterator[str]:
         yield f"- {plain(one.spec)}: {plain(one.message)}"
 
 
-def _compared(compared: BatchComparison) -> Iterator[str]:
+def _comparison_lines(compared: BatchComparison) -> Iterator[str]:
     count = len(compared.beyond)
     yield from ("", f"### Compared with {plain(compared.folder)}", "")
     if not compared.changes:

@@ -32,7 +32,7 @@ MAX_ROWS = 10
 NO_FIGURES: Mapping[str, Callable[[], Figure]] = MappingProxyType({})
 
 
-def shown(document: Document, figures: Mapping[str, Callable[[], Figure]] = NO_FIGURES, more: str = "") -> str:
+def show_html(document: Document, figures: Mapping[str, Callable[[], Figure]] = NO_FIGURES, more: str = "") -> str:
     """Return the HTML of a document with its tables and the first of some figures; `more` follows."""
     from cfmkit.plots.vector_formats import first_picture
 

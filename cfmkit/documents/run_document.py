@@ -18,8 +18,8 @@ from cfmkit.documents.document import (
     WarningEntry,
     Written,
     command_line,
+    name_in_words,
     shortened_to_clause,
-    spaced,
 )
 from cfmkit.errors import ExitCode
 from cfmkit.families import family
@@ -116,7 +116,7 @@ def verdict_of(report: Report) -> str:
     missed, count = len(report.missed), len(report.requirements)
     met = f"{missed} of {count} requirements missed" if missed else _all_met(count)
     if not report.status.usable:
-        return spaced(report.status.key)
+        return name_in_words(report.status.key)
     return met if report.status.exit_code is ExitCode.OK else f"partial, {met}"
 
 
@@ -166,11 +166,11 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
         yield Note("feasible", " ".join(f"--set {setting}" for setting in settings), whole=True)
     for word, text in report.supplement.lines:
         yield Note(word, text, short=text.partition(EXPECTED)[2])
-    for text in searched(design.search) if design else ():
+    for text in search_sentences(design.search) if design else ():
         yield Note("search", text)
 
 
-def searched(found: Mapping[str, Searched]) -> list[str]:
+def search_sentences(found: Mapping[str, Searched]) -> list[str]:
     """Return what only a design search knows: one sentence for each model and window, which it names first."""
     groups: dict[str, list[str]] = {}
     for name, one in found.items():
@@ -229,7 +229,7 @@ def headline_of(report: Report) -> tuple[ValueRow, ...]:
         return ()
     spec = report.result.spec
     judged = spec.requirements if len(report.requirements) == len(spec.requirements) else spec.part_requirements
-    required = [_required(report, *pair) for pair in zip(judged, report.requirements, strict=True)]
+    required = [_required_row(report, *pair) for pair in zip(judged, report.requirements, strict=True)]
     return (*required, *_facts(report))
 
 
@@ -244,7 +244,7 @@ def metrics_of(report: Report) -> tuple[ValueRow, ...]:
         ValueRow(
             words(name),
             branches(report, name, report.metrics) + _remark(report, name),
-            window=_over(report, name, window),
+            window=_format_window(report, name, window),
             about=report.metrics[name].definition,
         )
         for name in names
@@ -321,7 +321,7 @@ def _stress(report: Report, known: set[str]) -> ValueRow | None:
         text = f"{text.partition(' ')[0]} of {format_short(allowed, 'stress', 3)}"
     if "safety_factor" not in known and _has_value(report, "safety_factor"):
         factor = report.metrics["safety_factor"].value or 0.0
-        text += f", safety {factor:.3g}" + _overrated(report)
+        text += f", safety {factor:.3g}" + _explain_low_safety(report)
         text += " (little margin)" if 1.0 <= factor < LITTLE_MARGIN else ""
     return ValueRow("stress", text, about=report.metrics["stress_max"].definition)
 
@@ -347,8 +347,8 @@ def _remark(report: Report, name: str) -> str:
     if name == "allowable_stress":
         return _rule(report)
     if name == "safety_factor" and allowed is not None and "allowable_stress" not in report.metrics:
-        return f", of {format_short(allowed, 'stress')}{_rule(report)}{_overrated(report)}"
-    return _overrated(report, name) if name.endswith("safety_factor") else ""
+        return f", of {format_short(allowed, 'stress')}{_rule(report)}{_explain_low_safety(report)}"
+    return _explain_low_safety(report, name) if name.endswith("safety_factor") else ""
 
 
 def _rule(report: Report) -> str:
@@ -359,7 +359,7 @@ def _rule(report: Report) -> str:
         return ""
 
 
-def _overrated(report: Report, name: str = "safety_factor") -> str:
+def _explain_low_safety(report: Report, name: str = "safety_factor") -> str:
     """Return why a safety factor below one is no finding: the model is known to overestimate the stress by as much."""
     factor, share = report.metrics[name].value, report.result.stress_overrated
     if factor is None or any(item.name == "overstressed" for item in report.result.warnings):
@@ -395,7 +395,7 @@ def short_value(quantity: Quantity, digits: int = 4) -> str:
     return "no value" if quantity.value is None else format_short(quantity.value, quantity.dimension, digits)
 
 
-def _over(report: Report, name: str, window: Window | None) -> str:
+def _format_window(report: Report, name: str, window: Window | None) -> str:
     """Return the window, if there is one and the metric looks only inside."""
     if window is None or not report.result.curves:
         return ""
@@ -404,11 +404,11 @@ def _over(report: Report, name: str, window: Window | None) -> str:
     return span(window.lo, window.hi, curve.motion_dimension) if split_name(name)[0] in windowed else ""
 
 
-def _required(report: Report, requirement: Requirement, outcome: Outcome) -> ValueRow:
+def _required_row(report: Report, requirement: Requirement, outcome: Outcome) -> ValueRow:
     base, branch = split_name(outcome.metric)
     label = LABELS[base] + (f" on {branch}" if branch else "") if base in LABELS else words(outcome.metric)
     over = Window(*outcome.over) if outcome.over else None
-    apart = "" if over is None or _is_title(report, over) else _over(report, outcome.metric, over)
+    apart = "" if over is None or _is_title(report, over) else _format_window(report, outcome.metric, over)
     bound = _bound(requirement)
     about = outcome.sentence
     if outcome.value is None:
@@ -443,7 +443,7 @@ def complaints_of(report: Report) -> tuple[str, ...]:
     if not status.usable:
         design = report.design
         reported = design.explanation if design is not None and design.spec is None else report.message
-        return (f"error    {spaced(status.key)}: {reported}",)
+        return (f"error    {name_in_words(status.key)}: {reported}",)
     partial = [] if status.exit_code is ExitCode.OK else [f"partial  {report.message}"]
     return (*partial, *(f"missed   {outcome.sentence.removesuffix(': missed')}" for outcome in report.missed))
 

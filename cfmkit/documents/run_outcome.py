@@ -156,9 +156,9 @@ def report_on(result: Result, design: Design | None = None) -> Report:
     return Report(result, evaluate(result), requirements, design)
 
 
-def undesigned(spec: Spec, design: Design) -> Result:
+def empty_result(spec: Spec, design: Design) -> Result:
     """Return the empty result of a design that failed: nothing was analysed."""
     return Result(spec, design.status, design.message)
 
 
-__all__ = ["Report", "Supplement", "json_bytes", "report_on", "undesigned", "worst"]
+__all__ = ["Report", "Supplement", "empty_result", "json_bytes", "report_on", "worst"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING
 
-from cfmkit.documents.document import BAD, Document, GridColumn, Note, PageTable, ValueRow, Written, spaced
+from cfmkit.documents.document import BAD, Document, GridColumn, Note, PageTable, ValueRow, Written, name_in_words
 from cfmkit.documents.run_document import warning_of
 from cfmkit.studies.sensitivity.output import by_interval, exit_code, message, warnings, yield_ok
 
@@ -84,7 +84,7 @@ def _yields(found: Findings) -> Iterator[ValueRow]:
     yield ValueRow("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
     for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
         limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
-        yield ValueRow(spaced(outcome.metric), f"{share_of(one)}  {limits}")
+        yield ValueRow(name_in_words(outcome.metric), f"{share_of(one)}  {limits}")
 
 
 def share_of(one: Share) -> str:
@@ -100,7 +100,7 @@ def share_of(one: Share) -> str:
 def _rankings(found: Findings) -> Iterator[PageTable]:
     for metric, each in _by_metric(found).items():
         indices = [name for name in INDICES[found.setup.method] if any(name in lines for lines in each.values())]
-        heads = (GridColumn(spaced(metric)), *(GridColumn(spaced(name), wraps=False) for name in indices))
+        heads = (GridColumn(name_in_words(metric)), *(GridColumn(name_in_words(name), wraps=False) for name in indices))
         rows = tuple((parameter, *(_index(lines.get(name)) for name in indices)) for parameter, lines in each.items())
         yield PageTable("", heads, rows, MAX_PARAMETERS)
 

@@ -13,9 +13,9 @@ from cfmkit.documents.document import (
     ValueRow,
     WarningEntry,
     Written,
+    format_bounds,
+    name_in_words,
     shortened_to_clause,
-    spaced,
-    within,
 )
 from cfmkit.errors import ExitCode
 
@@ -57,7 +57,7 @@ def document_of(
         Points that came from the journal.
     """
     counts = summary["points"]
-    ends = ", ".join(f"{count} {spaced(name)}" for name, count in counts.items() if name != "total")
+    ends = ", ".join(f"{count} {name_in_words(name)}" for name, count in counts.items() if name != "total")
     again = f" ({reused} from the journal)" if reused else ""
     return Document(
         exit_code=code,
@@ -66,7 +66,12 @@ def document_of(
         verdict=_verdict(summary, code),
         headline=(
             *(
-                ValueRow(spaced(one["metric"]), f"met at {one['met']} of {one['of']}", within(one), bool(one["ok"]))
+                ValueRow(
+                    name_in_words(one["metric"]),
+                    f"met at {one['met']} of {one['of']}",
+                    format_bounds(one),
+                    bool(one["ok"]),
+                )
                 for one in summary["requirements"]
             ),
             *_best(summary, dimensions),
@@ -85,7 +90,7 @@ def _verdict(summary: Mapping[str, Any], code: ExitCode) -> str:
     if code is ExitCode.REQUIREMENT_MISSED:
         return "no point meets every requirement"
     if code is not ExitCode.OK:
-        return spaced(str(summary["status"] if code is not ExitCode.INTERRUPTED else "interrupted"))
+        return name_in_words(str(summary["status"] if code is not ExitCode.INTERRUPTED else "interrupted"))
     return "requirements can be met" if summary["requirements"] else "complete"
 
 
@@ -104,7 +109,7 @@ def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator
     metric = summary["metrics"][best["by"]]
     value = _quantity(metric["value"], metric["unit"], dimensions.get(best["by"], ""))
     tie = f" ({best['ties']} tie)" if best["ties"] > 1 else ""
-    yield ValueRow(f"{best['sense']} {spaced(best['by'])}", f"{value}, point {best['point']}{tie}")
+    yield ValueRow(f"{best['sense']} {name_in_words(best['by'])}", f"{value}, point {best['point']}{tie}")
 
 
 def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
@@ -121,9 +126,9 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
         at_best = summary["metrics"].get(name, {}).get("value")
         shown = "" if at_best is None else _quantity(at_best, one["unit"], dimension)
         if one["max"] - one["min"] <= NO_INFLUENCE * max(abs(one["min"]), abs(one["max"])):
-            row, others = (spaced(name), low, "no influence", shown), constant
+            row, others = (name_in_words(name), low, "no influence", shown), constant
         else:
-            row, others = (spaced(name), low, high, shown), rows
+            row, others = (name_in_words(name), low, high, shown), rows
         (leading if name in (*first, *asked) else others).append(row)
     if leading or rows:
         columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in ("from", "to", "best point")))

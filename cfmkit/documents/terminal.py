@@ -226,7 +226,7 @@ def _wide(lines: Iterable[Sequence[Span]]) -> int:
     return max([0, *(sum(len(one.text) for one in spans) for spans in lines)])
 
 
-def _without_ranked_columns(table: PageTable, width: int) -> PageTable:
+def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
     """Return a table without the columns of the highest ranks, as many as it takes to fit a page."""
     while any(column.rank for column in table.columns):
         texts = [
@@ -247,7 +247,7 @@ def _without_ranked_columns(table: PageTable, width: int) -> PageTable:
 
 def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     """Return a table as lines: as many rows as a short page has of it, each as wide as the page."""
-    table = _without_ranked_columns(table, width)
+    table = _drop_ranked_columns(table, width)
     rows = table.rows if table.most is None else table.rows[: table.most]
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
     heads = [column.head for column in table.columns]
@@ -330,12 +330,12 @@ def _whole_page(document: Document) -> Iterator[Block]:
 # --- characters -------------------------------------------------------------------------------------------------------
 
 
-def printed(blocks: Iterable[Block], width: int, colours: bool = False, ascii_only: bool = False) -> str:
+def print_blocks(blocks: Iterable[Block], width: int, colours: bool = False, ascii_only: bool = False) -> str:
     """Return blocks as a terminal of so many columns prints them."""
-    return "".join(_printed(block, width, colours, ascii_only) for block in blocks)
+    return "".join(_print_block(block, width, colours, ascii_only) for block in blocks)
 
 
-def _printed(block: Block, width: int, colours: bool, ascii_only: bool) -> str:
+def _print_block(block: Block, width: int, colours: bool, ascii_only: bool) -> str:
     if isinstance(block, Verbatim):
         return block.text
     if isinstance(block, JsonText):

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         SlideSpring,
         Support,
         TorsionSpring,
-        guided,
+        slider_support,
     )
     from cfmkit.elastica.model.section import Section, Taper
     from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
@@ -102,8 +102,8 @@ __all__ = [
     "TorsionSpring",
     "arc",
     "gradient",
-    "guided",
     "hindered_curling",
+    "slider_support",
     "trace",
     "trace_many",
 ]

@@ -144,7 +144,7 @@ def frequencies(
         matrices = system.at(z, float(path.at.drive[point]))
         row = system.row_of(z, *hold) if hold is not None and by_load else None
         (squares, *still), (others, *loose) = (
-            _squares(*_chosen(fine, matrices, is_held, row), count) for is_held in (True, False)
+            _squares(*_choose_unknowns(fine, matrices, is_held, row), count) for is_held in (True, False)
         )
         held[k], free[k] = unit * np.sqrt(squares), unit * np.sqrt(others)
         grows[:, k] = loose if by_load else still
@@ -286,7 +286,7 @@ class _VibratingNetwork:
         return found
 
 
-def _chosen(
+def _choose_unknowns(
     fine: Discretisation, matrices: _Matrices, is_held: bool, row: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the matrices of the unknowns that move while the drive is held, or free; a row that is held as a force."""

@@ -71,8 +71,10 @@ class Strokes:
     def complete(self) -> tuple[tuple[Stroke, Stroke], ...]:
         """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
         found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
-        pairs = [(pair[0], pair[1]) for pair in found if len(pair) == 2 and covered((pair[0], pair[1])) >= SHORT]
-        return tuple([pair for pair in pairs if covered(pair) >= WHOLE] or pairs)
+        pairs = [
+            (pair[0], pair[1]) for pair in found if len(pair) == 2 and covered_fraction((pair[0], pair[1])) >= SHORT
+        ]
+        return tuple([pair for pair in pairs if covered_fraction(pair) >= WHOLE] or pairs)
 
     @cached_property
     def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
@@ -150,7 +152,7 @@ def choose(strokes: Strokes, cycles: Cycles | None, name: str) -> Strokes:
     return replace(strokes, chosen=cycles)
 
 
-def covered(cycle: tuple[Stroke, Stroke]) -> float:
+def covered_fraction(cycle: tuple[Stroke, Stroke]) -> float:
     """Return which part of the longer stroke of a cycle the shorter one covers."""
     ways = sorted(stroke.way for stroke in cycle)
     return ways[0] / ways[1]
@@ -227,10 +229,10 @@ def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
             f"{recording.name}: no stroke has at least {_FEWEST} points: the {moved} jumps back and forth, "
             "or the rows are not in the order of time"
         )
-    return Strokes(_numbered(kept, motion), int(standing.sum()))
+    return Strokes(_number_strokes(kept, motion), int(standing.sum()))
 
 
-def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[Stroke, ...]:
+def _number_strokes(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[Stroke, ...]:
     """Return strokes with branch and cycle: a cycle starts with every stroke of the first one's direction.
 
     Where the first stroke is shorter than the next it may be a mere approach: then cycles start with
@@ -252,7 +254,7 @@ def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[S
 
 def _whole_cycles(strokes: tuple[Stroke, ...]) -> int:
     """Return how many complete cycles some strokes hold."""
-    return sum(covered(cycle) >= WHOLE for cycle in Strokes(strokes, 0).complete)
+    return sum(covered_fraction(cycle) >= WHOLE for cycle in Strokes(strokes, 0).complete)
 
 
 def jitter_of(motion: FloatArray) -> float:

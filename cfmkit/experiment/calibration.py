@@ -85,7 +85,7 @@ class Calibration(ShortRepr):
     warnings: tuple[Finding, ...] = ()  # what the user must know about the fit
 
 
-def resolved(spec: Spec) -> Spec:
+def resolve_spec(spec: Spec) -> Spec:
     """Return a specification with its derived parts written out: the part that was built and measured."""
     record = family(spec.family)
     written: Spec = record.resolve(spec) if record.resolve else spec
@@ -122,7 +122,7 @@ class ModelCurves:
         """
         key = tuple(sorted(self._changes(parameters, values).items()))
         if key not in self._solved:
-            self._solved[key] = _analysed(self.spec_with(parameters, values)).curve
+            self._solved[key] = _analyse(self.spec_with(parameters, values)).curve
         return self._solved[key]
 
     def _changes(self, parameters: Sequence[FitParameter], values: FloatArray) -> dict[str, float]:
@@ -160,7 +160,7 @@ def calibrate(
     cfmkit.errors.SolutionError
         If the start has no solution, or the data do not determine the parameters, which are named.
     """
-    before, curves = _compared(spec, source, parameters, window), ModelCurves(spec)
+    before, curves = _compare_start(spec, source, parameters, window), ModelCurves(spec)
     if has_no_loss(curves, before, parameters):
         before = before.of_the_mean()
     return fit_samples(before, curves, parameters, loss)
@@ -196,7 +196,7 @@ def fit_samples(
     fit = solve(problem, loss) if parameters else evaluate_start(problem)
     _check(problem, fit.values, parameters)
     fitted = curves.spec_with(parameters, fit.values)
-    result = _analysed(fitted)
+    result = _analyse(fitted)
     zeros = _zeros(parameters, fit.values)
     samples, branches = (tuple(item.less(zeros) for item in measured) for measured in (before.samples, before.branches))
     after = Comparison(samples, before.window, result.curve, before.holes, branches)
@@ -204,11 +204,11 @@ def fit_samples(
     return Calibration(fitted, tuple(parameters), fit, before, after, result, zeros, warnings)
 
 
-def _compared(
+def _compare_start(
     spec: Spec, source: MeasuredCurves, parameters: Sequence[FitParameter], window: Window | None
 ) -> Comparison:
     """Return the start beside the measurement, where the model exists for every zero that is tried."""
-    result = _analysed(spec)
+    result = _analyse(spec)
     found = compare(result, source, window)
     shift = next((item for item in parameters if _is_shift(item)), None)
     if shift is None:
@@ -262,7 +262,7 @@ def _zeros(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     return Zeros(**found)
 
 
-def _analysed(spec: Spec) -> Result:
+def _analyse(spec: Spec) -> Result:
     result: Result = family(spec.family).analyze(spec, Run())
     if not result.curves:
         raise SolutionError(f"there is no curve to compare with: {result.message}")
@@ -312,10 +312,10 @@ def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitPa
             "start from other values"
         ) from None
     if groups:
-        raise SolutionError("; ".join(_undetermined([parameters[k].label for k in group]) for group in groups))
+        raise SolutionError("; ".join(_name_undetermined([parameters[k].label for k in group]) for group in groups))
 
 
-def _undetermined(paths: Sequence[str]) -> str:
+def _name_undetermined(paths: Sequence[str]) -> str:
     if len(paths) == 1:
         return f"the measured curve does not determine {paths[0]}: changing it changes no force; leave it out of --fit"
     reported = f"{', '.join(paths[:-1])} and {paths[-1]}"
@@ -391,5 +391,5 @@ def table(calibration: Calibration) -> list[dict[str, Any]]:
 
 __all__ = [
     "CANNOT", "FINDINGS", "POORLY_DETERMINED", "UNKNOWN", "Calibration", "ModelCurves", "Samples", "calibrate",
-    "fit_samples", "has_no_loss", "resolved", "scaled_jacobian", "table",
+    "fit_samples", "has_no_loss", "resolve_spec", "scaled_jacobian", "table",
 ]  # fmt: skip

@@ -11,10 +11,10 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
-from cfmkit.experiment.coverage import emptied, holes_of, large_holes
-from cfmkit.experiment.curves_and_metrics_of_recording import elapsed
+from cfmkit.experiment.coverage import empty_uncovered, holes_of, large_holes
+from cfmkit.experiment.curves_and_metrics_of_recording import elapsed_fraction
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
-from cfmkit.experiment.value_definitions import RECORDED, recorded
+from cfmkit.experiment.value_definitions import RECORDED, define_recorded_values
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
@@ -94,7 +94,7 @@ class Comparison(ShortRepr):
         if set(found) != {LOAD, UNLOAD}:
             return None
         places = np.linspace(self.window.lo, self.window.hi, PLACES)
-        up, down = (_averaged(found[branch], places) for branch in (LOAD, UNLOAD))
+        up, down = (_average_effort(found[branch], places) for branch in (LOAD, UNLOAD))
         return MeasuredLoop(places, up, down)
 
     def causes(self, result: Result) -> Mapping[str, Quantity]:
@@ -104,7 +104,7 @@ class Comparison(ShortRepr):
         if module is None or loop is None:
             return {}
         causes: Mapping[str, Quantity] = import_module(module).attribute(result, loop)
-        return emptied(causes, self.holes, self.curve.kind)
+        return empty_uncovered(causes, self.holes, self.curve.kind)
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean error per branch, and over all, by name, SI."""
@@ -112,7 +112,7 @@ class Comparison(ShortRepr):
             item.branch: Points(item.motion, item.effort, item.model_branch, item.weight) for item in self.samples
         }
         found = compare_sides(Compared("measured", points=points), Compared("model", self.curve), self.window)
-        return emptied(found.summarize(_ERRORS, self.curve.kind), self.holes, self.curve.kind)
+        return empty_uncovered(found.summarize(_ERRORS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:
         """Return what a cycle loses, its loss factor, and half the gap of the branches; nothing without a loop."""
@@ -121,7 +121,7 @@ class Comparison(ShortRepr):
             return {}
         area = loop_area(loop.places, loop.up, loop.down)
         kind, width = self.curve.kind, self.window.hi - self.window.lo
-        meant = recorded(kind)
+        meant = define_recorded_values(kind)
         stored = float(np.trapezoid(0.5 * (loop.up + loop.down), loop.places))
         factor = area / (2.0 * np.pi * stored) if stored > 0.0 else None
         found = {
@@ -129,7 +129,7 @@ class Comparison(ShortRepr):
             "data_loss_factor": Quantity(factor, *meant["data_loss_factor"], "" if factor else "no energy is stored"),
             "data_half_gap": Quantity(0.5 * area / width, *meant["data_half_gap"]),
         }
-        return emptied(found, self.holes, kind)
+        return empty_uncovered(found, self.holes, kind)
 
     def of_the_mean(self) -> Comparison:
         """Return the comparison of a model without losses: with the mean of the branches, cycle by cycle."""
@@ -227,7 +227,7 @@ def model_at(curve: Curve, branch: str, motion: FloatArray) -> FloatArray:
         ) from None
 
 
-def _averaged(samples: Samples, places: FloatArray) -> FloatArray:
+def _average_effort(samples: Samples, places: FloatArray) -> FloatArray:
     """Return the effort at even places: the mean of the samples around each, interpolated where there are none."""
     step = places[1] - places[0]
     index = np.clip(np.rint((samples.motion - places[0]) / step).astype(int), 0, len(places) - 1)
@@ -262,7 +262,7 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
     parts = [curve.on(branch) for curve in source.raw]
     slack = 1e-9 * (window.hi - window.lo)
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]
-    times = np.split(elapsed(source, branch), np.cumsum([len(inside) for inside in keep])[:-1])
+    times = np.split(elapsed_fraction(source, branch), np.cumsum([len(inside) for inside in keep])[:-1])
     size = max(-(-sum(int(inside.sum()) for inside in keep) // MOST), 1)
     # Cycle by cycle: the end of one and the start of the next have nothing to do with each other.
     grouped = []
@@ -270,13 +270,13 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
         way = 1 if part.motion[-1] >= part.motion[0] else -1
         stands_for = weights(part.motion[inside][::way])[::way]
         motion = np.clip(part.motion[inside], window.lo, window.hi)
-        columns = _grouped((motion, part.effort[inside], passed[inside], stands_for), size)
+        columns = _average_groups((motion, part.effort[inside], passed[inside], stands_for), size)
         grouped.append((*columns, np.full(len(columns[0]), number)))
     motion, effort, passed, stands_for, cycle = (np.concatenate(columns) for columns in zip(*grouped, strict=True))
     return Samples(branch, mine, motion, effort, passed, stands_for, cycle)
 
 
-def _grouped(columns: Sequence[FloatArray], size: int) -> Sequence[FloatArray]:
+def _average_groups(columns: Sequence[FloatArray], size: int) -> Sequence[FloatArray]:
     """Return averages over groups of so many neighbours."""
     count = len(columns[0])
     if size == 1 or not count:

@@ -109,7 +109,9 @@ def _whose(holes: Sequence[UnrecordedInterval]) -> str:
     return branch + (f" of cycle {holes[0].cycle}" if len(cycles) == 1 and holes[0].cycle is not None else "")
 
 
-def emptied(metrics: Mapping[str, Quantity], large: Sequence[UnrecordedInterval], kind: Kind) -> dict[str, Quantity]:
+def empty_uncovered(
+    metrics: Mapping[str, Quantity], large: Sequence[UnrecordedInterval], kind: Kind
+) -> dict[str, Quantity]:
     """Return metrics, without a value for branches with a large hole and for what needs all branches."""
     branches = {hole.branch: hole for hole in reversed(large)}
     found = dict(metrics)

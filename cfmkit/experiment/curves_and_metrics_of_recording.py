@@ -25,7 +25,7 @@ from cfmkit.experiment.branches import LOAD, UNLOAD, Cycles, Stroke, Strokes, ch
 from cfmkit.experiment.coverage import (
     UnrecordedInterval,
     coverage,
-    emptied,
+    empty_uncovered,
     hole_finding,
     holes_of,
     large_holes,
@@ -37,8 +37,8 @@ from cfmkit.experiment.findings import FINDINGS, passages_left_out, spikes_left_
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
-from cfmkit.experiment.reversal_transitions import settled
-from cfmkit.experiment.zeros_and_signs import corrected
+from cfmkit.experiment.reversal_transitions import remove_transitions
+from cfmkit.experiment.zeros_and_signs import correct_recording
 from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
@@ -81,7 +81,7 @@ class MeasuredCurves(ShortRepr):
         return (self.filtered or self.raw)[0]
 
 
-def measured(
+def measure_recording(
     recording: Recording,
     low_pass: LowPass | Literal["default"] | None = "default",
     leave_out: Collection[str] = ("reversals",),
@@ -168,8 +168,8 @@ def read_measured(
         Which specimen of several, as ``"Specimen=2"``.
     """
     chosen = read_cycles(cycles)
-    recording = corrected(read_recording(path, units, group), tare, zero, flip)
-    return measured(recording, None, LEFT_OUT, chosen)
+    recording = correct_recording(read_recording(path, units, group), tare, zero, flip)
+    return measure_recording(recording, None, LEFT_OUT, chosen)
 
 
 def _strokes(
@@ -177,11 +177,11 @@ def _strokes(
 ) -> tuple[Strokes, Window, float, tuple[Finding, ...]]:
     """Return what counts of each stroke, what all branches reached, the longest passage, and what is said of both."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
-    strokes = choose(_without(recording, spiky), cycles, recording.name)
-    reached, reported = _reached(recording, strokes), spikes_left_out(recording, spiky)
+    strokes = choose(_remove_points(recording, spiky), cycles, recording.name)
+    reached, reported = _common_range(recording, strokes), spikes_left_out(recording, spiky)
     if "reversals" not in leave_out:
         return strokes, reached, 0.0, reported
-    found = settled(recording, strokes)
+    found = remove_transitions(recording, strokes)
     return found.strokes, reached, found.length, (*reported, *passages_left_out(recording, found))
 
 
@@ -193,7 +193,7 @@ def _spiky(recording: Recording) -> NDArray[np.bool_]:
     jumps = spikes(recording.motion) != 0
     heights = np.where(jumps, 0.0, spikes(recording.effort))
     found: NDArray[np.bool_] = heights != 0
-    strokes = _without(recording, jumps).strokes
+    strokes = _remove_points(recording, jumps).strokes
     for run in np.split(np.flatnonzero(found), np.flatnonzero(np.diff(np.flatnonzero(found)) > 1) + 1):
         if len(run) and any(_is_of_the_mechanism(recording.motion, heights, strokes, int(k)) for k in run):
             found[run] = False
@@ -213,7 +213,7 @@ def _is_of_the_mechanism(motion: FloatArray, heights: FloatArray, strokes: Seque
     return alike >= 2 and 2 * alike > passing
 
 
-def _without(recording: Recording, spiky: NDArray[np.bool_]) -> Strokes:
+def _remove_points(recording: Recording, spiky: NDArray[np.bool_]) -> Strokes:
     """Return the strokes of a recording without some of its points."""
     kept = np.flatnonzero(~spiky)
     time = None if recording.time is None else recording.time[kept]
@@ -221,7 +221,7 @@ def _without(recording: Recording, spiky: NDArray[np.bool_]) -> Strokes:
     return replace(found, strokes=tuple(replace(item, points=kept[item.points]) for item in found.strokes))
 
 
-def _reached(recording: Recording, strokes: Strokes) -> Window:
+def _common_range(recording: Recording, strokes: Strokes) -> Window:
     """Return what all measured strokes reached; the point at a reversal counts for both of its strokes."""
     measured_ones = {id(stroke) for cycle in strokes.measured for stroke in cycle}
     ends, before = [], None
@@ -272,7 +272,7 @@ def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, st
     return Curve(recording.motion[points], effort[points], branch, stable, extra, recording.kind, label)
 
 
-def elapsed(source: MeasuredCurves, branch: str) -> FloatArray:
+def elapsed_fraction(source: MeasuredCurves, branch: str) -> FloatArray:
     """Return which part of the recording had passed at every raw point of a branch, cycle by cycle; 0 to 1.
 
     By the time where it was recorded, else by the number of points.
@@ -338,18 +338,18 @@ def numbers_of(
         )
 
     def all_metrics(curves: Sequence[Curve]) -> tuple[Mapping[str, Quantity], ...]:
-        each = ((curve, measure(curve, frame, window, _over_motion(kind))) for curve in curves)
-        return tuple(emptied(metrics, of_cycle(large, curve), kind) for curve, metrics in each)
+        each = ((curve, measure(curve, frame, window, _motion_definitions(kind))) for curve in curves)
+        return tuple(empty_uncovered(metrics, of_cycle(large, curve), kind) for curve, metrics in each)
 
     covered_by = tuple(coverage(curve, of_cycle(holes, curve), window) for curve in source.raw)
     each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
-    repeated = emptied(repeatability(source.raw, window), large, kind)
+    repeated = empty_uncovered(repeatability(source.raw, window), large, kind)
     raw = _mean(each) | least(covered_by) | repeated
     return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings, large)
 
 
-def _over_motion(kind: Kind) -> tuple[Definition, ...]:
+def _motion_definitions(kind: Kind) -> tuple[Definition, ...]:
     """Return mean and standard deviation as they are of a recording."""
     own = {f"{kind}_mean": "mean {effort}", f"{kind}_sd": "standard deviation of the {effort}"}
     known = metrics_by_name(kind)
@@ -453,6 +453,7 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 __all__ = [
-    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "MeasuredCurves", "Measurement", "common_window", "elapsed", "measured",
+    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "MeasuredCurves", "Measurement", "common_window", "elapsed_fraction",
+    "measure_recording",
     "numbers_of", "read_measured", "require_loop",
 ]  # fmt: skip

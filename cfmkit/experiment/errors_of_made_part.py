@@ -32,7 +32,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import robust_scale
 from cfmkit.specs.units import format_short
-from cfmkit.studies.parts.assumed_errors import assumed
+from cfmkit.studies.parts.assumed_errors import assume_errors
 from cfmkit.studies.variable_paths import leaf
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def explain(
         fits = list(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
     if not fits:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
-    explanations = _ranked(fits, before, assumed(curves.spec))
+    explanations = _ranked(fits, before, assume_errors(curves.spec))
     best = explanations[0]
     _check_best(best, before, source)
     return tuple(_irreducible([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))

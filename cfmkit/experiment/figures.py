@@ -15,7 +15,7 @@ from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, write_hea
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import MarkedRange
-from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, LINES, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def figures(source: MeasuredCurves, numbers: Measurement) -> dict[str, Callable[
     return {"loop": partial(loop, source, numbers)}
 
 
-@styled
+@apply_style
 def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     """Return the measured loop: whole and raw above, the window with the filtered branches below."""
     window = numbers.window
@@ -52,7 +52,7 @@ def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     subject = "raw and filtered" if source.filtered else "raw"
     write_heading(figure, Heading(source.recording.name, f"measured {source.recording.kind}, {subject}"))
     upper, lower = axes_mm(figure, (17, 63, 138, 27.5)), axes_mm(figure, (17, 12, 138, 46))
-    thin = [broken_at_holes(thinned(curve)) for curve in source.raw]
+    thin = [broken_at_holes(thin_curve(curve)) for curve in source.raw]
     plain = CurveLook(names=False, arrows=False)
     plot_curve([replace(curve, label={}) for curve in thin] if len(thin) > 1 else thin[0], upper, plain)
     upper.set_xlabel("")
@@ -60,7 +60,7 @@ def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     across = upper.get_xlim()
     for curve in thin:
         _draw_faint(curve, lower)
-    smooth = broken_at_holes(thinned(source.curve))
+    smooth = broken_at_holes(thin_curve(source.curve))
     limits = _range_in(source.raw, (window.lo, window.hi))
     motion = smooth.motion_dimension
     ends = tuple(_from_border(value, motion) for value in across)
@@ -150,7 +150,7 @@ def _note_window(source: MeasuredCurves, window: Window, ax: Axes) -> None:
         place_labels(ax, [Label(text, GREY, points, prefer=0.05)])
 
 
-def thinned(curve: Curve, bins: int = BINS) -> Curve:
+def thin_curve(curve: Curve, bins: int = BINS) -> Curve:
     """Return a curve for a picture: of each branch no more than the extremes of `bins` equal parts."""
     keep: list[NDArray[np.intp]] = []
     for name in curve.branches:
@@ -164,7 +164,7 @@ def thinned(curve: Curve, bins: int = BINS) -> Curve:
     return curve.take(np.concatenate(keep))
 
 
-@styled
+@apply_style
 def overlay(comparison: Comparison, before: Comparison | None, heading: tuple[str, str]) -> Figure:
     """Return model and measurement overlaid, and their difference below.
 

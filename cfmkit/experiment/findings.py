@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.experiment.branches import WHOLE, covered
+from cfmkit.experiment.branches import WHOLE, covered_fraction
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
@@ -42,8 +42,8 @@ def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
         only = strokes.measured[0][0].branch
         found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
     left = len(strokes.strokes) - (2 * len(strokes.complete) or 1)
-    if cycles and covered(cycles[0]) < WHOLE:
-        reported = f"the shorter stroke covers only {100 * covered(cycles[0]):.0f} % of the longer one"
+    if cycles and covered_fraction(cycles[0]) < WHOLE:
+        reported = f"the shorter stroke covers only {100 * covered_fraction(cycles[0]):.0f} % of the longer one"
         found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
     if left:
         found.append(

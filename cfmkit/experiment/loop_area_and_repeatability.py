@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.experiment.value_definitions import recorded
+from cfmkit.experiment.value_definitions import define_recorded_values
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity
         ``force_repeatability[load]`` and so on; without a value where there is one cycle only.
     """
     kind = curves[0].kind
-    meant = recorded(kind)[f"{kind}_repeatability"]
+    meant = define_recorded_values(kind)[f"{kind}_repeatability"]
     places = np.linspace(window.lo, window.hi, PLACES)
     found = {}
     for branch in curves[0].branches:

@@ -99,19 +99,19 @@ def data_of(reports: Mapping[str, MeasureReport]) -> dict[str, Any]:
     return {
         "status": (Status.PARTIAL if short else Status.COMPLETE).key,
         "message": "; ".join(f"{name}: {message}" for name, message in short.items()),
-        "metrics": _tagged(each, "metrics"),
+        "metrics": _tag_metrics(each, "metrics"),
         "requirements": [],
         "warnings": [
             {"name": item["name"], "message": f"{name}: {item['message']}"}
             for name, data in each.items()
             for item in data["warnings"]
         ],
-        "metrics_filtered": _tagged(each, "metrics_filtered"),
-        "groups": {name: _about(data) for name, data in each.items()},
+        "metrics_filtered": _tag_metrics(each, "metrics_filtered"),
+        "groups": {name: _describe_data(data) for name, data in each.items()},
     }
 
 
-def _tagged(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
+def _tag_metrics(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
     """Return the metrics of all specimens, each with its specimen in brackets."""
     found = {}
     for group, data in each.items():
@@ -121,7 +121,7 @@ def _tagged(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
     return found
 
 
-def _about(data: Mapping[str, Any]) -> dict[str, Any]:
+def _describe_data(data: Mapping[str, Any]) -> dict[str, Any]:
     return {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
 
 
@@ -135,7 +135,7 @@ def report_on(
     return MeasureReport(source, numbers_of(source, frame, window, largest_hole))
 
 
-def _stacked(tables: Mapping[str, Table]) -> Table:
+def _stack_tables(tables: Mapping[str, Table]) -> Table:
     """Return the tables of several specimens as one, the specimen first; that of one as it is."""
     if len(tables) == 1:
         return next(iter(tables.values()))
@@ -208,8 +208,8 @@ def files(
     """
     from cfmkit.tables.json_writing import json_bytes
 
-    yield "curve.csv", to_csv(_stacked({name: curves_table(report.source) for name, report in reports.items()}))
-    yield "cycles.csv", to_csv(_stacked({name: cycles_table(report) for name, report in reports.items()}))
+    yield "curve.csv", to_csv(_stack_tables({name: curves_table(report.source) for name, report in reports.items()}))
+    yield "cycles.csv", to_csv(_stack_tables({name: cycles_table(report) for name, report in reports.items()}))
     yield "metrics.json", json_bytes(data_of(reports))
     if plots:
         from cfmkit.experiment.figures import figures

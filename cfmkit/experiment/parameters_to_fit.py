@@ -143,7 +143,8 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Fit
     high = min(high - margin * _open(type(spec), path, "lt"), asked_high)
     if not low < high or not low <= value <= high:
         raise UsageError(
-            f"--fit: {path} starts at {_reported(value, dimension)}, outside its bounds {_range(low, high, dimension)}"
+            f"--fit: {path} starts at {_report_parameter(value, dimension)}, outside its bounds "
+            f"{_range(low, high, dimension)}"
         )
     return FitParameter(path, dimension, value, low, high, size)
 
@@ -192,14 +193,14 @@ def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
     return 0.01 * width if math.isfinite(width) else float(from_border(1.0, dimension))
 
 
-def _reported(value: float, dimension: str) -> str:
+def _report_parameter(value: float, dimension: str) -> str:
     from cfmkit.specs.units import format_short
 
     return format_short(value, dimension, 6)
 
 
 def _range(low: float, high: float, dimension: str) -> str:
-    return f"{_reported(low, dimension)} ... {_reported(high, dimension)}"
+    return f"{_report_parameter(low, dimension)} ... {_report_parameter(high, dimension)}"
 
 
 def read_bounds(

@@ -18,9 +18,9 @@ import numpy as np
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
 from cfmkit.errors import DataError, UsageError, reason_of, visible
 from cfmkit.numerics.robust_statistics import spikes
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.tables.lab_columns import column_named, read_units, roles_of
-from cfmkit.tables.lab_file import EMPTY, SEPARATORS, decoded, lines_of, tables_in
+from cfmkit.tables.lab_file import EMPTY, SEPARATORS, decode_file, lines_of, tables_in
 
 if TYPE_CHECKING:
     import os
@@ -180,7 +180,7 @@ def read_recordings(
     """
     name = Path(path).name
     stated = read_units(units)
-    text, encoding = decoded(_content(Path(path)), name)
+    text, encoding = decode_file(_content(Path(path)), name)
     lines = lines_of(text)
     tables = tables_in(lines, name, stated)
     key, _, value = (part.strip() for part in (group or "").partition("="))
@@ -195,7 +195,7 @@ def read_recordings(
         if found is not None:
             values = list(dict.fromkeys(_labels(table, found)))
             raise DataError(
-                f"{name}: {shown(found.name)} tells {len(values)} specimens apart, which no single curve describes; "
+                f"{name}: {quote(found.name)} tells {len(values)} specimens apart, which no single curve describes; "
                 f"choose {_options(found.name, values)}, or --group {ONE} if all rows are of one"
             )
         return {"": _recording(table, roles, encoding, name)}
@@ -203,7 +203,7 @@ def read_recordings(
     parts = _parts(table.with_values(list(roles.values())), column)
     if value and value not in parts:
         raise DataError(
-            f"{name}: --group: {shown(column.name)} is nowhere {shown(value)}; there are {_options(key, parts)}"
+            f"{name}: --group: {quote(column.name)} is nowhere {quote(value)}; there are {_options(key, parts)}"
         )
     chosen = {value: parts[value]} if value else parts
     total = sum(len(part.rows) for part in parts.values())

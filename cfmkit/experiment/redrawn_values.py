@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.errors import CfmError, SolutionError
 from cfmkit.experiment.aimed_curve import N_PLACES, analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
@@ -21,7 +21,7 @@ from cfmkit.families.base import ENVELOPE, function_named
 from cfmkit.metrics import check, values_of_family
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
-from cfmkit.studies.parts.assumed_errors import assumed
+from cfmkit.studies.parts.assumed_errors import assume_errors
 from cfmkit.studies.parts.redesign import free_of
 from cfmkit.studies.variable_paths import leaf
 
@@ -105,8 +105,8 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     ranges = {path: ends for path, ends in ranges.items() if kinds.get(path) not in ("rate", "friction")}
     if not ranges:
         places = [path for path, kind in kinds.items() if kind == "position"]
-        ranges = {path: around(float(spec.at(path))) for path in places if float(spec.at(path))}
-    sheet, process = sheet_of(getattr(spec.at("mechanism"), "part", None)), assumed(spec)
+        ranges = {path: range_about(float(spec.at(path))) for path in places if float(spec.at(path))}
+    sheet, process = sheet_of(getattr(spec.at("mechanism"), "part", None)), assume_errors(spec)
     fixed = {f"mechanism.{key}" for key in spec.out_of_plane_widths} if sheet is not None else set()
     limits = {}
     for path, (low, high) in ranges.items():
@@ -123,7 +123,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
 
 def _widen(value: float, low: float, high: float) -> tuple[float, float]:
     """Return a range in which a value may be corrected: limits that a design states hold, others are wider."""
-    least, most = around(value)
+    least, most = range_about(value)
     return (
         value / MOST_CHANGE if np.isclose(low, least) and value > 0.0 else low,
         value * MOST_CHANGE if np.isclose(high, most) and value > 0.0 else high,

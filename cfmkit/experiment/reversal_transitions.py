@@ -65,7 +65,7 @@ class Settled:
     length: float
 
 
-def settled(recording: Recording, strokes: Strokes) -> Settled:
+def remove_transitions(recording: Recording, strokes: Strokes) -> Settled:
     """Return strokes without the points next to their ends at which the force passes to the other branch.
 
     Parameters
@@ -85,7 +85,9 @@ def settled(recording: Recording, strokes: Strokes) -> Settled:
     alike = {way: passage([end for end in ends if end.way == way and end.reversal]) for way in (1.0, -1.0)}
     lengths = [max(passage([end]), alike[end.way] if end.reversal else 0.0) for end in ends]
     found = [
-        _shortened(recording, stroke, [(e, length) for e, length in zip(ends, lengths, strict=True) if number in e.at])
+        _shorten_stroke(
+            recording, stroke, [(e, length) for e, length in zip(ends, lengths, strict=True) if number in e.at]
+        )
         for number, stroke in enumerate(strokes.strokes)
     ]
     left_out = sum(len(old.points) - len(new.points) for old, new in zip(strokes.strokes, found, strict=True))
@@ -148,7 +150,7 @@ def _seen_from(recording: Recording, stroke: Stroke, place: float, way: float) -
     return places, np.bincount(inverse, recording.effort[stroke.points]) / np.bincount(inverse)
 
 
-def _shortened(recording: Recording, stroke: Stroke, ends: Sequence[tuple[End, float]]) -> Stroke:
+def _shorten_stroke(recording: Recording, stroke: Stroke, ends: Sequence[tuple[End, float]]) -> Stroke:
     """Return a stroke without the passages at its ends; the whole one where too little would be left."""
     motion = recording.motion[stroke.points]
     keep = np.ones(len(motion), dtype=bool)
@@ -170,7 +172,7 @@ def passage(ends: Sequence[End]) -> float:
     reach = min(end.reach for end in ends)
     distance, gap = (np.concatenate(parts) for parts in zip(*(_gap(end, reach) for end in ends), strict=True))
     order = np.argsort(distance, kind="stable")
-    distance, gap, weight = _thinned(distance[order], gap[order])
+    distance, gap, weight = _thin_neighbours(distance[order], gap[order])
     if len(distance) < _FEWEST:
         return 0.0
     beyond = gap[distance > 0.5 * reach]
@@ -200,7 +202,7 @@ def _gap(end: End, reach: float) -> tuple[FloatArray, FloatArray]:
     return places, np.interp(places, *end.up) - np.interp(places, *end.down)
 
 
-def _thinned(places: FloatArray, gap: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _thin_neighbours(places: FloatArray, gap: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return averages over neighbours where there are many; those next to the end stay single."""
     size = max(-(-(len(places) - _SINGLE) // _MOST), 1)
     edges = np.concatenate([np.arange(min(_SINGLE, len(places))), np.arange(_SINGLE, len(places), size)])

@@ -31,7 +31,7 @@ RECORDED = {
 }
 
 
-def recorded(kind: str) -> dict[str, tuple[str, str]]:
+def define_recorded_values(kind: str) -> dict[str, tuple[str, str]]:
     """Return name, dimension and definition of each of them, of a force or of a torque.
 
     Examples

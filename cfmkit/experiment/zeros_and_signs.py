@@ -27,7 +27,7 @@ def words_of(kind: str) -> tuple[str, str]:
     return ("force", "displacement") if kind == "force" else ("torque", "angle")
 
 
-def corrected(
+def correct_recording(
     recording: Recording, tare: str | float | None = None, zero: str | float | None = None, flip: Collection[str] = ()
 ) -> Recording:
     """Return a recording with other zeros and signs: (reading - zero), turned where it is to be.
@@ -53,8 +53,8 @@ def corrected(
     if strange := next((word for word in flip if word not in (effort, motion)), None):
         raise UsageError(f"--flip: {strange!r} is not in this recording; it has {effort} and {motion}")
     resting = _resting(recording)
-    shown = [_shown(tare, recording.effort[:resting], "--tare", recording.kind)]
-    shown.append(_shown(zero, recording.motion[:1], "--zero", recording.motion_dimension))
+    shown = [_to_shown_unit(tare, recording.effort[:resting], "--tare", recording.kind)]
+    shown.append(_to_shown_unit(zero, recording.motion[:1], "--zero", recording.motion_dimension))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
     notes = [*_notes((effort, motion), shown, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
     if not notes:
@@ -81,7 +81,7 @@ def _resting(recording: Recording) -> int:
     return max(int(np.argmax(moved)), 1)
 
 
-def _shown(value: str | float | None, first: FloatArray, option: str, dimension: str) -> float:
+def _to_shown_unit(value: str | float | None, first: FloatArray, option: str, dimension: str) -> float:
     from cfmkit.specs.units import read_quantity
 
     if value is None:

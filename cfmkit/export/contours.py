@@ -144,7 +144,7 @@ class Contour:
 
         On arcs neighbouring lines differ by `turn` [rad] at most.
         """
-        found = [_along(edge, sagitta, turn) for edge in self.edges]
+        found = [_points_along(edge, sagitta, turn) for edge in self.edges]
         return np.concatenate([piece[:-1] for piece in found])
 
 
@@ -166,9 +166,9 @@ def _farthest(edge: Edge) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
+def _points_along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
     if isinstance(edge, Smooth):
-        return _between(edge, sagitta)
+        return _points_between(edge, sagitta)
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end])
     # quarter turns at most: a circle within `sagitta` of its centre is still a ring
@@ -178,7 +178,7 @@ def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _between(edge: Smooth, sagitta: float) -> FloatArray:
+def _points_between(edge: Smooth, sagitta: float) -> FloatArray:
     """Return the points of a smooth edge, and between them those of its cubics that keep lines within `sagitta` [m]."""
     z, t = (values @ np.array([1, 1j]) for values in (edge.points, edge.tangents))
     bulge = np.abs(np.diff(z) * np.angle(t[1:] / t[:-1])) / 8.0

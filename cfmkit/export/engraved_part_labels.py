@@ -30,7 +30,7 @@ NEAR = 5e-6
 """Outlines of bodies are flattened within this [m]."""
 
 
-def engraved(drawing: Drawing, name: str) -> Drawing:
+def engrave_labels(drawing: Drawing, name: str) -> Drawing:
     """Return a drawing with a label on each of its parts that has a held or a driven piece.
 
     Parameters
@@ -58,7 +58,7 @@ def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
         for spot in spots:
             thick = _thickness(drawing.sheet, spot.centroid)
             text = name if thick is None else f"{name}, sheet {format_short(thick, 'length')}"
-            if (label := _placed(text, spot)) is not None and not any(
+            if (label := _place_text(text, spot)) is not None and not any(
                 spot.intersection(hole).area > SPECK for hole in holes
             ):
                 yield label
@@ -72,7 +72,7 @@ def _thickness(sheet: Sheet, at: Any) -> float | None:
     return max(own) if own else sheet.thickness
 
 
-def _placed(text: str, spot: Any) -> EngravedText | None:
+def _place_text(text: str, spot: Any) -> EngravedText | None:
     """Return a text in the middle of a rectangle, along its longer side and never upside down."""
     corners = np.array(spot.minimum_rotated_rectangle.exterior.coords)
     if len(corners) < 4:

@@ -24,7 +24,7 @@ SMOOTH = math.radians(0.5)
 """Where the direction turns by less than this the edges are tangent: nothing to round [rad]."""
 
 
-def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, ...]]:
+def round_inside_corners(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, ...]]:
     """Return a closed contour with rounded inside corners, and the places x + iy [m] of corners that no arc fits.
 
     Corners between lines, and between a line and a smooth edge, are rounded; others count as not fitting.
@@ -47,7 +47,7 @@ def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, .
         before, after = edges[k - 1], edges[k]
         if turn * side > -SMOOTH:
             continue
-        if (found := _rounded(before, after, radius, side)) is None:
+        if (found := _round_corner(before, after, radius, side)) is None:
             sharp.append(after.ends[0])
         else:
             edges[k - 1], arcs[k], edges[k] = found
@@ -71,24 +71,24 @@ def _direction(edge: Edge, end: int) -> complex:
     return complex(-math.sin(angle), math.cos(angle)) * (1 if edge.end > edge.start else -1)
 
 
-def _rounded(before: Edge, after: Edge, radius: float, side: float) -> tuple[Edge, Arc, Edge] | None:
+def _round_corner(before: Edge, after: Edge, radius: float, side: float) -> tuple[Edge, Arc, Edge] | None:
     """Return two edges, shortened, and the arc between them; None if it does not fit."""
     if _used_up(before) or _used_up(after):
         return None
     if isinstance(before, Line) and isinstance(after, Line):
-        return _between_lines(before, after, radius, side)
+        return _round_between_lines(before, after, radius, side)
     if isinstance(before, Line) and isinstance(after, Smooth):
-        return _onto_smooth(before, after, radius, side)
+        return _round_onto_smooth(before, after, radius, side)
     if isinstance(before, Smooth) and isinstance(after, Line):
         # the mirror image of the same, run backwards: the waste is then on the other hand
-        if (found := _onto_smooth(after.reversed(), before.reversed(), radius, -side)) is None:
+        if (found := _round_onto_smooth(after.reversed(), before.reversed(), radius, -side)) is None:
             return None
         line, arc, smooth = found
         return smooth.reversed(), arc.reversed(), line.reversed()
     return None
 
 
-def _between_lines(before: Line, after: Line, radius: float, side: float) -> tuple[Line, Arc, Line] | None:
+def _round_between_lines(before: Line, after: Line, radius: float, side: float) -> tuple[Line, Arc, Line] | None:
     one, other = _direction(before, -1), _direction(after, 0)
     corner = after.ends[0]
     trim = radius * math.tan(0.5 * abs(float(np.angle(other / one))))
@@ -101,7 +101,7 @@ def _between_lines(before: Line, after: Line, radius: float, side: float) -> tup
     return Line(before.start, _pair(first)), arc, Line(_pair(last), after.end)
 
 
-def _onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tuple[Line, Arc, Smooth] | None:
+def _round_onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tuple[Line, Arc, Smooth] | None:
     """Return the arc from a line to the smooth edge that begins at its end."""
     way, start = _direction(line, -1), line.ends[0]
     points, tangents = (np.asarray(values[:, 0] + 1j * values[:, 1]) for values in (smooth.points, smooth.tangents))

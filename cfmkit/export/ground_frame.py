@@ -161,7 +161,7 @@ def swept(lines: Sequence[FloatArray], half: float, shapes: Sequence[FloatArray]
     return union_all([*found, *(Polygon(shape).buffer(0) for shape in shapes if len(shape) > 2)])
 
 
-def outside(
+def find_outside(
     places: Sequence[tuple[float, float]], frame: Sequence[FloatArray], pads: Sequence[FloatArray]
 ) -> list[bool]:
     """Return which places [m] do not lie in a frame; what is also in a pad does not count as in the frame."""
@@ -171,7 +171,7 @@ def outside(
     return [not own.contains(Point(place)) for place in places]
 
 
-def moved(shape: FloatArray, by: FloatArray, turn: float = 0.0, about: FloatArray | None = None) -> FloatArray:
+def move_polygon(shape: FloatArray, by: FloatArray, turn: float = 0.0, about: FloatArray | None = None) -> FloatArray:
     """Return a polygon that is turned by an angle [rad] about a place and shifted [m]."""
     c, s = math.cos(turn), math.sin(turn)
     center = np.zeros(2) if about is None else about

@@ -51,7 +51,7 @@ def with_kerf(outlines: Sequence[Outline], kerf: float) -> tuple[Outline, ...]:
     if not (np.isfinite(kerf) and kerf > 0):
         raise GeometryError(f"the kerf must be a length above zero, not {format_short(kerf, 'length')}")
     moved = tuple(
-        _moved(outline, kerf / 2, f"contour {number} on layer 'cut'")
+        _offset_outline(outline, kerf / 2, f"contour {number} on layer 'cut'")
         if outline.layer == "cut" and outline.closed
         else outline
         for number, outline in enumerate(outlines, start=1)
@@ -63,7 +63,7 @@ def with_kerf(outlines: Sequence[Outline], kerf: float) -> tuple[Outline, ...]:
     return moved
 
 
-def _moved(outline: Outline, half: float, name: str) -> Outline:
+def _offset_outline(outline: Outline, half: float, name: str) -> Outline:
     region = _region(outline, half, name)
     right = half if (outline.chain.area > 0) != outline.hole else -half
     chain = parallel(outline.chain, right)

@@ -59,7 +59,7 @@ def _step(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes
         raise GeometryError("the CAD kernel cannot make a valid body from the outline")
     whole = solids[0] if len(solids) == 1 else kernel.Compound(children=solids)
     whole.label = name
-    return _written(kernel, whole)
+    return _write_step(kernel, whole)
 
 
 def _kernel() -> ModuleType:
@@ -129,7 +129,7 @@ def _face(kernel: Any, region: Region) -> Any:
     return kernel.Face(kernel.Wire.make_polygon([tuple(map(float, point)) for point in ends]))
 
 
-def _written(kernel: Any, whole: Any) -> bytes:
+def _write_step(kernel: Any, whole: Any) -> bytes:
     """Return a STEP file whose head names no date and no folder: the same part gives the same bytes."""
     try:
         with tempfile.TemporaryDirectory(prefix="cfmkit-") as folder:

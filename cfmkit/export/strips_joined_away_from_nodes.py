@@ -193,7 +193,7 @@ class _Look:
             a, b = (self.names[k] for k in divmod(which, len(self.names)))
             own = pair == which
             if not _found_in_other_half(a, b):
-                yield *_ordered(a, b), self.points[one[own]], self.points[other[own]], gap[own]
+                yield *_order_names(a, b), self.points[one[own]], self.points[other[own]], gap[own]
 
     def _way_between(self, one: Any, other: Any) -> FloatArray:
         """Return the shortest way along strips and through bodies between points (k,) [m]."""
@@ -232,7 +232,7 @@ class _Look:
             line = shapely.shortest_line(shapely.Polygon(one.shape), shapely.Polygon(other.shape))
             if line.length < self.filled:
                 ends = shapely.get_coordinates(line)
-                yield *_ordered(one.name, other.name), ends[:1], ends[1:], np.array([line.length])
+                yield *_order_names(one.name, other.name), ends[:1], ends[1:], np.array([line.length])
 
 
 def _found_in_other_half(one: str, other: str) -> bool:
@@ -240,7 +240,7 @@ def _found_in_other_half(one: str, other: str) -> bool:
     return one.endswith("'") and other.endswith("'")
 
 
-def _ordered(one: str, other: str) -> tuple[str, str]:
+def _order_names(one: str, other: str) -> tuple[str, str]:
     """Return two names in one order, whichever of both is the mirrored one: b1 and b2' as well as b1' and b2."""
     plain, second = sorted((one.rstrip("'"), other.rstrip("'")))
     image = "'" if one.endswith("'") != other.endswith("'") else ""

@@ -91,7 +91,7 @@ class OutlinePiece:
         return self.areas or (_corners(self.edges, size),)
 
 
-def merged(
+def merge_pieces(
     pieces: Sequence[OutlinePiece],
     size: float,
     fillet: float = 0.0,
@@ -120,21 +120,21 @@ def merged(
     """
     near = NEAR * GRID * size
     tracks = [TracedEdge.of(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
-    whole = _united([area for piece in pieces for area in piece.covered(size)], size)
-    rings = [_recognised(_ring(runs, near), near) for runs in _traced(whole, tracks, size)]
+    whole = _unite([area for piece in pieces for area in piece.covered(size)], size)
+    rings = [_recognise_edges(_ring(runs, near), near) for runs in _trace_rings(whole, tracks, size)]
     if fillet > 0:
-        rings = _rounded(rings, fillet, size)
+        rings = _round_chains(rings, fillet, size)
     if holes:
         tracks = [TracedEdge.of(edge, SAGITTA * size) for ring in rings for edge in ring]
         tracks += [TracedEdge.of(edge, SAGITTA * size) for hole in holes for edge in hole.removed()]
-        left = _area(rings, size).difference(_united([area for hole in holes for area in hole.covered(size)], size))
-        rings = [_ring(runs, near) for runs in _traced(left, tracks, size)]
+        left = _area(rings, size).difference(_unite([area for hole in holes for area in hole.covered(size)], size))
+        rings = [_ring(runs, near) for runs in _trace_rings(left, tracks, size)]
     if not rings:
         raise GeometryError("the pieces of the part leave nothing to cut")
     return tuple(Contour(tuple(ring), layer, closed=True, hole=_encloses(ring) < 0) for ring in rings)
 
 
-def _united(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
+def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
     """Return the union of polygons (n, 2), and of geometries of shapely, on the grid, as one."""
     from shapely import Polygon, is_valid, make_valid, union_all
 
@@ -148,8 +148,8 @@ def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
     """Return what closed chains of edges bound, holes left out, as a geometry of shapely."""
     outer = [_corners(ring, size) for ring in rings if _encloses(ring) > 0]
     inner = [_corners(ring, size) for ring in rings if _encloses(ring) < 0]
-    whole = _united(outer, size)
-    return whole.difference(_united(inner, size)) if inner else whole
+    whole = _unite(outer, size)
+    return whole.difference(_unite(inner, size)) if inner else whole
 
 
 def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
@@ -179,7 +179,7 @@ class _Run:
         return self.track.part(self.first, self.last, self.track.foot(self.first), self.track.foot(self.last))
 
 
-def _traced(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Iterator[list[_Run]]:
+def _trace_rings(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Iterator[list[_Run]]:
     """Yield, ring by ring of a geometry of shapely, the runs of tracks that bound it, the material on their left."""
     from shapely import STRtree, linestrings, orient_polygons
 
@@ -270,7 +270,7 @@ def _ring(runs: Sequence[_Run], near: float) -> list[Edge]:
     for run, before, after in zip(runs, [meetings[-1], *meetings[:-1]], meetings, strict=True):
         if abs(after.at - before.at) > near or abs(after.first - before.last) > 1.0:
             edges.append(run.track.part(before.last, after.first, before.at, after.at))
-    return _straightened(edges, near)
+    return _straighten_chain(edges, near)
 
 
 @dataclass(frozen=True)
@@ -308,9 +308,9 @@ def _meeting(one: _Run, other: _Run) -> _Meeting:
     return _Meeting(at, *(end if abs(w - end) < 1e-3 else w for _, w, end in ends))
 
 
-def _recognised(edges: Sequence[Edge], near: float) -> list[Edge]:
+def _recognise_edges(edges: Sequence[Edge], near: float) -> list[Edge]:
     """Return a closed chain in which smooth edges that are lines or arcs are such."""
-    return _straightened([_simplest(edge, near) if isinstance(edge, Smooth) else edge for edge in edges], near)
+    return _straighten_chain([_simplest(edge, near) if isinstance(edge, Smooth) else edge for edge in edges], near)
 
 
 def _simplest(edge: Smooth, near: float) -> Edge:
@@ -332,7 +332,7 @@ def _simplest(edge: Smooth, near: float) -> Edge:
     return Arc(pair(center), float(np.abs(spokes).mean()), start, start + turn)
 
 
-def _straightened(edges: Sequence[Edge], near: float) -> list[Edge]:
+def _straighten_chain(edges: Sequence[Edge], near: float) -> list[Edge]:
     """Return a closed chain in which lines, and arcs about one centre, that go on as they are, are one edge."""
     found: list[Edge] = []
     for edge in edges:
@@ -357,7 +357,7 @@ def _as_one(one: Edge, other: Edge, near: float) -> Edge | None:
     return None
 
 
-def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> list[list[Edge]]:
+def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> list[list[Edge]]:
     """Return closed chains of edges with inside corners as a cutter of a radius [m] leaves them."""
     fine = SAGITTA * min(size, radius)
     ways: list[TracedEdge] = []
@@ -376,9 +376,9 @@ def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> lis
                 areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
             elif turn < -SMOOTH:  # an inside corner: beside edges shorter than the radius only it is near enough
                 areas.append(TracedEdge.of(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
-    reach = _united(areas, size, _area(rings, size))
+    reach = _unite(areas, size, _area(rings, size))
     near = NEAR * GRID * size
-    touched = (_touched(runs, radius, near) for runs in _traced(reach, ways, size))
+    touched = (_touch_edges(runs, radius, near) for runs in _trace_rings(reach, ways, size))
     closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= near)
     return [ring for ring in closed if abs(_encloses(ring)) > (SPECK * size) ** 2]
 
@@ -401,7 +401,7 @@ def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iter
                 yield np.asarray(hull.exterior.coords)[:-1]
 
 
-def _touched(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
+def _touch_edges(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
     """Return the edges that a cutter touches whose centre runs so, and the arcs that it leaves between them."""
     runs = [run for run in runs if run.track.moved or isinstance(run.track.edge, Arc)]
     if len(runs) < 2:
@@ -417,7 +417,7 @@ def _touched(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
             center = _center_between(end, beyond, after.at, radius)
             first, turn = float(np.angle(end - center)), float(np.angle((beyond - center) / (end - center)))
             edges.append(Arc(pair(center), radius, first, first - (-turn % (2 * math.pi))))
-    return _straightened(edges, near)
+    return _straighten_chain(edges, near)
 
 
 def _center_between(start: complex, end: complex, near: complex, radius: float) -> complex:

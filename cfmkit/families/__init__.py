@@ -131,7 +131,7 @@ def _record(name: str) -> Family:
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
 
 
-def examined() -> tuple[tuple[entry_point_plugins.InstalledFamily | None, Family | str], ...]:
+def examine_families() -> tuple[tuple[entry_point_plugins.InstalledFamily | None, Family | str], ...]:
     """Return every family with the offer of the package it is from, or the reason why it cannot be used.
 
     Returns
@@ -140,20 +140,20 @@ def examined() -> tuple[tuple[entry_point_plugins.InstalledFamily | None, Family
         Those of this package and of this process come first, without an offer. All others are imported.
     """
     own = tuple((None, family(name)) for name in (*FAMILIES, *_REGISTERED_FAMILIES))
-    return own + tuple((offer, _tried(offer)) for offer in entry_point_plugins.offers())
+    return own + tuple((offer, _try_family(offer)) for offer in entry_point_plugins.offers())
 
 
 def records() -> tuple[Family, ...]:
     """Return all families that can be used, in the order of `names`; `skipped` says which cannot."""
-    return tuple(found for _, found in examined() if not isinstance(found, str))
+    return tuple(found for _, found in examine_families() if not isinstance(found, str))
 
 
-def skipped() -> tuple[str, ...]:
+def list_skipped() -> tuple[str, ...]:
     """Return one line for each family of another package that cannot be used, with the reason."""
-    return tuple(found for _, found in examined() if isinstance(found, str))
+    return tuple(found for _, found in examine_families() if isinstance(found, str))
 
 
-def _tried(offer: entry_point_plugins.InstalledFamily) -> Family | str:
+def _try_family(offer: entry_point_plugins.InstalledFamily) -> Family | str:
     try:
         return entry_point_plugins.record_of(offer, FAMILIES)
     except Unusable as problem:
@@ -191,13 +191,13 @@ __all__ = [
     "FAMILIES",
     "Unusable",
     "clashing",
-    "examined",
+    "examine_families",
     "family",
     "list_registered",
+    "list_skipped",
     "names",
     "origin",
     "origins",
     "records",
     "register",
-    "skipped",
 ]

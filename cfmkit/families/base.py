@@ -255,7 +255,7 @@ class Family:
     @property
     def bibtex(self) -> str:
         """The papers as BibTeX; empty where there is no file of them."""
-        return packaged(self.bibliography) if self.bibliography else ""
+        return read_packaged(self.bibliography) if self.bibliography else ""
 
     @property
     def leading(self) -> tuple[str, ...]:
@@ -283,7 +283,7 @@ class Family:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
         if ENVELOPE.keys().isdisjoint(names) or not self.part:
             return result
-        return sized(result, self.envelope(result))
+        return add_size(result, self.envelope(result))
 
     def envelope(self, result: Result) -> BoundingBox | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
@@ -336,7 +336,7 @@ def _own_quantity(metric: OwnMetric, result: Result) -> Quantity:
     return Quantity(number, *about) if math.isfinite(number) else Quantity(None, *about, reason="it is not finite")
 
 
-def sized(result: Result, space: BoundingBox | None) -> Result:
+def add_size(result: Result, space: BoundingBox | None) -> Result:
     """Return a result with the sizes of its box among its values; without a value where the box is not known."""
     sides = (None, None, None) if space is None else space.sides
     reason = (space.assumed if space else "") or "the box is not known"
@@ -347,7 +347,7 @@ def sized(result: Result, space: BoundingBox | None) -> Result:
     return replace(result, values=result.values | found)  # type: ignore[operator]
 
 
-def packaged(name: str) -> str:
+def read_packaged(name: str) -> str:
     """Return the text of a file that comes with a package, by ``"package/folder/file"``."""
     return package_file(name).read_text(encoding="utf-8")
 

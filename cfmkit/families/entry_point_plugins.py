@@ -115,7 +115,7 @@ def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
     Unusable
         With the reason in one line, if it cannot be used.
     """
-    found = _clash(offer, taken) or _imported(offer)
+    found = _clash(offer, taken) or _import_record(offer)
     if isinstance(found, str):
         raise Unusable(f"the family {visible(offer.name)!r} of the package {offer.source} cannot be used: {found}")
     return found
@@ -130,7 +130,7 @@ def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
 
 
 @lru_cache(maxsize=64)
-def _imported(offer: InstalledFamily) -> Family | str:
+def _import_record(offer: InstalledFamily) -> Family | str:
     """Return the record, or why there is none: whatever the package raises when it is imported or looked at."""
     from cfmkit.families.base import function_named
 
@@ -190,7 +190,7 @@ def _fault_of(record: Any, offer: InstalledFamily) -> str:
 
 def fault_of_record(record: Family, needs_interface: bool = True) -> str:
     """Return why a record cannot be used; empty if it can. A record that is made now need not state its interface."""
-    from cfmkit.families.base import INTERFACE, Family, packaged
+    from cfmkit.families.base import INTERFACE, Family, read_packaged
 
     if record.interface != INTERFACE and (needs_interface or record.interface is not None):
         made = "does not state its interface" if record.interface is None else f"is for interface {record.interface}"
@@ -199,7 +199,7 @@ def fault_of_record(record: Family, needs_interface: bool = True) -> str:
         if not _is_of_kind(getattr(record, one.name), str(one.type)):
             return f"the field {one.name!r} of its record must be of the type {one.type}"
     for name in filter(None, (record.template, record.bibliography, record.dimension_drawing)):
-        packaged(name)
+        read_packaged(name)
     return ""
 
 

@@ -94,7 +94,7 @@ def largest_concentration(rows: Sequence[FilletRow]) -> dict[str, Quantity]:
     return {name: Quantity(found, *DEFINITIONS[name], "" if found else "beams have no stress at any fillet")}
 
 
-def numbered(rows: Sequence[FilletRow], before: int = 0) -> dict[int, FilletArc]:
+def number_fillets(rows: Sequence[FilletRow], before: int = 0) -> dict[int, FilletArc]:
     """Return fillets by their numbers in the table, where so many rows stand before them."""
     return {number: row.arc for number, row in enumerate(rows, start=before + 1)}
 
@@ -103,7 +103,7 @@ def fillet_table(rows: Sequence[FilletRow], motion: tuple[str, str] = ("displace
     """Return the table, with the name and the dimension of the motion."""
     places = np.array([row.arc.middle for row in rows]).reshape(-1, 2)
     columns = [
-        TableColumn("fillet", tuple(numbered(rows))),
+        TableColumn("fillet", tuple(number_fillets(rows))),
         TableColumn("place", tuple(row.place for row in rows)),
         border_column("x", places[:, 0], "length"),
         border_column("y", places[:, 1], "length"),

@@ -135,12 +135,12 @@ def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bo
     )
 
 
-def at_most(length: float) -> str:
+def format_at_most(length: float) -> str:
     """Return a length [m] rounded down to four digits: as good as feasible, and feasible."""
-    return _rounded(length, math.floor)
+    return _round_digits(length, math.floor)
 
 
-def at_least(length: float) -> str:
+def format_at_least(length: float) -> str:
     """Return a length [m] rounded up to four digits.
 
     Examples
@@ -148,10 +148,10 @@ def at_least(length: float) -> str:
     >>> at_least(0.0144645), at_most(0.1693794)
     ('14.47 mm', '169.3 mm')
     """
-    return _rounded(length, math.ceil)
+    return _round_digits(length, math.ceil)
 
 
-def _rounded(length: float, way: Callable[[float], int]) -> str:
+def _round_digits(length: float, way: Callable[[float], int]) -> str:
     if length < 1e-300:
         return "0 mm"
     digits = 3 - math.floor(math.log10(length * 1e3))

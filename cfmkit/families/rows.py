@@ -33,7 +33,7 @@ S_co = TypeVar("S_co", covariant=True)
 T = TypeVar("T")
 
 
-def stacked(items: Sequence[T]) -> T:
+def stack(items: Sequence[T]) -> T:
     """Return dataclasses of numbers as one, with columns where they differ: (m, 1), of arrays (k,) (k, m, 1).
 
     Numbers that are equal in all stay plain, so that what mechanisms have in common is computed once. A class that
@@ -46,9 +46,9 @@ def stacked(items: Sequence[T]) -> T:
     if is_dataclass(first):
         found = object.__new__(type(first))  # without what is known of the first one
         for name in (*(item.name for item in fields(first)), *getattr(first, "also_stacked", ())):
-            vars(found)[name] = stacked([getattr(one, name) for one in items])
+            vars(found)[name] = stack([getattr(one, name) for one in items])
     elif isinstance(first, tuple):
-        found = tuple(stacked(one) for one in zip(*items, strict=True))
+        found = tuple(stack(one) for one in zip(*items, strict=True))
     elif not ((values := np.array(items)) == values[0]).all():
         found = np.moveaxis(values, 0, -1)[..., None]
     return found  # type: ignore[no-any-return]
@@ -239,11 +239,11 @@ def with_values(block: T, values: Mapping[str, Any]) -> T:
     return own.model_copy(update=changes)  # type: ignore[no-any-return]
 
 
-def without_numbers(value: Any) -> Any:
+def drop_numbers(value: Any) -> Any:
     """Return what mechanisms that are solved together have in common: all of a block but the values of its numbers."""
     if isinstance(value, Model | tuple):
         items = value if isinstance(value, tuple) else vars(value).values()
-        return ["number" if type(item) is float else item and without_numbers(item) for item in items]
+        return ["number" if type(item) is float else item and drop_numbers(item) for item in items]
     return "number" if isinstance(value, float) else value
 
 

@@ -110,7 +110,7 @@ class Candidate:
     springs: Springs | None = None  # that it is put together with; None if it needs none
 
 
-def called(variant: str, request: Request, block: MaterialBlock) -> str:
+def name_variant(variant: str, request: Request, block: MaterialBlock) -> str:
     """Return what a variant is called: with its material where the request allows several.
 
     Examples

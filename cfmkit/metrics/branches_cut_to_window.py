@@ -123,7 +123,7 @@ def covers(extent: tuple[float, float], window: Window) -> bool:
     return extent[0] <= window.lo + slack and extent[1] >= window.hi - slack
 
 
-def between_ends(places: FloatArray, low: float, high: float) -> NDArray[np.bool_]:
+def find_between_ends(places: FloatArray, low: float, high: float) -> NDArray[np.bool_]:
     """Return which places lie between the ends of a window and are none of these, but for rounding."""
     slack = TOLERANCE * (high - low)
     return (places > low + slack) & (places < high - slack)
@@ -134,7 +134,7 @@ def restrict(trace: BranchTrace, window: Window) -> BranchTrace:
     slack = TOLERANCE * (window.hi - window.lo)
     if trace.extent[0] >= window.lo - slack and trace.extent[1] <= window.hi + slack:
         return trace
-    return _straight(trace, window, slack) if trace.way else _folded(trace, window, slack)
+    return _straight(trace, window, slack) if trace.way else _cut_folded(trace, window, slack)
 
 
 def _straight(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
@@ -142,23 +142,25 @@ def _straight(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
     motion = trace.motion[:: trace.way]
     first, last = int(motion.searchsorted(window.lo - slack)), int(motion.searchsorted(window.hi + slack, "right"))
     # an end between two samples needs a point of its own: the segment it lies on, and how far along
-    head = _between(motion, first, window.lo) if first and motion[first] > window.lo + slack else None
-    tail = _between(motion, last, window.hi) if last < len(motion) and motion[last - 1] < window.hi - slack else None
+    head = _place_between(motion, first, window.lo) if first and motion[first] > window.lo + slack else None
+    tail = (
+        _place_between(motion, last, window.hi) if last < len(motion) and motion[last - 1] < window.hi - slack else None
+    )
 
     def cut(values: FloatArray) -> FloatArray:
         values = values[:: trace.way]
-        pieces = [_along(values, head), values[first:last], _along(values, tail)]
+        pieces = [_values_along(values, head), values[first:last], _values_along(values, tail)]
         return np.concatenate(pieces)[:: trace.way] if head or tail else pieces[1][:: trace.way]
 
     return BranchTrace(trace.name, cut(trace.motion), cut(trace.effort), trace.changed_stress(cut))
 
 
-def _between(motion: FloatArray, after: int, place: float) -> tuple[int, float]:
+def _place_between(motion: FloatArray, after: int, place: float) -> tuple[int, float]:
     before = float(motion[after - 1])
     return after, (place - before) / (float(motion[after]) - before)
 
 
-def _along(values: FloatArray, where: tuple[int, float] | None) -> FloatArray:
+def _values_along(values: FloatArray, where: tuple[int, float] | None) -> FloatArray:
     if where is None:
         return values[:0]
     after, part = where
@@ -166,7 +168,7 @@ def _along(values: FloatArray, where: tuple[int, float] | None) -> FloatArray:
     return before + part * (values[after : after + 1] - before)
 
 
-def _folded(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
+def _cut_folded(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
     """Return the part of a branch that turns back: several runs, perhaps."""
     inside = (trace.motion >= window.lo - slack) & (trace.motion <= window.hi + slack)
     where, level = _crossings(trace.motion, window, slack)
@@ -175,8 +177,8 @@ def _folded(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
     return BranchTrace(
         trace.name,
         np.insert(trace.motion, after, level)[kept],
-        _inserted(trace.effort, where, after)[kept],
-        trace.changed_stress(lambda stress: _inserted(stress, where, after)[kept]),
+        _insert_interpolated(trace.effort, where, after)[kept],
+        trace.changed_stress(lambda stress: _insert_interpolated(stress, where, after)[kept]),
     )
 
 
@@ -195,7 +197,7 @@ def _crossings(motion: FloatArray, window: Window, slack: float) -> tuple[FloatA
     return where[order], np.concatenate(levels)[order]
 
 
-def _inserted(values: FloatArray, where: FloatArray, after: NDArray[np.intp]) -> FloatArray:
+def _insert_interpolated(values: FloatArray, where: FloatArray, after: NDArray[np.intp]) -> FloatArray:
     """Return `values` with linearly interpolated ones at the fractional indices `where`."""
     before = values[after - 1]
     return np.insert(values, after, before + (where - (after - 1)) * (values[after] - before))

@@ -100,10 +100,10 @@ class MetricChange:
         """The change in words."""
         share = "" if self.relative is None else f" ({100 * self.relative:+.3g} %)"
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
-        return f"{self.name}: {_reported(self.before)} -> {_reported(self.after)}{unit}{share}"
+        return f"{self.name}: {_report_change(self.before)} -> {_report_change(self.after)}{unit}{share}"
 
 
-def _reported(value: float | str | None) -> str:
+def _report_change(value: float | str | None) -> str:
     return "no value" if value is None else value if isinstance(value, str) else f"{value:.8g}"
 
 
@@ -123,7 +123,7 @@ class Differences:
         where there are several: ``name[tag]`` and ``name[tag,branch]``.
         """
         several, found = len(self.curves) > 1, {}
-        whole = {"": _joined(self.curves)} if several else {}
+        whole = {"": _join_differences(self.curves)} if several else {}
         for branch, item in (whole | dict(self.curves)).items():
             inside = ",".join(part for part in (tag, branch if several else "") if part)
             for name, (function, words) in measures.items():
@@ -156,7 +156,7 @@ def compare(
     if window is None:
         return Differences({"": Difference(nothing, "they have no travel in common")}, nothing, None, changes)
     places = np.linspace(window.lo, window.hi, PLACES)
-    curves = {name: _between((fine, name), (coarse, its), places) for name, its in pairs.items()}
+    curves = {name: _difference_between((fine, name), (coarse, its), places) for name, its in pairs.items()}
     return Differences(curves, places, window, changes)
 
 
@@ -165,7 +165,7 @@ def _way(curve: Curve, branch: str) -> float:
     return float(motion[-1] - motion[0])
 
 
-def _between(fine: tuple[Curve, str], coarse: tuple[Curve, str], places: FloatArray) -> Difference:
+def _difference_between(fine: tuple[Curve, str], coarse: tuple[Curve, str], places: FloatArray) -> Difference:
     try:
         points = Points(places, effort_at(*fine, places), coarse[1])
         return _less(points, coarse[0], "there is no equilibrium at some of the places")
@@ -201,7 +201,7 @@ def _changes(before: Metrics, other: Compared, tolerance: float) -> Iterator[Met
             yield MetricChange(other.name, name, old, new, unit, relative, beyond)
 
 
-def _joined(differences: Mapping[str, Difference]) -> Difference:
+def _join_differences(differences: Mapping[str, Difference]) -> Difference:
     """Return the differences of all branches, with the reason of the first that has a gap."""
     items = list(differences.values())
     gaps = [item.reason for item in items if not np.isfinite(item.values).all()]

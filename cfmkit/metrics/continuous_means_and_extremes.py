@@ -32,7 +32,7 @@ way is a sixth as long after each round: of a cam at 31 points the last extreme 
 """
 
 
-def inside(places: FloatArray, low: float, high: float) -> FloatArray:
+def places_inside(places: FloatArray, low: float, high: float) -> FloatArray:
     """Return the ends of a window and the places between them, increasing."""
     between = places[(places > low) & (places < high)]
     return np.concatenate([[low], between, [high]])
@@ -46,7 +46,7 @@ def mean(function: Callable[[FloatArray], FloatArray], places: FloatArray, low: 
     >>> round(mean(np.exp, np.linspace(0.0, 1.0, 9), 0.0, 1.0), 12)
     1.718281828459
     """
-    ends = inside(places, low, high)
+    ends = places_inside(places, low, high)
     middle, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
     values = function(middle[:, None] + half[:, None] * _NODES)
     return float((half * (values @ _WEIGHTS)).sum() / (high - low))
@@ -111,7 +111,7 @@ def extremes(
         counts = few[:, None] if number else True  # of many samples one parabola is enough
         best = np.where(counts, np.maximum(best, found.max(axis=-1)), best)
         if number < rounds - 1:
-            x, y = _around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
+            x, y = _three_around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
     curved = end >= 2
     return np.where(curved, best[:, 0], top), np.where(curved, -best[:, 1], bottom)
 
@@ -126,7 +126,7 @@ def _next(x: FloatArray, y: FloatArray, beside: FloatArray) -> FloatArray:
     return np.asarray(np.clip(places, np.minimum(a, c)[..., None], np.maximum(a, c)[..., None]))
 
 
-def _around(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _three_around(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the three of all points that surround the largest."""
     order = np.argsort(x, axis=-1)
     x, y = np.take_along_axis(x, order, -1), np.take_along_axis(y, order, -1)

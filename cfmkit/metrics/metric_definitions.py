@@ -240,10 +240,10 @@ TABLE = (*_IN_WINDOW, *_RANGES, *_LOADS, *_LONG_TERM)
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.of(kind), name=_named(item.name, kind)) for item in TABLE)
+    return tuple(replace(item.of(kind), name=_name_in_words(item.name, kind)) for item in TABLE)
 
 
-def _named(name: str, kind: Kind) -> str:
+def _name_in_words(name: str, kind: Kind) -> str:
     return f"{kind}_{name.removeprefix('force_')}" if name.startswith("force_") else name
 
 

@@ -27,7 +27,7 @@ from cfmkit.metrics.metric_definitions import (
 )
 from cfmkit.metrics.usable_interval_of_all_branches import Cycle, cycle
 from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
-from cfmkit.specs.units import TravelShare, between
+from cfmkit.specs.units import TravelShare, window_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -222,7 +222,7 @@ def window_of(result: Result, over: Ends | None = None) -> Window | None:
     travel = travel_of(result)
     if ends is None or (travel is None and any(isinstance(end, TravelShare) for end in ends)):
         return None
-    return Window(*between(ends, travel or (0.0, 0.0)))
+    return Window(*window_places(ends, travel or (0.0, 0.0)))
 
 
 def kind_of(result: Result) -> Kind | None:
@@ -288,12 +288,12 @@ def evaluate(
     kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
         known = metrics_by_name(kind, extra)
-        return {name: result.values.get(name) or _named(view, name, known, result) for name in names}
+        return {name: result.values.get(name) or _named_quantity(view, name, known, result) for name in names}
     return ({} if view is None else _all(view, definitions(kind, extra))) | dict(result.values)
 
 
 @np.errstate(all="ignore")
-def _named(view: Survey | None, name: str, known: Mapping[str, Definition], result: Result) -> Quantity:
+def _named_quantity(view: Survey | None, name: str, known: Mapping[str, Definition], result: Result) -> Quantity:
     metric, branch = split_name(name)
     if metric not in known:
         raise UsageError(unknown_metric(metric, [*known, *result.values]))
@@ -337,11 +337,11 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
 
 def windows_judged(result: Result) -> Result:
     """Return a result that warns of windows that its nominal curve does not cover."""
-    found = tuple(Finding(WINDOW_OUTSIDE, _reported(gap, result)) for gap in gaps(result))
+    found = tuple(Finding(WINDOW_OUTSIDE, _report_gap(gap, result)) for gap in gaps(result))
     return replace(result, warnings=LazySequence(lambda: (*result.warnings, *found))) if found else result
 
 
-def _reported(gap: UncoveredWindow, result: Result) -> str:
+def _report_gap(gap: UncoveredWindow, result: Result) -> str:
     (low, high), window, kind = gap.common, gap.window, gap.kind
     text = f"{' and '.join(gap.paths)}: the window {span_text(window.lo, window.hi, kind)} is not within the curve, "
     text += span_text(low, high, kind)

@@ -95,10 +95,10 @@ def search_json(found: Mapping[str, Searched]) -> dict[str, dict[str, Any]]:
     {'starts': {'value': 20.0, 'unit': '1', 'definition': 'random starts', 'model': 'inextensible', \
 'window': [0.0, 10.0], 'window_unit': 'mm'}}
     """
-    return {name: as_json(one.quantity) | _of(one) for name, one in found.items()}
+    return {name: as_json(one.quantity) | _model_and_window(one) for name, one in found.items()}
 
 
-def _of(found: Searched) -> dict[str, Any]:
+def _model_and_window(found: Searched) -> dict[str, Any]:
     """Return model and window in border units."""
     window = None if found.window is None else [finite_border(end, found.motion) for end in found.window]
     return {"model": found.model, "window": window, "window_unit": window and border_unit(found.motion)}

@@ -260,7 +260,7 @@ class RowsInWindow:
         slack, ends = TOLERANCE * (high - low), np.stack([low, high], axis=1)
         points, *beside = stress.samples
         at_point = (np.abs(points.motion[:, :, None] - ends[:, None]) <= slack[:, None, None]).any(axis=1)
-        own = np.stack([_at(points, end) for end in (low, high)], axis=1)
+        own = np.stack([_value_at(points, end) for end in (low, high)], axis=1)
         rows = np.arange(len(low))
         known = points.with_ends((low, high), np.where(at_point, own, stress.at(ends, rows)), slack)
         top = known.extremes(lambda places: stress.at(places, rows))[0]
@@ -268,7 +268,7 @@ class RowsInWindow:
             start, stop = np.maximum(other.motion[:, 0], low), np.minimum(other.motion[:, -1], high)
             within, inside = other.between((start, stop))
             inner = np.where(inside, within.values, -np.inf).max(axis=1, initial=-np.inf)
-            most = np.maximum(inner, np.maximum(_at(other, start), _at(other, stop)))
+            most = np.maximum(inner, np.maximum(_value_at(other, start), _value_at(other, stop)))
             top = np.where(start < stop, np.maximum(top, most), top)
         return top
 
@@ -314,7 +314,7 @@ class RowsInWindow:
         return np.where(self._has_target, self.curves.target, level)
 
 
-def _at(samples: RowSamples, place: FloatArray) -> FloatArray:
+def _value_at(samples: RowSamples, place: FloatArray) -> FloatArray:
     """Return the value of each row at a place, (d,), by linear interpolation."""
     rows = np.arange(len(place))
     after = np.clip((samples.motion < place[:, None]).sum(axis=1), 1, np.maximum(samples.count - 1, 1))

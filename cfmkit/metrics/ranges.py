@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @np.errstate(all="ignore")
 def range_95(branch: Branch) -> float:
     """Return d - c, with d the end of the window and c where F first reaches 0.95 F(d)."""
-    return _known(ranges_many.range_95(_rising(branch)))
+    return _value_of_branch(ranges_many.range_95(_rising(branch)))
 
 
 @np.errstate(all="ignore")
@@ -33,7 +33,7 @@ def range_95_fraction(branch: Branch) -> float:
     """Return (d - c) / d."""
     if branch.ends[1] <= 0:
         raise Undefined("the displacement at the end is not positive")
-    return _known(ranges_many.range_95_fraction(_rising(branch)))
+    return _value_of_branch(ranges_many.range_95_fraction(_rising(branch)))
 
 
 def _rising(branch: Branch) -> ManyBranches:
@@ -47,10 +47,10 @@ def _rising(branch: Branch) -> ManyBranches:
 def band_range(branch: Branch, tolerance: float) -> float:
     """Return the widest interval around the reference pose in which ``|F / F_ref - 1|`` is within the tolerance."""
     branch.effort_at_reference  # noqa: B018  (raises where there is nothing to compare with)
-    return _known(ranges_many.band_range(branch.many, tolerance))
+    return _value_of_branch(ranges_many.band_range(branch.many, tolerance))
 
 
-def _known(values: FloatArray) -> float:
+def _value_of_branch(values: FloatArray) -> float:
     """Return the value of one branch.
 
     Raises

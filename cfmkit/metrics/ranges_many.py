@@ -58,17 +58,17 @@ class ManyBranches:
     @cached_property
     def solved(self) -> tuple[FloatArray, FloatArray]:
         """Places at which 95 % is first reached, (d,), and widths of `BAND_RANGES`, (d, 3), of known branches."""
-        return _solved(self)
+        return _solve_ends(self)
 
     @cached_property
     def rise(self) -> FloatArray:
         """The first of these alone: of a beam every place takes an equilibrium, and bands need six times as many."""
-        return self.solved[0] if "solved" in self.__dict__ else _solved(self, with_bands=False)[0]
+        return self.solved[0] if "solved" in self.__dict__ else _solve_ends(self, with_bands=False)[0]
 
     @cached_property
     def bands(self) -> FloatArray:
         """The second; with the first in the same calls unless that is known."""
-        return _solved(self, with_rise=False)[1] if "rise" in self.__dict__ else self.solved[1]
+        return _solve_ends(self, with_rise=False)[1] if "rise" in self.__dict__ else self.solved[1]
 
     def at(self, places: FloatArray) -> FloatArray:
         """Return the effort at places of each row, (d, m), by linear interpolation."""
@@ -174,7 +174,7 @@ def _edge(
     return _crossing((many.motion[rows, worst], good), (offset[rows, worst] - level, height - level))
 
 
-def _solved(many: ManyBranches, with_rise: bool = True, with_bands: bool = True) -> tuple[FloatArray, FloatArray]:
+def _solve_ends(many: ManyBranches, with_rise: bool = True, with_bands: bool = True) -> tuple[FloatArray, FloatArray]:
     """Return `ManyBranches.solved`: all ends are looked for together, as calls of the model are what takes the time.
 
     Without the rise, or the bands, these are NaN.
@@ -311,12 +311,12 @@ def _solved_interval(
     start, end = last_places(lambda at, ends: excess(at, ends // 2), inside, outside).T
     lost = np.flatnonzero(~good.any(axis=1))  # the whole interval may lie between two samples
     if lost.size:
-        start[lost], end[lost] = _between_samples(branches[0], target, excess, lost)
+        start[lost], end[lost] = _intervals_between_samples(branches[0], target, excess, lost)
     some = end > start
     return np.where(some, start, np.nan), np.where(some, end, np.nan)
 
 
-def _between_samples(
+def _intervals_between_samples(
     branch: ManyBranches, target: FloatArray, excess: Callable[..., FloatArray], rows: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the interval around the first place where the effort passes the target between two samples; NaN without.

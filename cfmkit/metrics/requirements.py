@@ -289,7 +289,7 @@ def _outcome(
     table: Mapping[str, Sequence[Definition]],
     surveys: Surveys,
 ) -> Outcome:
-    definition = _meant(requirement, table[split_name(requirement.metric)[0]])
+    definition = _intended_definition(requirement, table[split_name(requirement.metric)[0]])
     window = window_of(result, requirement.over)
     values = _values(requirement.metric, definition, survey_of(result, window, surveys), result)
     limits = Bounds.of(requirement, definition.dimension)
@@ -305,11 +305,11 @@ def _outcome(
         (measured.lo, measured.hi) if measured else None,
         kind,
         limits.met(value.value),
-        limits.sentence(requirement.metric, value, _over(definition, window, kind)),
+        limits.sentence(requirement.metric, value, _format_window(definition, window, kind)),
     )
 
 
-def _meant(requirement: Requirement, items: Sequence[Definition]) -> Definition:
+def _intended_definition(requirement: Requirement, items: Sequence[Definition]) -> Definition:
     """Return the definition in whose dimension the bounds are: without a curve nothing else tells angle from length."""
     return next((item for item in items if not list(_bound_faults(requirement, (item.dimension,)))), items[0])
 
@@ -322,7 +322,7 @@ def _values(name: str, definition: Definition, view: Survey | None, result: Resu
     return (Value(None, result.message),) if view is None else view.each(definition, split_name(name)[1])
 
 
-def _over(definition: Definition, window: Window | None, kind: Kind) -> str:
+def _format_window(definition: Definition, window: Window | None, kind: Kind) -> str:
     if not definition.windowed:
         return ""
     return f" over {span_text(window.lo, window.hi, kind)}" if window else " over the full travel"

@@ -53,7 +53,7 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     A place counts only if every state of the path at that place keeps them, so
     that a branch that folds back needs no sorting.
     """
-    curve, cycle = cycle.frame.curve, _levelled(cycle)
+    curve, cycle = cycle.frame.curve, _level_cycle(cycle)
     reference = cycle.frame.target if cycle.frame.has_target() else _mean(cycle)
     assert reference is not None
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
@@ -71,7 +71,7 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
 
 
-def _levelled(cycle: Cycle) -> Cycle:
+def _level_cycle(cycle: Cycle) -> Cycle:
     """Return a cycle that follows a curve as one that is to be level: its offsets from it, on its largest effort."""
     curve = cycle.frame.curve
     if curve is None:
@@ -160,10 +160,10 @@ def _bad_on_way(
         motion, effort = path.states(ways)
         return np.asarray((effort if curve is None else effort - curve.at(motion) + reference) / reference - 1)
 
-    bad = winding_branches.broken(path, lambda ways: above(ways) - band)
-    bad += winding_branches.broken(path, lambda ways: -band - above(ways))
+    bad = winding_branches.list_broken_intervals(path, lambda ways: above(ways) - band)
+    bad += winding_branches.list_broken_intervals(path, lambda ways: -band - above(ways))
     if allowed is not None:
-        bad += winding_branches.broken(path, lambda ways: path.stress(ways) / allowed - (1 + ROUNDING))
+        bad += winding_branches.list_broken_intervals(path, lambda ways: path.stress(ways) / allowed - (1 + ROUNDING))
     return bad
 
 

@@ -39,7 +39,7 @@ def reach(path: WindingPath) -> Interval:
     return float(motion.min()), float(motion.max())
 
 
-def inside(path: WindingPath, low: float, high: float) -> FloatArray:
+def places_inside(path: WindingPath, low: float, high: float) -> FloatArray:
     """Return the places `ways` of a path with those where its motion enters and leaves a window, increasing."""
     ways = path.ways
     motion, found = path.states(ways)[0], [ways]
@@ -58,7 +58,7 @@ def inside(path: WindingPath, low: float, high: float) -> FloatArray:
 
 def mean(path: WindingPath, low: float, high: float) -> float:
     """Return the mean effort over the way in a window, each bit of motion counted in whichever direction it goes."""
-    ways = inside(path, low, high)
+    ways = places_inside(path, low, high)
     middle, half = 0.5 * (ways[1:] + ways[:-1]), 0.5 * (ways[1:] - ways[:-1])
     motion, effort = path.states(middle[:, None] + half[:, None] * _NODES)
     centre = 0.5 * (motion[:, 0] + motion[:, -1])
@@ -69,22 +69,22 @@ def mean(path: WindingPath, low: float, high: float) -> float:
 
 def extremes(path: WindingPath, low: float, high: float) -> tuple[float, float]:
     """Return the largest and the smallest effort in a window."""
-    return _largest_and_smallest(path, low, high, path.states(inside(path, low, high))[1])
+    return _largest_and_smallest(path, low, high, path.states(places_inside(path, low, high))[1])
 
 
 def stress_extremes(path: WindingPath, low: float, high: float) -> tuple[float, float]:
     """Return the largest and the smallest stress in a window [Pa]."""
-    return _largest_and_smallest(path, low, high, path.stress(inside(path, low, high)))
+    return _largest_and_smallest(path, low, high, path.stress(places_inside(path, low, high)))
 
 
 def _largest_and_smallest(path: WindingPath, low: float, high: float, values: FloatArray) -> tuple[float, float]:
-    motion = path.states(inside(path, low, high))[0]
+    motion = path.states(places_inside(path, low, high))[0]
     slack = 1e-9 * float(np.ptp(motion))
     kept = values[(motion >= low - slack) & (motion <= high + slack)]
     return float(kept.max()), float(kept.min())
 
 
-def broken(path: WindingPath, height: Callable[[FloatArray], FloatArray]) -> list[Interval]:
+def list_broken_intervals(path: WindingPath, height: Callable[[FloatArray], FloatArray]) -> list[Interval]:
     """Return the intervals of the motion over which a height, of places of the way, is positive or no number."""
     ways = path.ways
     bad = ~(height(ways) <= 0)

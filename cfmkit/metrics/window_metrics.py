@@ -59,20 +59,20 @@ def smallest(branch: Branch) -> float:
 
 def ripple(branch: Branch) -> float:
     """Return (max - min) / max."""
-    return _known(spread.ripple(branch.spread), branch)
+    return _require_value(spread.ripple(branch.spread), branch)
 
 
 def half_band(branch: Branch) -> float:
     """Return (max - min) / (max + min)."""
-    return _known(spread.half_band(branch.spread), branch)
+    return _require_value(spread.half_band(branch.spread), branch)
 
 
 def deviation_from_mean(branch: Branch) -> float:
     """Return the largest ``|F - mean| / mean``."""
-    return _known(spread.deviation_from_mean(branch.spread), branch)
+    return _require_value(spread.deviation_from_mean(branch.spread), branch)
 
 
-def _known(share: float, branch: Branch) -> float:
+def _require_value(share: float, branch: Branch) -> float:
     if isnan(share):
         raise Undefined(branch.vanishes)
     return float(share)

@@ -56,7 +56,7 @@ class CoarseDataError(GeometryError):
         return type(self), (str(self), self.index)
 
 
-def checked(points: FloatArray, tangents: FloatArray, tolerance: float) -> tuple[ComplexArray, ComplexArray]:
+def check_samples(points: FloatArray, tangents: FloatArray, tolerance: float) -> tuple[ComplexArray, ComplexArray]:
     """Return the samples as complex numbers once they are known to run along a curve."""
     if len(points) < 2 or not tolerance > 0:
         raise ValueError("a fit needs two samples or more and a tolerance above zero")
@@ -244,7 +244,7 @@ class _Curve:
     @classmethod
     def of(cls, points: FloatArray, tangents: FloatArray, limits: tuple[float, float], stride: int) -> _Curve:
         tolerance = limits[0]
-        z, t = checked(points, tangents, tolerance)
+        z, t = check_samples(points, tangents, tolerance)
         unsure = doubt(z, t)
         worst = int(np.argmax(unsure))
         if unsure[worst] > tolerance / 2:
@@ -305,7 +305,7 @@ class _Curve:
         for spread in (True, False):
             for share in 0.9 ** np.arange(_TRIES):
                 forward, backward = self.swept(share)
-                yield _balanced(forward, backward, self.arclength) if spread else forward
+                yield _balance_knots(forward, backward, self.arclength) if spread else forward
 
     def swept(self, share: float) -> tuple[list[int], list[int]]:
         """Return the knots of the longest pieces that use `share` of the tolerance, from the start and from the end."""
@@ -351,7 +351,7 @@ class _Curve:
         return ArcChain(np.array(nodes), np.array(bulges))
 
 
-def _balanced(forward: list[int], backward: list[int], arclength: FloatArray) -> list[int]:
+def _balance_knots(forward: list[int], backward: list[int], arclength: FloatArray) -> list[int]:
     """Return knots between the latest (`forward`) and the earliest (`backward`) possible ones, spread evenly.
 
     Rounding to a sample goes towards the middle of the curve where it is a tie, so that

@@ -78,7 +78,7 @@ def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) 
     return found
 
 
-def resolved(
+def resolve_panels(
     functions: Callable[[FloatArray], FloatArray], ends: FloatArray, close: Sequence[float], halvings: int
 ) -> tuple[ChebyshevPanels, ...]:
     """Return functions as panels, each halved until the polynomials of all functions have converged on it.

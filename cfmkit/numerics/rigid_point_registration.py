@@ -109,7 +109,7 @@ class Registration:
         return direction, float(np.sqrt(max(values[-1], 0.0)))
 
 
-def turned(points: FloatArray, angle: float, shift: FloatArray) -> FloatArray:
+def turn_points(points: FloatArray, angle: float, shift: FloatArray) -> FloatArray:
     """Return R(angle) p + shift for points (n, 2)."""
     c, s = math.cos(angle), math.sin(angle)
     moved: FloatArray = points @ np.array([[c, s], [-s, c]]) + shift
@@ -176,12 +176,12 @@ def register(
     guess: list[FloatArray | None] = [None] * len(points)
     for weighted in (False, True) if robust else (False,):
         for _ in range(_STEPS):
-            moved = [turned(item, state[0], state[1:3]) for item in points]
+            moved = [turn_points(item, state[0], state[1:3]) for item in points]
             found = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
             guess = [*found]
             rows, residuals, weights = _equations(curves, moved, found, weighted, state[3])
             step = _step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
-            state[:3] = _composed(state[:3], step[:3])
+            state[:3] = _compose_motions(state[:3], step[:3])
             state[3] += step[3] if width else 0.0
             if np.abs(step[:3] * [size, 1.0, 1.0]).max() <= 1e-14 * size:
                 break
@@ -232,7 +232,7 @@ def _equations(
     residuals = _dot(points - np.concatenate([item.points for item in frames]), normals)
     lever = normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1]
     rows = np.column_stack([lever, normals, -np.ones(len(normals))])
-    inside = np.concatenate([_inside(curve, u) for curve, u in zip(curves, parameters, strict=True)])
+    inside = np.concatenate([_find_inside(curve, u) for curve, u in zip(curves, parameters, strict=True)])
     weights = inside.astype(float)
     if weighted:
         weights *= _trust(residuals - width, inside, [len(item) for item in moved])
@@ -246,7 +246,7 @@ def _trust(residuals: FloatArray, inside: Any, counts: Sequence[int]) -> FloatAr
     return np.concatenate([tukey(part, robust_scale(part[good])) for part, good in parts])
 
 
-def _inside(curve: SmoothCurve, u: FloatArray) -> Any:
+def _find_inside(curve: SmoothCurve, u: FloatArray) -> Any:
     low, high = curve.ends
     margin = 1e-12 * (high - low)
     return (u > low + margin) & (u < high - margin)
@@ -260,15 +260,15 @@ def _step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: fl
     return step
 
 
-def _composed(state: FloatArray, step: FloatArray) -> FloatArray:
+def _compose_motions(state: FloatArray, step: FloatArray) -> FloatArray:
     """Return the motion followed by a further one."""
-    return np.array([state[0] + step[0], *turned(state[None, 1:], step[0], step[1:])[0]])
+    return np.array([state[0] + step[0], *turn_points(state[None, 1:], step[0], step[1:])[0]])
 
 
 def _registration(
     state: FloatArray, points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool, width: bool
 ) -> Registration:
-    moved = [turned(item, state[0], state[1:3]) for item in points]
+    moved = [turn_points(item, state[0], state[1:3]) for item in points]
     found = [feet(curve, item) for curve, item in zip(curves, moved, strict=True)]
     rows, residuals, weights = _equations(curves, moved, found, robust, state[3])
     rows = rows[:, : 4 if width else 3]

@@ -61,13 +61,13 @@ def smoothed(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFu
         raise ValueError(f"at least {FEWEST} points in increasing order are needed")
     low, high = float(places[0]), float(places[-1])
     unit = (high - low) / (len(places) - 1)
-    spline = _chosen((places - low) / unit, values, noise)
+    spline = _choose_spline((places - low) / unit, values, noise)
     moved = BSpline(spline.t * unit + low, spline.c, spline.k)
     residual = float(np.sqrt(np.mean((moved(places) - values) ** 2)))
     return SmoothedFunction(moved, residual, low, high)
 
 
-def _chosen(x: FloatArray, values: FloatArray, noise: float) -> Any:
+def _choose_spline(x: FloatArray, values: FloatArray, noise: float) -> Any:
     """Return the spline in units of the spacing."""
     from scipy.interpolate import make_interp_spline, make_smoothing_spline
 

@@ -115,7 +115,7 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     try:
         if memory.at(z) is None:
             return memory.optimum(z, None, SearchEnding.NO_ANSWER)
-        last, ending = _solved(memory, z, bounds)
+        last, ending = _run_solver(memory, z, bounds)
         if effort.last:
             answer = memory.at(last)
             return memory.optimum(last, answer, ending if answer is not None else SearchEnding.STUCK)
@@ -127,7 +127,7 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     return memory.optimum(z, best, ending)
 
 
-def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[FloatArray, SearchEnding]:
+def _run_solver(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[FloatArray, SearchEnding]:
     """Run the solver; return where it ends and why. Its answers are in the memory."""
     from scipy.optimize import minimize as slsqp
 

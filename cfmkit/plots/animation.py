@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import UsageError
-from cfmkit.plots.style import GREY, LINES, NORMAL, TROUBLE, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, LINES, NORMAL, TROUBLE, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import border_unit, to_border
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ MILLISECONDS = 90
 """Of each frame: 11 a second, so that there and back takes three seconds."""
 
 
-@styled
+@apply_style
 def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     """Return the frames of one way, each (height, width, 3): the mechanism on the left, a cursor in the curve."""
     figure = new_figure(WIDTH, HEIGHT)

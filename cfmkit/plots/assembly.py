@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.parts import PLATE, STEEL, mm
-from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, apply_style, axes_mm, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -38,7 +38,7 @@ LETTERS_PER_LINE = 50
 """Of the parts list."""
 
 
-@styled
+@apply_style
 def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[ListedPart], pose: int) -> Figure:
     """Return the picture of an assembly.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, is_plain, size_mm, styled
+from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, apply_style, has_titles, is_plain, size_mm
 from cfmkit.plots.tick_numbers import WholeNumbers, brief
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
@@ -100,7 +100,7 @@ class Heading:
         return 12.0 if self.note else 8.0
 
 
-@styled
+@apply_style
 def write_heading(figure: Figure, heading: Heading) -> None:
     """Write a heading at the top left, each part on one line: names that are too long are cut, the subject is not."""
     titles = has_titles()
@@ -136,7 +136,7 @@ def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: di
         text.set_fontsize(look["size"] * min(1.0, room / extent))
 
 
-@styled
+@apply_style
 def color_key(ax: Axes, entries: Sequence[tuple[str, str]]) -> None:
     """Write texts in their colours above axes side by side, on as many lines as the width of the print demands."""
     points = 72.0 / ax.figure.dpi
@@ -172,7 +172,7 @@ def plain_ticks(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-@styled
+@apply_style
 def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> None:
     """Write a small grey remark at a place in fractions of the axes."""
     if is_plain():
@@ -181,7 +181,7 @@ def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> N
     ax.text(*place, text, **look)
 
 
-@styled
+@apply_style
 def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> None:
     """Add an axis at the top for another quantity that grows with the lower one.
 
@@ -210,7 +210,7 @@ def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> No
     top.grid(False)
 
 
-@styled
+@apply_style
 def right_axis(ax: Axes, factor: float, label: str, at_zero: float = 0.0) -> None:
     """Add an axis at the right for `at_zero` plus `factor` times the left quantity, in border units."""
     right = ax.twinx()

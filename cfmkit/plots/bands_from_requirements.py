@@ -83,7 +83,7 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     elif outcome.max is None:
         return None
     elif rule is None:
-        bounds = _about(result.target, outcome.max)
+        bounds = _band_about_target(result.target, outcome.max)
     else:
         bounds, worst = _worst(chosen, rule, outcome.max)
     if bounds is None:
@@ -102,7 +102,7 @@ def _half_band(spread: Spread, limit: float) -> tuple[float, float, float]:
     return (1.0 - limit) * middle, (1.0 + limit) * middle, (spread.max - spread.min) / spread.max
 
 
-def _about_mean(spread: Spread, limit: float) -> tuple[float, float, float]:
+def _band_about_mean(spread: Spread, limit: float) -> tuple[float, float, float]:
     away = max(spread.max - spread.mean, spread.mean - spread.min) / spread.mean
     return (1.0 - limit) * spread.mean, (1.0 + limit) * spread.mean, away
 
@@ -117,7 +117,7 @@ _KINDS = {
 }
 """Metrics that are bands, and what they are called on a picture."""
 
-_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _about_mean}
+_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
 """Bounds of the band, and what ranks the branches."""
 
 
@@ -140,7 +140,7 @@ def _worst(
     return (low, high), name
 
 
-def _about(target: float | None, limit: float) -> Bounds | None:
+def _band_about_target(target: float | None, limit: float) -> Bounds | None:
     """Return the band about the target; it is there even where the curve does not reach."""
     if not target:
         return None

@@ -15,7 +15,7 @@ from cfmkit.metrics.metric_values import window_of
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, write_heading
 from cfmkit.plots.bands_from_requirements import bands_of
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.style import GREY, axes_mm, is_plain, new_figure, styled
+from cfmkit.plots.style import GREY, apply_style, axes_mm, is_plain, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ LEAST = 0.002
 """The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""
 
 
-@styled
+@apply_style
 def loop_figure(result: Result, look: CurveLook | None = None, subject: str = "") -> Figure:
     """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat.
 
@@ -54,7 +54,7 @@ def loop_figure(result: Result, look: CurveLook | None = None, subject: str = ""
     heading = Heading.of(result, subject or f"{curve.kind} over {curve.motion_name}")
     write_heading(figure, heading)
     room = 86.5 - heading.height_mm
-    detail = None if is_plain() else enlarged(result, look)
+    detail = None if is_plain() else choose_enlarged_range(result, look)
     if detail is None:
         plot_curve(result, axes_mm(figure, (17, 12, 138, room)), look)
         return figure
@@ -64,11 +64,11 @@ def loop_figure(result: Result, look: CurveLook | None = None, subject: str = ""
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)
     _frame_of_detail(upper, curve, detail)
-    plot_curve(result, lower, replace(look, window=(_across(upper, curve), detail[1])))
+    plot_curve(result, lower, replace(look, window=(_motion_range(upper, curve), detail[1])))
     return figure
 
 
-def _across(upper: Axes, curve: Curve) -> Interval:
+def _motion_range(upper: Axes, curve: Curve) -> Interval:
     """Return the motion that the upper panel shows, in SI."""
     from cfmkit.specs.units import from_border
 
@@ -76,7 +76,7 @@ def _across(upper: Axes, curve: Curve) -> Interval:
     return float(from_border(low, curve.motion_dimension)), float(from_border(high, curve.motion_dimension))
 
 
-def enlarged(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:
+def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:
     """Return motion and effort [SI] that deserve a panel of their own; None if the whole shows them well."""
     curve = result.curve
     bands = bands_of(result)

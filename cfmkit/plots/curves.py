@@ -18,8 +18,8 @@ from cfmkit.metrics import frame_of, window_of
 from cfmkit.plots.axis_labels_and_headings import axis_label, finite_range, shown_range, value_text
 from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, padded, shade
-from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, is_plain, overlay, size_mm, styled
+from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, pad_limits, shade
+from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, apply_style, is_plain, overlay, size_mm
 from cfmkit.results import Result
 from cfmkit.specs.units import to_border
 
@@ -72,7 +72,7 @@ class _Line:
     faint: bool = False
 
 
-@styled
+@apply_style
 def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLook | None = None) -> Axes:
     """Draw one or several curves on axes; return the axes.
 
@@ -146,7 +146,7 @@ def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
         names = curves[0].branches
         several = len(names) > 1
         return [_line(curves[0], name, LINES[i % len(LINES)], name if several else "") for i, name in enumerate(names)]
-    colors, named = _colors(len(curves)), _named(len(curves))
+    colors, named = _colors(len(curves)), _choose_named(len(curves))
     found = []
     for index, curve in enumerate(curves):
         first, *others = curve.branches
@@ -171,7 +171,7 @@ def _colors(count: int) -> list[str]:
     return [to_hex(colormaps["viridis"](share)) for share in np.linspace(0.0, 0.75, count)]
 
 
-def _named(count: int, most: int = 7) -> set[int]:
+def _choose_named(count: int, most: int = 7) -> set[int]:
     """Return which of many curves are named: the first, the last and some between."""
     return set(np.unique(np.linspace(0, count - 1, min(count, most)).astype(int)).tolist())
 
@@ -230,11 +230,11 @@ def _limit(ax: Axes, drawn: tuple[list[_Line], Sequence[Band]], look: CurveLook,
     marks = [*bounds, *(item.value for item in look.levels)]
     across = finite_range([*points[:, 0], *to_border(np.array(ends), motion)])
     up = finite_range([0.0, *(shown_range(points[:, 1]) or ()), *to_border(np.array(marks), kind)])
-    ax.set_xlim(*padded(across or (0.0, 1.0), 0.0, 0.02))
+    ax.set_xlim(*pad_limits(across or (0.0, 1.0), 0.0, 0.02))
     if not np.isfinite(points[:, 1]).any():
         ax.text(0.5, 0.5, "no point has a finite value", transform=ax.transAxes, ha="center", color=TROUBLE)
     low, high = up or (0.0, 1.0)
-    ax.set_ylim(*padded((low, high), 0.0 if low == 0 else 0.08, 0.14 if high else 0.0))
+    ax.set_ylim(*pad_limits((low, high), 0.0 if low == 0 else 0.08, 0.14 if high else 0.0))
 
 
 def _draw_band(ax: Axes, band: Band, curve: Curve) -> Label:

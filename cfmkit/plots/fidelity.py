@@ -10,8 +10,8 @@ import numpy as np
 from cfmkit.plots.axis_labels_and_headings import axis_label, remark, shown_range, write_heading
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.stacked_line_diagrams import padded
-from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
+from cfmkit.plots.stacked_line_diagrams import pad_limits
+from cfmkit.plots.style import GREY, LINES, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Gap:
     values: FloatArray
 
 
-@styled
+@apply_style
 def fidelity_figure(heading: Heading, curves: Sequence[Curve], gaps: Sequence[Gap]) -> Figure:
     """Return curves overlaid, and the differences from the finest below.
 
@@ -71,7 +71,7 @@ def _draw_gaps(ax: Axes, curves: Sequence[Curve], gaps: Sequence[Gap]) -> None:
         shown += list(shown_range(points[:, 1]) or ())
         labels += [Label(gap.name, color, points, prefer=0.5)] if gap.name and np.isfinite(points).any() else []
     ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
-    ax.set_ylim(*padded((min(shown), max(shown)), 0.15, 0.25))
+    ax.set_ylim(*pad_limits((min(shown), max(shown)), 0.15, 0.25))
     ax.set_xlabel(axis_label(curves[0].motion_name, motion))
     ax.set_ylabel(axis_label("difference", kind))
     if not labels:

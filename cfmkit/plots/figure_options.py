@@ -59,11 +59,11 @@ class FigureForm:
     def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
         """Yield a figure's files as (name, content), below ``figures/``."""
         from cfmkit.plots.style import with_settings
-        from cfmkit.plots.vector_formats import written
+        from cfmkit.plots.vector_formats import write_figure
 
         for kind in self.formats:
             with with_settings(self.settings, self.titles, self.plain):
-                content = written(figure, kind)
+                content = write_figure(figure, kind)
             yield f"figures/{stem}.{kind}", content
 
     def files(self, makers: Mapping[str, Callable[[], Figure]]) -> Iterator[tuple[str, bytes]]:
@@ -162,14 +162,14 @@ def settings(path: str) -> tuple[tuple[str, Any], ...]:
     cfmkit.errors.UsageError
         If it cannot be read, or says something that matplotlib does not know or that is not a file's to change.
     """
-    found = _read(path)
+    found = _read_style(path)
     for name in found:
         if name.startswith(FIXED):
             raise UsageError(f"--figure-style: {visible(path)}: {name} is not a style file's to change")
     return tuple(sorted(found.items()))
 
 
-def _read(path: str) -> dict[str, Any]:
+def _read_style(path: str) -> dict[str, Any]:
     """Return what a style file says; matplotlib tells of its faults in its log."""
     import logging
     import warnings

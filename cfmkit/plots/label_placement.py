@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.style import SMALL, styled
+from cfmkit.plots.style import SMALL, apply_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ class Label:
     halo: bool = True  # whether to clear the background behind the name
 
 
-@styled
+@apply_style
 def place_labels(ax: Axes, labels: list[Label], size: float = SMALL) -> list[Text]:
     """Write names on axes whose limits are final; return the texts.
 
@@ -95,7 +95,7 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
     if not label.text:
         return None
     points = ground.to_points(label.points)
-    points = _thinned(points[ground.inside(points)])
+    points = _thin_points(points[ground.inside(points)])
     if not len(points):
         return None
     text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
@@ -143,7 +143,7 @@ def _in_two_lines(text: str) -> str:
     return f"{text[:middle]}\n{text[middle + 1 :]}"
 
 
-def _thinned(points: FloatArray, most: int = 80) -> FloatArray:
+def _thin_points(points: FloatArray, most: int = 80) -> FloatArray:
     if len(points) <= most:
         return points
     thinned: FloatArray = points[np.linspace(0, len(points) - 1, most).astype(int)]
@@ -154,7 +154,7 @@ def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]
     """Return at which points [pt] another named line is so near that a name there would be taken for that of either."""
     found = np.zeros(len(points), dtype=bool)
     for line in others:
-        away = points[:, None, :] - _thinned(line, 200)[None, :, :]
+        away = points[:, None, :] - _thin_points(line, 200)[None, :, :]
         found |= (np.hypot(away[..., 0], away[..., 1]) < APART).any(axis=1)
     return found
 
@@ -183,7 +183,7 @@ def _best(
         wanted = np.array(label.toward) / np.hypot(*label.toward)
         unit = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
         cost = cost + np.tile(25.0 * (1.0 - unit @ wanted), len(points))
-    cost = cost + _between(ground, centers, box, np.repeat(points, len(offsets), axis=0))
+    cost = cost + _cost_between(ground, centers, box, np.repeat(points, len(offsets), axis=0))
     cost = cost + TOGETHER * np.repeat(together, len(offsets))
     cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
     cheapest = int(np.argmin(cost))
@@ -206,7 +206,7 @@ def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     return np.concatenate([sides, corners]), np.concatenate([gaps, upright])
 
 
-def _between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
+def _cost_between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
     """Return what it costs that something lies between boxes and their anchors (n, 2) [pt]."""
     starts = _edges(centers, box, anchors)
     way = anchors - starts

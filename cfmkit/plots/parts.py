@@ -16,7 +16,7 @@ from cfmkit.export.posed_part import arc
 from cfmkit.export.posed_part import box as box_of
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.label_placement import Label
-from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def mm(values: Any) -> FloatArray:
     return array
 
 
-@styled
+@apply_style
 def plate(ax: Axes, outlines: Iterable[FloatArray], gid: str = "plate") -> None:
     """Draw a plate from closed outlines (n, 2); one that runs clockwise is a hole."""
     from matplotlib.patches import PathPatch
@@ -66,14 +66,14 @@ def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
     ax.add_artist(Line2D(x, y, **look))
 
 
-@styled
+@apply_style
 def edge(ax: Axes, points: FloatArray, gid: str, **options: Any) -> None:
     """Draw a chain of points (n, 2) as a line: a flank, a path."""
     look: dict[str, Any] = {"color": INK, "linewidth": 0.9, "zorder": 1.6} | options
     _line(ax, *mm(points).T, gid=gid, **look)
 
 
-@styled
+@apply_style
 def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: bool = False) -> None:
     """Draw a roller with its axis; a ghost is a dashed outline, for another place of the same roller."""
     from matplotlib.patches import Circle
@@ -86,7 +86,7 @@ def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: b
     _line(ax, [x], [y], marker="o", markersize=2.2, color=GREY if ghost else INK, zorder=4)
 
 
-@styled
+@apply_style
 def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     """Draw a rigid link between two pins."""
     _line(
@@ -95,7 +95,7 @@ def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     )  # fmt: skip
 
 
-@styled
+@apply_style
 def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring", coils: int = 12) -> None:
     """Draw a tension spring as a zigzag of some width between two pins, straight at its ends."""
     a, b = np.array(start, dtype=float), np.array(end, dtype=float)
@@ -109,7 +109,7 @@ def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring"
     _line(ax, *mm(points).T, color=OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
-@styled
+@apply_style
 def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
     """Draw a square block that slides along a guide."""
     from matplotlib.patches import Rectangle
@@ -119,13 +119,13 @@ def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
     ax.add_artist(Rectangle(corner, side, side, facecolor=LINK, edgecolor=INK, linewidth=0.6, zorder=3.4, gid=gid))
 
 
-@styled
+@apply_style
 def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:
     """Draw the vertical axis x = 0 as a dash-dotted line."""
     _line(ax, [0.0, 0.0], mm([low, high]), color=GREY, linewidth=0.6, dashes=(9, 2.5, 1.5, 2.5), zorder=1.1, gid="axis")
 
 
-@styled
+@apply_style
 def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
     """Draw a force from `tail` to `tip`."""
     look = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 1.4, "mutation_scale": 10}
@@ -133,7 +133,7 @@ def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
     arrow.set(zorder=3.5, gid=gid, annotation_clip=False)
 
 
-@styled
+@apply_style
 def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
     """Fill an outline (n, 2) [m]; the limits of the axes do not follow it.
 
@@ -146,7 +146,7 @@ def area(ax: Axes, outline: Any, gid: str, **options: Any) -> None:
     ax.add_artist(Polygon(mm(outline), closed=True, gid=gid, **look))
 
 
-@styled
+@apply_style
 def bodies(ax: Axes, shown: Sequence[PosedBody], pose: int, colors: Mapping[str, str]) -> None:
     """Draw bodies in a pose: in their colours by name, rigid ones without a colour as one plate."""
     rigid = [body.outline(pose) for body in shown if body.name not in colors]
@@ -167,7 +167,7 @@ def box_around(shown: Iterable[PosedBody], margins: tuple[float, float, float, f
     return (left - a, bottom - b, right + c, top + d), unit
 
 
-@styled
+@apply_style
 def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     """Mark a point of contact."""
     x, y = mm(point)
@@ -176,7 +176,7 @@ def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     )
 
 
-@styled
+@apply_style
 def to_scale(ax: Axes, box: Box) -> None:
     """Show the box (left, bottom, right, top) [m] with one scale in both directions and no grid."""
     left, bottom, right, top = mm(box)
@@ -195,7 +195,7 @@ def _round_below(value: float) -> float:
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1 + 1e-12)))
 
 
-@styled
+@apply_style
 def close_up(ax: Axes, center: Point, half_width: float) -> None:
     """Fill the axes with what surrounds a point [m], one scale in both directions."""
     room = ax.get_window_extent()
@@ -205,7 +205,7 @@ def close_up(ax: Axes, center: Point, half_width: float) -> None:
     ax.locator_params("x", nbins=4 if abs(center[0]) < 100.0 * half_width else 2)
 
 
-@styled
+@apply_style
 def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], stacked: bool = False) -> list[Axes]:
     """Return titled axes of equal size, spread over the width of the figure or `stacked` from top to bottom.
 
@@ -222,7 +222,7 @@ def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], 
     return found
 
 
-@styled
+@apply_style
 def poses(heading: Heading, box: Box, titles: Sequence[str]) -> tuple[Figure, list[Axes]]:
     """Return a figure with a titled panel for each of up to three poses, all showing one box [m] to scale."""
     slender = (box[3] - box[1]) / (box[2] - box[0])

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cfmkit.plots.style import axes_mm, new_figure, styled
+from cfmkit.plots.style import apply_style, axes_mm, new_figure
 from cfmkit.plots.vector_formats import inline, svg
 
 if TYPE_CHECKING:
@@ -46,12 +46,12 @@ class Moving:
     draw_as_made: Callable[[Axes, int], Any] | None = None
 
 
-def chosen(count: int, poses: int = POSES) -> FloatArray:
+def choose_poses(count: int, poses: int = POSES) -> FloatArray:
     """Return which of so many points of a curve are shown as poses: evenly, the ends included."""
     return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
 
 
-@styled
+@apply_style
 def film(moving: Moving, title: str) -> str:
     """Return all poses as one SVG for a page: each in groups of the class ``pose`` with its number in ``data-pose``.
 
@@ -62,16 +62,16 @@ def film(moving: Moving, title: str) -> str:
     title : str
         What a screen reader says about it.
     """
-    return _merged(poses(moving, range(len(moving.motion))), title)
+    return _merge_poses(poses(moving, range(len(moving.motion))), title)
 
 
-@styled
+@apply_style
 def still(moving: Moving, number: int, title: str) -> str:
     """Return one pose as SVG for a page."""
-    return _merged(poses(moving, (number,)), title)
+    return _merge_poses(poses(moving, (number,)), title)
 
 
-@styled
+@apply_style
 def poses(moving: Moving, numbers: Iterable[int]) -> list[ElementTree.Element]:
     """Return poses as SVG, all drawn on the same axes: to make axes takes as long as to draw on them."""
     left, bottom, right, top = moving.box
@@ -89,7 +89,7 @@ def poses(moving: Moving, numbers: Iterable[int]) -> list[ElementTree.Element]:
     return drawn
 
 
-def _merged(poses: Sequence[ElementTree.Element], title: str) -> str:
+def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
     """Return poses as one: runs of what differs between pieces that all of them have, in the order of drawing."""
     ElementTree.register_namespace("", _SVG)
     ElementTree.register_namespace("xlink", _LINK)
@@ -107,7 +107,7 @@ def _merged(poses: Sequence[ElementTree.Element], title: str) -> str:
         body += [] if anchor is None else [anchor]
     shared: dict[str, str] = {}
     for pose in poses:
-        shared |= {_named(piece): _plain(piece) for piece in pose.iter() if piece.get("id") and _is_shared(piece)}
+        shared |= {_name_group(piece): _plain(piece) for piece in pose.iter() if piece.get("id") and _is_shared(piece)}
     box = poses[0].get("viewBox", "")
     return (
         f'<svg xmlns="{_SVG}" xmlns:xlink="{_LINK}" viewBox="{box}" role="img" aria-label={quoteattr(title)}>'
@@ -124,10 +124,10 @@ def _pieces(pose: ElementTree.Element) -> list[ElementTree.Element]:
 
 def _is_shared(piece: ElementTree.Element) -> bool:
     """Return whether a piece is a definition: a marker, or where something is cut off."""
-    return piece.tag == f"{{{_SVG}}}clipPath" or (piece.tag == f"{{{_SVG}}}path" and "m" in _named(piece)[5:6])
+    return piece.tag == f"{{{_SVG}}}clipPath" or (piece.tag == f"{{{_SVG}}}path" and "m" in _name_group(piece)[5:6])
 
 
-def _named(piece: ElementTree.Element) -> str:
+def _name_group(piece: ElementTree.Element) -> str:
     return piece.get("id", "")
 
 

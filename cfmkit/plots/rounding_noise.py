@@ -20,7 +20,7 @@ def is_level(values: FloatArray) -> bool:
     return not len(known) or bool(np.ptp(known) <= ROUNDING * np.abs(known).max())
 
 
-def levelled(values: FloatArray) -> FloatArray:
+def remove_rounding(values: FloatArray) -> FloatArray:
     """Return values; those that differ by rounding only are all the same.
 
     Examples

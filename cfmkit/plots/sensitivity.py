@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, metric_label, metric_values, write_heading
-from cfmkit.plots.rounding_noise import is_level, levelled
+from cfmkit.plots.rounding_noise import is_level, remove_rounding
 from cfmkit.plots.style import (
     BAND,
     BLUE,
@@ -24,12 +24,12 @@ from cfmkit.plots.style import (
     SMALL,
     TROUBLE,
     VERMILLION,
+    apply_style,
     axes_mm,
     has_titles,
     is_plain,
     new_figure,
     size_mm,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def _head(figure: Figure, title: str) -> None:
     write_heading(figure, Heading(name, subject) if name else Heading(subject, "all parameters"))
 
 
-@styled
+@apply_style
 def draw_histogram(found: Findings, number: int) -> Figure:
     """Return how one metric scatters over the parts that were drawn."""
     setup = found.setup
@@ -212,7 +212,7 @@ def _lines(found: Findings, metric: str, index: str) -> list[IndexLine]:
     return [line for line in found.lines if (line.metric, line.index) == (metric, index)]
 
 
-def _ranked(lines: Sequence[IndexLine]) -> list[int]:
+def _rank_parameters(lines: Sequence[IndexLine]) -> list[int]:
     """Return the numbers of the parameters to draw, those that do most first; unstated ones lead."""
     sizes = [np.inf if line.value is None else abs(line.value) for line in lines]
     return sorted(range(len(lines)), key=lambda k: -sizes[k])[:MOST_SHOWN]
@@ -252,12 +252,12 @@ def _draw_bars(
             axes.plot((line.low, line.high), (row + shift,) * 2, color=INK, linewidth=1.0, marker="|", markersize=5)
 
 
-@styled
+@apply_style
 def draw_bars(found: Findings, number: int) -> Figure:
     """Return the indices of one metric as bars with their intervals."""
     metric, kinds = found.setup.study.metrics[number], BARS[found.setup.method]
     each = [_lines(found, metric.label, kind.index) for kind in kinds]
-    order = _ranked(each[0])
+    order = _rank_parameters(each[0])
     figure, axes = _bar_axes(len(order), _title(found, metric), len(kinds) > 1)
     height = 0.7 / len(kinds)
     for k, (kind, lines) in enumerate(zip(kinds, each, strict=True)):
@@ -269,11 +269,11 @@ def draw_bars(found: Findings, number: int) -> Figure:
     return figure
 
 
-@styled
+@apply_style
 def draw_gains(found: Findings) -> Figure:
     """Return what the yield gains if a tolerance is halved."""
     lines = _lines(found, "yield", "yield_gain_when_halved")
-    order = _ranked(lines)
+    order = _rank_parameters(lines)
     share = found.all_met
     stated = share is not None and share.value == share.value
     reported = f"yield {100 * share.value:.1f} %" if share is not None and stated else "yield not stated"
@@ -291,18 +291,18 @@ def _title(found: Findings, metric: Metric) -> str:
     return f"{found.setup.study.spec.name}: {metric.label.replace('_', ' ')}"
 
 
-@styled
+@apply_style
 def draw_oat(found: Findings, number: int) -> Figure:
     """Return one metric over each parameter's range, and what the ends of the range do."""
     metric, setup = found.setup.study.metrics[number], found.setup
     swings = _lines(found, metric.label, "swing")
-    order = _ranked(swings)
+    order = _rank_parameters(swings)
     room = max(60.0, _ROW * len(order) + 10.0)
     figure = new_figure(190, room + 24)
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
     _head(figure, _title(found, metric))
     every_output = np.empty((len(swings), 0)) if found.outputs is None else found.outputs[:, :, number]
-    shown = levelled(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
+    shown = remove_rounding(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
     nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
     bars.axvline(nominal, color=GREY, linewidth=0.8)
     for row, k in enumerate(order):
@@ -340,7 +340,7 @@ def _unit(metric: Metric) -> str:
     return metric_label(metric.name, metric.dimension)
 
 
-@styled
+@apply_style
 def draw_morris(found: Findings, number: int) -> Figure:
     """Return mean size and scatter of the effects: far right matters, high up is curved or interacts."""
     metric = found.setup.study.metrics[number]
@@ -349,7 +349,7 @@ def draw_morris(found: Findings, number: int) -> Figure:
     axes = axes_mm(figure, (20, 14, 84, 66))
     _head(figure, _title(found, metric))
     top, factor = 0.0, 100.0 if metric.dimension == "ratio" else 1.0
-    for row, k in enumerate(_ranked(sizes)):
+    for row, k in enumerate(_rank_parameters(sizes)):
         size, scatter = sizes[k], scatters[k]
         label = "\n".join(textwrap.wrap(short(size.parameter), 26))
         if size.value is None or scatter.value is None:
@@ -370,7 +370,7 @@ def draw_morris(found: Findings, number: int) -> Figure:
     return figure
 
 
-@styled
+@apply_style
 def draw_convergence(found: Findings, number: int) -> Figure:
     """Return the total order indices over the number of samples, with their intervals."""
     metric = found.setup.study.metrics[number]
@@ -378,7 +378,7 @@ def draw_convergence(found: Findings, number: int) -> Figure:
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (18, 14, 86, 66))
     _head(figure, f"{_title(found, metric)}, convergence")
-    order = [found.setup.paths[k] for k in _ranked(_lines(found, metric.label, "total_order"))]
+    order = [found.setup.paths[k] for k in _rank_parameters(_lines(found, metric.label, "total_order"))]
     for row, path in enumerate(order):
         own = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])
         if not len(own):

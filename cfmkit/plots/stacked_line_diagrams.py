@@ -16,7 +16,7 @@ from cfmkit.plots.axis_labels_and_headings import (
     write_heading,
 )
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.style import GREY, TROUBLE, axes_mm, is_plain, new_figure, styled
+from cfmkit.plots.style import GREY, TROUBLE, apply_style, axes_mm, is_plain, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Diagram:
     regions: Sequence[MarkedRange] = ()  # shaded parts of the horizontal axis
 
 
-@styled
+@apply_style
 def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
     """Draw a diagram on axes; return the axes."""
     if is_plain():
@@ -108,7 +108,7 @@ def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
     return ax
 
 
-@styled
+@apply_style
 def diagram_figure(heading: Heading, diagrams: Sequence[Diagram], top_mm: float = 0.0, right_mm: float = 5.0) -> Figure:
     """Return a figure of diagrams below each other, over one common axis.
 
@@ -136,7 +136,7 @@ def diagram_figure(heading: Heading, diagrams: Sequence[Diagram], top_mm: float 
 def _scale(diagram: Diagram, ax: Axes) -> None:
     ends = [value for region in diagram.regions for value in (region.start, region.stop)]
     across = finite_range(to_border(np.concatenate([diagram.over, ends]), diagram.x.dimension)) or (0.0, 1.0)
-    ax.set_xlim(*padded(across, 0.0, 0.02))
+    ax.set_xlim(*pad_limits(across, 0.0, 0.02))
     values = [np.asarray(item.values, dtype=float) for item in diagram.series]
     shown = (finite_range if diagram.y.log else shown_range)(np.concatenate(values))
     marks = [item.value for item in diagram.limits]
@@ -147,10 +147,10 @@ def _scale(diagram: Diagram, ax: Axes) -> None:
         plain_ticks(ax.yaxis)
         return
     low, high = (min(low, 0.0), max(high, 0.0)) if diagram.y.zero else (low, high)
-    ax.set_ylim(*padded((low, high), 0.0 if low == 0 else 0.08, 0.14))
+    ax.set_ylim(*pad_limits((low, high), 0.0 if low == 0 else 0.08, 0.14))
 
 
-def padded(ends: tuple[float, float], below: float, above: float) -> tuple[float, float]:
+def pad_limits(ends: tuple[float, float], below: float, above: float) -> tuple[float, float]:
     """Return limits with a margin below and above, as fractions of their distance; never empty."""
     width = ends[1] - ends[0]
     if width <= 0:

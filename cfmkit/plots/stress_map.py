@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.style import VERMILLION, axes_mm, color_bar, new_figure, styled
+from cfmkit.plots.style import VERMILLION, apply_style, axes_mm, color_bar, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -86,7 +86,7 @@ def stress_views(
     ]
 
 
-@styled
+@apply_style
 def stress_map_figure(result: Result, views: Sequence[StressView], subject: str) -> Figure:
     """Return a figure of parts at poses, coloured by stress in one scale, each with the place of its peak.
 
@@ -114,7 +114,7 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
     for number, view in enumerate(views):
         x, y = np.array([10.0, 16.0]) + step * (number if beside else len(views) - 1 - number)
         ax = axes_mm(figure, (x, y, width * scale, height * scale))
-        shades = _drawn(ax, view, moved[number], top)
+        shades = _draw_part(ax, view, moved[number], top)
         ax.set_xlim(1e3 * low[number][0], 1e3 * (low[number][0] + width))
         ax.set_ylim(1e3 * low[number][1], 1e3 * (low[number][1] + height))
         ax.set_aspect("equal", anchor="SW")
@@ -125,7 +125,7 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
     return figure
 
 
-def _drawn(ax: Axes, view: StressView, places: FloatArray, top: float) -> Any:
+def _draw_part(ax: Axes, view: StressView, places: FloatArray, top: float) -> Any:
     """Draw one part [mm] with its stress, 0 ... top [MPa]; return what a colour bar is made of."""
     from matplotlib.tri import Triangulation
 

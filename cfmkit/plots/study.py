@@ -15,8 +15,8 @@ from matplotlib.colors import to_hex
 
 from cfmkit.plots.axis_labels_and_headings import finite_range
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.rounding_noise import is_level, levelled
-from cfmkit.plots.stacked_line_diagrams import padded
+from cfmkit.plots.rounding_noise import is_level, remove_rounding
+from cfmkit.plots.stacked_line_diagrams import pad_limits
 from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.style import (
     BLUE,
@@ -25,11 +25,11 @@ from cfmkit.plots.style import (
     LINES,
     SMALL,
     VERMILLION,
+    apply_style,
     axes_mm,
     color_bar,
     is_plain,
     new_figure,
-    styled,
 )
 from cfmkit.plots.tick_numbers import digits_that_differ, widen
 
@@ -55,7 +55,7 @@ def fit_panels(found: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
     return len(found.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINES)
 
 
-@styled
+@apply_style
 def draw_panels(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return the curves of a study of two parameters; each panel has its own vertical scale."""
     first, second = found.varied
@@ -84,7 +84,7 @@ def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> No
         names.append(Label(second.text(line.parameter), color, np.column_stack([motion, effort]), prefer=0.6))
     efforts = np.concatenate([effort for line in lines for _, effort in line.branches.values()])
     low, high = finite_range(efforts) or (0.0, 1.0)
-    ax.set_ylim(*padded((min(low, 0.0), max(high, 0.0)), 0.05, 0.15))
+    ax.set_ylim(*pad_limits((min(low, 0.0), max(high, 0.0)), 0.05, 0.15))
     place_labels(ax, names)
 
 
@@ -129,7 +129,7 @@ def _stem(metric: DrawnScale) -> str:
     return metric.name.replace("[", "_").replace("]", "")
 
 
-@styled
+@apply_style
 def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return the curves of a study of one parameter, coloured by it."""
     from matplotlib import colormaps
@@ -198,14 +198,14 @@ def _clear_of_poles(axes: Axes, lines: Sequence[StudyCurve]) -> None:
     axes.set_ylim(max(low - room, efforts.min() - room), min(high + room, efforts.max() + room))
 
 
-@styled
+@apply_style
 def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over the only parameter."""
     figure = new_figure(120, 75 + HEAD)
     axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (20, 13, 94, 56))
     (parameter,) = found.varied
     order = np.argsort(parameter.values, kind="stable")
-    x, y = parameter.values[order], levelled(metric.values)[order]
+    x, y = parameter.values[order], remove_rounding(metric.values)[order]
     axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
     axes.set(xlabel=parameter.axis, ylabel="" if metric.words else metric.label)
@@ -213,7 +213,7 @@ def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
     ticks(axes.xaxis, parameter)
     ticks(axes.yaxis, metric)
     best = found.best
-    starred = best is not None and star(axes, parameter.values[best], levelled(metric.values)[best])
+    starred = best is not None and star(axes, parameter.values[best], remove_rounding(metric.values)[best])
     head(figure, found, f"{metric.plain} over {parameter.plain}", key_of(found, starred, not found.meets.all()))
     return figure
 
@@ -225,7 +225,7 @@ def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
     axes.set_xlim(ends[0], ends[-1])
 
 
-@styled
+@apply_style
 def draw_parallel(found: StudyMarks) -> Figure:
     """Return every point as a line over parallel axes, parameters then metrics, coloured by the first metric."""
     from matplotlib import colormaps
@@ -298,14 +298,14 @@ FINE = 80
 """Places along an axis that level lines are drawn through: about 1 mm of print apart, where no corner shows."""
 
 
-@styled
+@apply_style
 def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over two parameters: colours and level lines."""
     figure = new_figure(140, 100 + HEAD)
     axes = axes_mm(figure, (18, 14, 92, 80))
     down, across = found.varied
     up, along = _places(down, found.shape[0], found.shape[1]), _places(across, found.shape[1], 1)
-    values = levelled(metric.values).reshape(found.shape)[np.ix_(up.order, along.order)]
+    values = remove_rounding(metric.values).reshape(found.shape)[np.ix_(up.order, along.order)]
     meets = found.meets.reshape(found.shape)[np.ix_(up.order, along.order)]
     x, y = along.borders, up.borders
     axes.set_facecolor(EMPTY)
@@ -407,7 +407,7 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
     if min(values.shape) < 3 or up.words or across.words or not len(known):
         return
     low, high = float(known.min()), float(known.max())
-    levels = _between(low, high)
+    levels = _round_values_between(low, high)
     if is_level(known) or not len(levels):
         return
     x, y = across.positions, up.positions
@@ -426,7 +426,7 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
         label.set_path_effects(outline)
 
 
-def _between(low: float, high: float) -> FloatArray:
+def _round_values_between(low: float, high: float) -> FloatArray:
     """Return round values clearly between two: a line at the lowest or highest value would follow rounding."""
     from matplotlib.ticker import MaxNLocator
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, write_heading
-from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, is_plain, size_mm, styled
+from cfmkit.plots.style import GREY, SMALL, VERMILLION, apply_style, has_titles, is_plain, size_mm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +32,7 @@ HEAD = 12.0
 """Room at the top of a picture of a study for its heading and its key [mm]."""
 
 
-@styled
+@apply_style
 def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))

@@ -132,7 +132,7 @@ def style() -> Iterator[None]:
         _INSIDE.reset(mark)
 
 
-def styled(function: Callable[P, T]) -> Callable[P, T]:
+def apply_style(function: Callable[P, T]) -> Callable[P, T]:
     """Return a drawing function that works in our look, whoever calls it."""
 
     @wraps(function)
@@ -143,7 +143,7 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
     return inside
 
 
-@styled
+@apply_style
 def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     """Return an empty figure of a print size in millimetres, on the Agg canvas; in a layout, the one that it has."""
     layout = active_layout()
@@ -154,7 +154,7 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     return figure
 
 
-@styled
+@apply_style
 def new_axes() -> Axes:
     """Return axes that fill a new figure of `matplotlib.pyplot` (160 x 100 mm), which notebooks show."""
     from matplotlib import pyplot
@@ -198,7 +198,7 @@ def with_settings(
         yield
 
 
-@styled
+@apply_style
 def png(figure: Figure, dpi: float | None = None) -> bytes:
     """Return the figure as PNG: the same bytes for the same content and library versions."""
     dpi = float(matplotlib.rcParams["savefig.dpi"]) if dpi is None else dpi
@@ -208,12 +208,12 @@ def png(figure: Figure, dpi: float | None = None) -> bytes:
     try:
         canvas.draw()  # type: ignore[no-untyped-call]
         pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-        return _encoded(pixels[:, :, :3], dpi)
+        return _encode_png(pixels[:, :, :3], dpi)
     finally:
         figure.dpi = before
 
 
-def _encoded(rgb: NDArray[np.uint8], dpi: float) -> bytes:
+def _encode_png(rgb: NDArray[np.uint8], dpi: float) -> bytes:
     """Return pixels (height, width, 3) as PNG; half the time of matplotlib's own writer, and no metadata."""
     height, width, _ = rgb.shape
     rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # every row begins with its filter: 0, none
@@ -232,7 +232,7 @@ def _chunk(name: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
 
-@styled
+@apply_style
 def axes_mm(figure: Figure, box: tuple[float, float, float, float], **options: Any) -> Axes:
     """Return new axes in a box (left, bottom, width, height) [mm of print]."""
     width, height = size_mm(figure)
@@ -246,7 +246,7 @@ def axes_mm(figure: Figure, box: tuple[float, float, float, float], **options: A
     return axes
 
 
-@styled
+@apply_style
 def color_bar(shades: Any, axes: Axes, label: str = "", **options: Any) -> Colorbar:
     """Fill axes with the key of colours, whose ticks are written like those of every other axis."""
     bar = axes.figure.colorbar(shades, cax=axes, format=WholeNumbers(), **options)

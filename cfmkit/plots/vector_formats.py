@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 
-from cfmkit.plots.style import png, styled
+from cfmkit.plots.style import apply_style, png
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -28,10 +28,10 @@ _FONTS = "'DejaVu Sans', Verdana, Geneva, sans-serif"
 """Where the font of the figures is missing: those of nearly the same widths."""
 
 
-@styled
+@apply_style
 def svg(figure: Figure) -> bytes:
     """Return a figure as SVG, with its text as text."""
-    found = _written(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
+    found = _write(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
     text = found.decode().replace("'DejaVu Sans'", _FONTS)
     return _each_id_once(text).encode()
 
@@ -48,18 +48,18 @@ def _each_id_once(text: str) -> str:
     return re.sub(r' id="([^"]*)"', first, text)
 
 
-@styled
+@apply_style
 def pdf(figure: Figure) -> bytes:
     """Return a figure as PDF, with its fonts embedded."""
-    return _written(figure, "pdf", {"CreationDate": None})
+    return _write(figure, "pdf", {"CreationDate": None})
 
 
-def written(figure: Figure, kind: str) -> bytes:
+def write_figure(figure: Figure, kind: str) -> bytes:
     """Return a figure as a file of the kind ``png``, ``svg`` or ``pdf``."""
     return {"png": png, "svg": svg, "pdf": pdf}[kind](figure)
 
 
-def _written(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
+def _write(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
     into = io.BytesIO()
     with matplotlib.rc_context(_WRITERS):
         figure.savefig(into, format=kind, metadata=metadata)

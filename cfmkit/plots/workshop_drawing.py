@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.export.contours import UNCUT, Arc, DrawnDimension, Line, Smooth
 from cfmkit.export.layers import HELD
 from cfmkit.plots.parts import mm
-from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, apply_style, axes_mm, new_figure
 from cfmkit.stock.stock_series import SIZE_RTOL, screw_through
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class _Hole:
     diameter: float
 
 
-@styled
+@apply_style
 def drawing_figure(
     drawing: Drawing, title: str, tolerances: Sequence[str] = (), block: TitleBlock | None = None
 ) -> Figure:
@@ -352,30 +352,30 @@ def _words(
         _title_block(ax, block, title, ratio)
     rows = [*drawing.facts, ("sheet", _sheet(drawing, decimals)), ("scale", ratio)]
     y = PAPER[1] - 10.0
-    y = _written(ax, 4.0, y, title, NORMAL + 1.0, "bold") - 2.0
+    y = _write_text(ax, 4.0, y, title, NORMAL + 1.0, "bold") - 2.0
     for word, text in rows:
         ax.text(4.0, y, word, fontsize=SMALL, color=GREY, va="top")
-        y = _written(ax, 24.0, y, text) - 0.6
+        y = _write_text(ax, 24.0, y, text) - 0.6
     if found:
-        y = _written(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL)
+        y = _write_text(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL)
         for number, hole in enumerate(found[:MOST_HOLES], start=1):
             x, up, across = (length_in_words(size, decimals) for size in (hole.x, hole.y, hole.diameter))
             screw = screw_through(hole.diameter)
             fits = f" ({screw.name})" if screw and math.isclose(screw.hole, hole.diameter, rel_tol=SIZE_RTOL) else ""
-            y = _written(ax, 4.0, y, f"{number}   \u2300 {across}{fits}   x {x}, y {up}")
+            y = _write_text(ax, 4.0, y, f"{number}   \u2300 {across}{fits}   x {x}, y {up}")
         if len(found) > MOST_HOLES:
-            y = _written(ax, 4.0, y, f"and {len(found) - MOST_HOLES} more, in the DXF file")
+            y = _write_text(ax, 4.0, y, f"and {len(found) - MOST_HOLES} more, in the DXF file")
     for heading, lines in (
         ("tolerances", tolerances),
         ("notes", (*drawing.notes, *(one.message for one in drawing.warnings))),
     ):
         if lines:
-            y = _written(ax, 4.0, y - 2.0, heading, NORMAL)
+            y = _write_text(ax, 4.0, y - 2.0, heading, NORMAL)
             for line in lines:
                 if y < floor:
-                    _written(ax, 4.0, y, "more: in the page of the run")
+                    _write_text(ax, 4.0, y, "more: in the page of the run")
                     return
-                y = _written(ax, 4.0, y, line)
+                y = _write_text(ax, 4.0, y, line)
 
 
 def _title_block(ax: Axes, block: TitleBlock, title: str, ratio: str) -> None:
@@ -416,7 +416,7 @@ LETTERS = 0.235
 """Mean width of a letter [mm] in points of its size, measured on the font of the figures."""
 
 
-def _written(ax: Axes, x: float, y: float, text: str, size: float = SMALL, weight: str = "normal") -> float:
+def _write_text(ax: Axes, x: float, y: float, text: str, size: float = SMALL, weight: str = "normal") -> float:
     """Write a text, broken into lines that fit, and return where the next one begins [mm]."""
     import textwrap
 

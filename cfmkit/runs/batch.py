@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from cfmkit.arrays import Several, named
+from cfmkit.arrays import Several, shorten_values
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.metrics.compare import TOLERANCE
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
-from cfmkit.runs.run import FinishedRun, RunTask, Verb, analysed, designed, journal_of, long_run, spec_of
+from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, gone
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, list_gone
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ class BatchWork:
         try:
             entry = self._done(entry)
         except CfmError as error:
-            entry = _failed(entry, error)
+            entry = _failed_entry(entry, error)
         except Exception as error:
-            entry = replace(_failed(entry, error), bug="".join(traceback.format_exception(error)))
+            entry = replace(_failed_entry(entry, error), bug="".join(traceback.format_exception(error)))
         return replace(entry, seconds=time.perf_counter() - start)
 
     def refusal(self, job: BatchJob) -> Entry | None:
@@ -75,7 +75,7 @@ class BatchWork:
         try:
             spec_of(replace(self.common, spec=job.spec))
         except CfmError as error:
-            return _failed(Entry(job.spec, job.folder), error)
+            return _failed_entry(Entry(job.spec, job.folder), error)
         return None
 
     def _done(self, entry: Entry) -> Entry:
@@ -87,8 +87,8 @@ class BatchWork:
         try:
             outcome = carried_out(verb, wanted, self.arguments)
         except CfmError as error:
-            return _failed(known, error)
-        return _ended(known, outcome)
+            return _failed_entry(known, error)
+        return _entry_of(known, outcome)
 
 
 def _natural(spec: Spec) -> str:
@@ -113,11 +113,11 @@ def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
 def _verb(name: str, fresh: bool) -> Verb:
     if name == "design":
         # One process: the specifications of the batch share the cores already.
-        return Verb("design", "designed and analysed", designed, running=partial(long_run, 1, fresh))
-    return Verb("analyze", "analysed", analysed)
+        return Verb("design", "designed and analysed", run_design, running=partial(long_run, 1, fresh))
+    return Verb("analyze", "analysed", run_analysis)
 
 
-def _ended(entry: Entry, outcome: FinishedRun) -> Entry:
+def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:
     """Return the outcome of a specification that was computed."""
     data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
     reported = [one["sentence"] for one in data["requirements"] if not one["ok"]]
@@ -134,7 +134,7 @@ def _ended(entry: Entry, outcome: FinishedRun) -> Entry:
     )
 
 
-def _failed(entry: Entry, error: Exception) -> Entry:
+def _failed_entry(entry: Entry, error: Exception) -> Entry:
     code, complaints = code_of(error), tuple(_of_one(entry, error))
     first, *more = complaints
     reported = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
@@ -150,7 +150,7 @@ def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
         yield str(problem) if not problem.source.startswith("--") else f"{visible(entry.spec)}: {problem}"
 
 
-def lost(job: BatchJob, outcome: Lost) -> Entry:
+def lost_entry(job: BatchJob, outcome: Lost) -> Entry:
     """Return the outcome of a specification whose process did not answer."""
     code = outcome.status.exit_code
     return Entry(job.spec, job.folder, "", "", "", outcome.status.key, code, outcome.message, bug=outcome.bug)
@@ -229,7 +229,7 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[En
 
     crew.progress.total(len(jobs))
     for job, outcome in crew.executor(work, new(), stopping):
-        entry = outcome if isinstance(outcome, Entry) else lost(job, outcome)
+        entry = outcome if isinstance(outcome, Entry) else lost_entry(job, outcome)
         crew.kept.keep(entry)
         note(job, entry)
     reported = "not run: interrupted" if crew.progress.stopped else LEFT
@@ -307,14 +307,14 @@ class BatchResult:
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the first specifications with their verdicts."""
         from cfmkit.documents.batch_document import document_of
-        from cfmkit.documents.notebook import shown
+        from cfmkit.documents.notebook import show_html
 
-        return shown(document_of(self.entries, self.exit_code, compared=self.compared))
+        return show_html(document_of(self.entries, self.exit_code, compared=self.compared))
 
     @property
     def summary(self) -> Mapping[str, Any]:
         """Content of metrics.json."""
-        found: Mapping[str, Any] = named(batch_output_files.data(self.entries, self.exit_code, self.compared))
+        found: Mapping[str, Any] = shorten_values(batch_output_files.data(self.entries, self.exit_code, self.compared))
         return found
 
     @property
@@ -422,8 +422,8 @@ def batch(
     ('OK', [('configs/cam.yaml', 'complete')])
     """
     from cfmkit.documents.junit import junit as junit_of
-    from cfmkit.documents.junit import prepared
-    from cfmkit.runs.specfile import addressed
+    from cfmkit.documents.junit import prepare_file
+    from cfmkit.runs.specfile import split_address
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch_sources_and_outcomes import folders, sources
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
@@ -434,15 +434,15 @@ def batch(
     if verb not in (None, "design", "analyze"):
         raise UsageError(f"verb: {verb!r} is not one of 'design', 'analyze'")
     for change in given:
-        addressed(change)
-    named = _named(specs)
+        split_address(change)
+    named = _list_named(specs)
     files = sources(named, place)
     common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
-    report = None if junit is None else prepared(junit)
-    reported = None if summary is None else prepared(summary, "--summary")
+    report = None if junit is None else prepare_file(junit)
+    reported = None if summary is None else prepare_file(summary, "--summary")
     tolerance = TOLERANCE if compare_tolerance is None else compare_tolerance
     if not 0 <= tolerance < 1:
         meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
@@ -457,12 +457,16 @@ def batch(
         compared = None
         if before is not None:
             changed = changes_of(before, entries, place, tolerance)
-            compared = BatchComparison(reference, tolerance, changed, gone(before, entries))
+            compared = BatchComparison(reference, tolerance, changed, list_gone(before, entries))
         code = exit_code(entries, watched.stopped)
         if compared is not None and compared.beyond and not watched.stopped and not accept:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
         written = batch_output_files.write(
-            folder, entries, batch_output_files.about(work.arguments, work.common.seed, named, code), page, compared
+            folder,
+            entries,
+            batch_output_files.describe_batch(work.arguments, work.common.seed, named, code),
+            page,
+            compared,
         )
     if accepted := accept and not watched.stopped:
         batch_output_files.write_reference(reference, place, entries, work.arguments)
@@ -475,7 +479,7 @@ def batch(
     return BatchResult(entries, code, place, written, compared, reference if accepted else "")
 
 
-def _named(specs: Any) -> list[str]:
+def _list_named(specs: Any) -> list[str]:
     """Return the names of the files, folders and patterns that are given."""
     if isinstance(specs, str | os.PathLike):
         specs = [specs]
@@ -487,12 +491,12 @@ def _named(specs: Any) -> list[str]:
     return [str(os.fspath(one)) for one in named]
 
 
-def unreached(entries: Sequence[Entry], changes: Iterable[str]) -> Iterator[str]:
+def list_unreached_options(entries: Sequence[Entry], changes: Iterable[str]) -> Iterator[str]:
     """Yield the options that are for a family of which there is no specification."""
-    from cfmkit.runs.specfile import addressed
+    from cfmkit.runs.specfile import split_address
 
     families = {one.family for one in entries}
     for change in changes if "" not in families else ():  # what is not valid may be of any family
-        family, _ = addressed(change)
+        family, _ = split_address(change)
         if family is not None and family not in families:
             yield f"warning  --set {visible(change)}: no specification is of the family {family!r}"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
 
 
-def about(arguments: Sequence[str], seed: int, named: Sequence[str], code: ExitCode) -> dict[str, Any]:
+def describe_batch(arguments: Sequence[str], seed: int, named: Sequence[str], code: ExitCode) -> dict[str, Any]:
     """Return what the manifest says about the batch."""
     return {
         "command": "batch",

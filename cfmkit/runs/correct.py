@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import api
 from cfmkit.documents.document import GridColumn, PageTable
-from cfmkit.documents.run_outcome import Supplement, report_on, undesigned
+from cfmkit.documents.run_outcome import Supplement, empty_result, report_on
 from cfmkit.errors import SpecError
 from cfmkit.experiment import measurement_and_calibration_outputs as add
 from cfmkit.experiment.correction import correct
@@ -81,7 +81,7 @@ def report_on_corrected(source: MeasuredCurves, fit: str | None, tared: bool, sp
         correction = correct(drawn, source, None if fit is None else fit.split(","), tared, run)
     except NotMakeable as problem:
         failed = Design(None, Status.INFEASIBLE, str(problem), nearest_feasible=problem.nearest)
-        return report_on(undesigned(drawn, failed), failed)
+        return report_on(empty_result(drawn, failed), failed)
     return report_of(correction, source, tared or fit is not None)
 
 

@@ -54,11 +54,13 @@ def read_dimensions(record: Family) -> list[dict[str, str]]:
     """
     from xml.etree import ElementTree
 
-    from cfmkit.families.base import packaged
+    from cfmkit.families.base import read_packaged
 
     rows = []
     try:
-        for text in ElementTree.fromstring(packaged(record.dimension_drawing)).iterfind(".//{*}text[@class='row']"):
+        for text in ElementTree.fromstring(read_packaged(record.dimension_drawing)).iterfind(
+            ".//{*}text[@class='row']"
+        ):
             symbol, key, *meaning = ("".join(part.itertext()) for part in text)
             rows.append({"symbol": symbol, "key": key, "meaning": " ".join(meaning)})
     except (ElementTree.ParseError, ValueError) as error:

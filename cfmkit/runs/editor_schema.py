@@ -40,9 +40,11 @@ def schema(records: Iterable[Family]) -> dict[str, Any]:
         names = [*metric_names(known[prefix] if dot else next(iter(known.values())))]
         properties = block.get("properties", {})
         if name in ("Requirement", "PartRequirement") and "metric" in properties:
-            properties["metric"] = _closed(properties["metric"], names)
+            properties["metric"] = _close_names(properties["metric"], names)
         elif name in ("Sweep", "Sensitivity") and "items" in properties.get("metrics", {}):
-            properties["metrics"] = properties["metrics"] | {"items": _closed(properties["metrics"]["items"], names)}
+            properties["metrics"] = properties["metrics"] | {
+                "items": _close_names(properties["metrics"]["items"], names)
+            }
     return found
 
 
@@ -64,7 +66,7 @@ def metric_names(record: Family) -> Iterator[str]:
             yield from (f"{item.name}[{branch}]" for branch in record.branches)
 
 
-def _closed(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
+def _close_names(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
     """Return the schema of a name: one of those that are known, or one with brackets, which may hold more."""
     kept = {key: value for key, value in node.items() if key != "type"}
     return kept | {"anyOf": [{"enum": names}, {"type": "string", "pattern": r"^[a-z0-9_]+\[.+\]$"}]}

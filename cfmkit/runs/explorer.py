@@ -22,7 +22,7 @@ from cfmkit.documents.run_document import document_of, shown_window
 from cfmkit.documents.run_outcome import report_on
 from cfmkit.errors import CfmError, OutputError, SpecError, UsageError, lines_of, visible
 from cfmkit.results import Status
-from cfmkit.runs.specfile import bind, changed, read_spec
+from cfmkit.runs.specfile import apply_options, bind, read_spec
 from cfmkit.specs.units.strict_decimal_number import NUMBER
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Explorer:
 
     def spec(self, changes: Sequence[str] = ()) -> Spec:
         """Return the specification with changes."""
-        return bind(changed(self.document, changes))
+        return bind(apply_options(self.document, changes))
 
     @cached_property
     def sliders(self) -> tuple[Slider, ...]:
@@ -132,7 +132,7 @@ class Explorer:
         """Return what a page shows of the changed specification: curve, metrics, requirements, or what is wrong."""
         start = time.perf_counter()
         try:
-            found = _shown(api.analyze(self.spec(changes)))
+            found = _page_data(api.analyze(self.spec(changes)))
         except CfmError as error:
             found = {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
             if isinstance(error, SpecError):
@@ -282,7 +282,7 @@ def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
     return Slider(path, number, float(f"{low:.6g}"), float(f"{high:.6g}"), float(f"{step:.1e}"), unit, about, whole)
 
 
-def _shown(result: Result) -> dict[str, Any]:
+def _page_data(result: Result) -> dict[str, Any]:
     """Return a result as data for the page: its document, which the command line prints, and its curve."""
     from cfmkit.plots.bands_from_requirements import bands_of
     from cfmkit.specs.units import border_unit, to_border

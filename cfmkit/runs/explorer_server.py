@@ -60,7 +60,7 @@ REDIRECT = """<!DOCTYPE html>
 """
 
 
-def ignored(_error: Exception) -> None:
+def ignore_progress(_error: Exception) -> None:
     """Ignore progress: the default for library use."""
 
 
@@ -81,7 +81,9 @@ class ExplorerServer(ThreadingHTTPServer):
     allow_reuse_address = os.name == "posix"  # elsewhere it lets another program listen on the same port
     request_queue_size = MAX_CONNECTIONS
 
-    def __init__(self, explorer: Explorer, port: int = 0, failed: Callable[[Exception], object] = ignored) -> None:
+    def __init__(
+        self, explorer: Explorer, port: int = 0, failed: Callable[[Exception], object] = ignore_progress
+    ) -> None:
         """Bind to a port of this computer alone; 0 takes a free one.
 
         Raises

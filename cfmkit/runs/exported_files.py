@@ -27,7 +27,7 @@ PAPER = ("png", "pdf")
 """Formats of the dimensioned drawing."""
 
 
-def exported(
+def export_files(
     spec: Spec,
     kerf: str | float | None = None,
     tolerance: str | float | None = None,
@@ -69,7 +69,7 @@ def exported(
     for name in (one for one in wanted if one not in USUAL):
         try:
             if name in PAPER:
-                found |= _on_paper(drawn, spec, name)
+                found |= _drawing_on_paper(drawn, spec, name)
             else:
                 found |= _decks(spec) if name == DECK else files(drawn, None, near, [name])
         except CfmError as error:
@@ -81,14 +81,14 @@ def exported(
 
 def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Drawing:
     """Return the outlines of the parts that can be cut or printed, as `cfmkit.drawing` says."""
-    from cfmkit.export.engraved_part_labels import engraved
+    from cfmkit.export.engraved_part_labels import engrave_labels
 
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
     drawn = import_module(record.outline).drawing(spec, *given)
     drawn = replace(drawn, warnings=(*drawn.warnings, *_thin(drawn, spec)))
-    return engraved(drawn, spec.name)
+    return engrave_labels(drawn, spec.name)
 
 
 NAMED = 3
@@ -122,7 +122,7 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
     )
 
 
-def _on_paper(drawn: Drawing, spec: Spec, name: str) -> dict[str, bytes]:
+def _drawing_on_paper(drawn: Drawing, spec: Spec, name: str) -> dict[str, bytes]:
     """Return the dimensioned drawing in one format."""
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.runs.part_on_paper import part_on_paper

@@ -120,10 +120,10 @@ class MeasurementSettings:
         """Return what a recording says."""
         from cfmkit.experiment.branches import read_cycles
         from cfmkit.experiment.coverage import read_largest_hole
-        from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, require_loop
+        from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measure_recording, require_loop
         from cfmkit.experiment.low_pass import read_filter
         from cfmkit.experiment.measurement_and_calibration_outputs import report_on
-        from cfmkit.experiment.zeros_and_signs import corrected
+        from cfmkit.experiment.zeros_and_signs import correct_recording
         from cfmkit.metrics import MeasuringFrame
 
         low_pass: LowPass | Literal["default"] | None
@@ -131,8 +131,8 @@ class MeasurementSettings:
         cycles, largest = read_cycles(self.cycles), read_largest_hole(self.max_hole)
         place = read_window(self.window, recording.kind)
         frame = MeasuringFrame(target=read_target(self.target, recording.kind))
-        recording = corrected(recording, self.tare, self.zero, self.flip)
-        source = measured(recording, low_pass, () if self.as_recorded else LEFT_OUT, cycles)
+        recording = correct_recording(recording, self.tare, self.zero, self.flip)
+        source = measure_recording(recording, low_pass, () if self.as_recorded else LEFT_OUT, cycles)
         if not self.one_branch:
             require_loop(source)
         return report_on(source, frame, place, largest)
@@ -275,12 +275,17 @@ def _read_curves(
 ) -> MeasuredCurves:
     """Return the branches of a recording, read from its file unless they are given."""
     from cfmkit.experiment.branches import read_cycles
-    from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, MeasuredCurves, measured, read_measured
+    from cfmkit.experiment.curves_and_metrics_of_recording import (
+        LEFT_OUT,
+        MeasuredCurves,
+        measure_recording,
+        read_measured,
+    )
     from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.zeros_and_signs import corrected
+    from cfmkit.experiment.zeros_and_signs import correct_recording
 
     if isinstance(data, MeasuredCurves):
         return data
     if isinstance(data, Recording):
-        return measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT, read_cycles(cycles))
+        return measure_recording(correct_recording(data, tare, zero, _each(flip)), None, LEFT_OUT, read_cycles(cycles))
     return read_measured(_file(data), units, tare, zero, _each(flip), cycles, group)

@@ -99,13 +99,13 @@ class AnalysisView(Result):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
-        from cfmkit.documents.notebook import shown
+        from cfmkit.documents.notebook import show_html
         from cfmkit.documents.run_document import document_of
         from cfmkit.documents.run_outcome import Report
         from cfmkit.plots.figures import figures
 
         report = Report(self, self.metrics, tuple(self.requirements))
-        return shown(document_of(report), figures(family(self.spec.family), self))
+        return show_html(document_of(report), figures(family(self.spec.family), self))
 
 
 @dataclass(frozen=True, repr=False)
@@ -128,11 +128,11 @@ class SuggestionsView(Suggestions):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
-        from cfmkit.documents.notebook import shown
+        from cfmkit.documents.notebook import show_html
         from cfmkit.documents.suggestion_document import document_of
         from cfmkit.runs.suggestion_files import as_json, exit_code
         from cfmkit.studies.suggest.figures import to_one_scale
 
         assert self.block is not None  # `of`
         figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
-        return shown(document_of(as_json(self, self.block), exit_code(self)), figures)
+        return show_html(document_of(as_json(self, self.block), exit_code(self)), figures)

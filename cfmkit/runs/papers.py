@@ -103,7 +103,7 @@ def _texts(value: Any) -> tuple[str, ...]:
     return tuple(map(str, value)) if isinstance(value, list | tuple) else (str(value),)
 
 
-def chosen(name: str | None) -> tuple[PrintedRow, ...]:
+def choose_rows(name: str | None) -> tuple[PrintedRow, ...]:
     """Return the rows of one paper, or of a family's papers, or all.
 
     Raises
@@ -140,21 +140,21 @@ def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[Comp
         elif row.heavy and not everything:
             yield ComputedRow(row, skipped=True)
         else:
-            yield _checked(row)
+            yield _check_row(row)
 
 
-def _checked(row: PrintedRow) -> ComputedRow:
+def _check_row(row: PrintedRow) -> ComputedRow:
     try:
         values = _values(row)
     except (CfmError, ValueError, KeyError) as error:
         return ComputedRow(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
-    shown = tuple(_reported(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
+    shown = tuple(_report_value(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
     return ComputedRow(row, shown, "; ".join(_faults(row, values)))
 
 
 def _values(row: PrintedRow) -> tuple[float, ...]:
     scope = _Scope(row.spec, row.changes, row.verb)
-    found = [_evaluated(text, scope) for text in row.ask]
+    found = [_evaluate(text, scope) for text in row.ask]
     values = tuple(float(one) for value in found for one in (value if isinstance(value, tuple | list) else (value,)))
     if len(values) != len(row.printed):
         raise ValueError(f"{len(values)} values for {len(row.printed)} numbers")
@@ -169,12 +169,12 @@ def _faults(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
         yield "a model computes it: its verdict is not 'arithmetic'"
     for value, printed in zip(values, row.printed, strict=True):
         if row.verdict in ("agrees", "arithmetic", "given") and not _matches(value, printed, row.tolerance):
-            yield f"{_reported(value, printed)} is not {printed}"
+            yield f"{_report_value(value, printed)} is not {printed}"
         if row.verdict in ("misprint", "disagrees") and _is_quantity(printed) and _matches(value, printed):
-            yield f"{_reported(value, printed)} is what is printed"
+            yield f"{_report_value(value, printed)} is what is printed"
     for value, here in zip(values, row.here, strict=bool(row.here)):
         if not _matches(value, here):
-            yield f"{_reported(value, here)} is not {here}"
+            yield f"{_report_value(value, here)} is not {here}"
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ def _matches(value: float, text: str, tolerance: str = "") -> bool:
     return abs(value - wanted.value) <= room * (1 + 1e-9) + 1e-12 * abs(wanted.value)
 
 
-def _reported(value: float, text: str) -> str:
+def _report_value(value: float, text: str) -> str:
     """Return a value in the unit of a printed text, with two digits more."""
     if not _is_quantity(text):
         return f"{value:.6g}"
@@ -321,7 +321,7 @@ def _asks_model(text: str) -> bool:
     return not names <= _FUNCTIONS.keys()
 
 
-def _evaluated(text: str, scope: _Scope) -> Any:
+def _evaluate(text: str, scope: _Scope) -> Any:
     """Return what a question is answered with, in SI."""
     try:
         tree = ast.parse(text.strip(), mode="eval").body
@@ -343,17 +343,19 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
             return _value(inner, scope.changed(change))
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
-            return _varied(scope.specification(), path)
+            return _varied_values(scope.specification(), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _FUNCTIONS:
             return _FUNCTIONS[name](*(_value(one, scope) for one in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
-            return _on_curve(scope.result().curves[0], column, _value(place, scope), *map(ast.literal_eval, branch))
+            return _value_on_curve(
+                scope.result().curves[0], column, _value(place, scope), *map(ast.literal_eval, branch)
+            )
         case ast.Name() | ast.Attribute() | ast.Subscript():
-            return _named(ast.unparse(node), scope)
+            return _value_named(ast.unparse(node), scope)
     raise ValueError(f"{ast.unparse(node)!r} is no question")
 
 
-def _named(name: str, scope: _Scope) -> Any:
+def _value_named(name: str, scope: _Scope) -> Any:
     """Return a value of the specification, or a metric."""
     if name.startswith(tuple(f"{block}." for block in _BLOCKS)):
         return scope.specification().at(name.replace("[", ".").replace("]", ""))
@@ -363,18 +365,18 @@ def _named(name: str, scope: _Scope) -> Any:
     return metric.value
 
 
-def _varied(spec: Spec, path: str) -> tuple[float, ...]:
+def _varied_values(spec: Spec, path: str) -> tuple[float, ...]:
     """Return the values that a sweep gives to something."""
-    from cfmkit.studies.plan import stepped
+    from cfmkit.studies.plan import step_axis
     from cfmkit.studies.varied_axes import axes, collect_variations
 
     for axis in axes(spec, collect_variations(spec.sweep.vary)) if spec.sweep else ():
         if axis.leaf.path == path:
-            return tuple(map(float, stepped(axis).values))
+            return tuple(map(float, step_axis(axis).values))
     raise ValueError(f"no sweep varies {path}")
 
 
-def _on_curve(curve: Curve, column: str, place: float, branch: str | None = None) -> float:
+def _value_on_curve(curve: Curve, column: str, place: float, branch: str | None = None) -> float:
     """Return a column at a place, linear between the points."""
     import numpy as np
 

@@ -73,9 +73,9 @@ def stated_tolerances(spec: Spec) -> tuple[str, ...]:
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
-    from cfmkit.studies.parts.assumed_errors import assumed
+    from cfmkit.studies.parts.assumed_errors import assume_errors
 
-    found = assumed(spec)
+    found = assume_errors(spec)
     if found is None:
         return ()
     process = found.process

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import SpecError
-from cfmkit.runs.specfile import STDIN, content, renamed, standard_input
+from cfmkit.runs.specfile import STDIN, content, rename_source, standard_input
 from cfmkit.specs.yamlio import read_document
 from cfmkit.studies.suggest.spec import SuggestFile
 
@@ -41,5 +41,5 @@ def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
     except SpecError as error:
         reported = error
     for key in keys:
-        reported = renamed(reported, f"--set suggest.{key}", f"--{key}")
+        reported = rename_source(reported, f"--set suggest.{key}", f"--{key}")
     raise reported

@@ -20,7 +20,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.results import OVERWRITTEN, Finding, Status
 from cfmkit.runs.files_a_run_writes import files, warnings_of_part
-from cfmkit.runs.specfile import bind, placed, read_spec, renamed
+from cfmkit.runs.specfile import bind, place_problem, read_spec, rename_source
 from cfmkit.store import RunFolder, stable_hash
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def carry_out(
     with RunFolder(wanted.out) as folder:
         folder.check(*FIRST, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
-            found = _options_judged(_computed(verb, spec, run, document), spec, document)
+            found = _options_judged(_compute(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
         started = RunCommand(verb.name, wanted.spec, _changes(wanted), verb.words, wanted.out)
         for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate, started):
@@ -180,7 +180,7 @@ def read(wanted: RunRequest) -> tuple[YamlDocument, Spec]:
     try:
         return document, bind(document)
     except SpecError as error:
-        raise (renamed(error, "--set analysis.fidelity", "--fidelity") if wanted.fidelity else error) from None
+        raise (rename_source(error, "--set analysis.fidelity", "--fidelity") if wanted.fidelity else error) from None
 
 
 @contextmanager
@@ -192,10 +192,10 @@ def placing(document: YamlDocument, options: Collection[str] = ()) -> Iterator[N
     try:
         yield
     except SpecError as error:
-        raise SpecError([_placed(document, one, options) for one in error.problems]) from None
+        raise SpecError([_place_problem(document, one, options) for one in error.problems]) from None
 
 
-def _placed(document: YamlDocument, one: Problem, options: Collection[str]) -> Problem:
+def _place_problem(document: YamlDocument, one: Problem, options: Collection[str]) -> Problem:
     if one.source or any(f"{one.path}.".startswith(f"{path}.") for path in options):
         return one
     return document.problem(one.path, one.message)
@@ -212,11 +212,11 @@ def _changes(wanted: RunRequest) -> tuple[str, ...]:
     return (*wanted.changes, *([] if wanted.fidelity is None else [f"analysis.fidelity={wanted.fidelity}"]))
 
 
-def _computed(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:
+def _compute(verb: Verb, spec: Spec, run: Run, document: YamlDocument) -> Report:
     with placing(document):
         found = verb.compute(spec, run)
     if found.result.status is Status.INVALID:
-        raise SpecError([placed(document, verb.name, found.result.message)])
+        raise SpecError([place_problem(document, verb.name, found.result.message)])
     return found
 
 
@@ -273,7 +273,7 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
     return {"command": command, "arguments": list(arguments), "spec": content, **engine, **cited}
 
 
-def analysed(spec: Spec, run: Run) -> Report:
+def run_analysis(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
     found = run_outcome.report_on(api.analyze(spec, run))
     return found.beside({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
@@ -285,7 +285,7 @@ def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
     return () if lasting is None else tuple(("lasting", text) for text in lasting.assumed)
 
 
-def designed(spec: Spec, run: Run) -> Report:
+def run_design(spec: Spec, run: Run) -> Report:
     """Return the report on the designed mechanism, with the yield of its parts, or on why there is none."""
     from cfmkit.specs.spec import DesignKeys
     from cfmkit.studies.parts.parts import is_made
@@ -293,7 +293,7 @@ def designed(spec: Spec, run: Run) -> Report:
     block = getattr(spec, "design", None)
     many = isinstance(block, DesignKeys) and is_made(spec, block)
     design = api.design(spec, run.part(0.0, 0.6) if many else run)
-    result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.undesigned(spec, design)
+    result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.empty_result(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
     found = run_outcome.report_on(result, design)
     drawn = warnings_of_part(result.spec) if design.spec is not None and result.status.usable else ()

@@ -44,11 +44,11 @@ def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> 
     from cfmkit.specs.yamlio.base_file import with_base
 
     if name == STDIN:
-        return changed(with_base(read_document(standard_input(), "stdin", Path.cwd())), changes, of_many)
-    return changed(with_base(read_document(content(name), name, Path(name).absolute().parent)), changes, of_many)
+        return apply_options(with_base(read_document(standard_input(), "stdin", Path.cwd())), changes, of_many)
+    return apply_options(with_base(read_document(content(name), name, Path(name).absolute().parent)), changes, of_many)
 
 
-def changed(document: YamlDocument, changes: Iterable[str], of_many: bool = False) -> YamlDocument:
+def apply_options(document: YamlDocument, changes: Iterable[str], of_many: bool = False) -> YamlDocument:
     """Return a document with options applied in their order.
 
     An option for another family is skipped where there are many specifications, and refused where there is only one.
@@ -59,7 +59,7 @@ def changed(document: YamlDocument, changes: Iterable[str], of_many: bool = Fals
         If an option is malformed, for a family that does not exist, or for none that there is.
     """
     for change in changes:
-        family, option = addressed(change)
+        family, option = split_address(change)
         own = _family_of(document)
         if family in (None, own):
             document = document.set(option)
@@ -68,7 +68,7 @@ def changed(document: YamlDocument, changes: Iterable[str], of_many: bool = Fals
     return document
 
 
-def addressed(change: str) -> tuple[str | None, str]:
+def split_address(change: str) -> tuple[str | None, str]:
     """Return the family that an option such as ``cam:mechanism.roller_radius=10 mm`` is for, and the option itself.
 
     Raises
@@ -132,7 +132,7 @@ def content(name: str) -> bytes:
         raise UsageError(f"{name!r} is not the name of a file")
     try:
         if Path(name).is_dir():
-            raise UsageError(f"{visible(name)} is a folder; name the specification in it{_inside(name)}")
+            raise UsageError(f"{visible(name)} is a folder; name the specification in it{_path_inside(name)}")
         with open(name, "rb") as file:
             return file.read(LARGEST + 1)
     except FileNotFoundError:
@@ -155,7 +155,7 @@ def bind(document: YamlDocument) -> Spec:
     except SpecError as error:
         reported = {problem.path for problem in error.problems}
         raw = _entries(document.tree)
-        more = [found for found in _requirement_faults(document, family, raw) if not _below(found.path, reported)]
+        more = [found for found in _requirement_faults(document, family, raw) if not _is_below(found.path, reported)]
         faults = sorted([*error.problems, *more], key=lambda one: (one.line == 0, one.line, one.column))
         raise SpecError(faults) from None
     found = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
@@ -165,7 +165,7 @@ def bind(document: YamlDocument) -> Spec:
     return spec
 
 
-def _known(named: str | None) -> Sequence[str]:
+def _known_families(named: str | None) -> Sequence[str]:
     """Return the families among which one is looked for; other packages are not searched for one that is here."""
     from cfmkit import families
 
@@ -179,7 +179,7 @@ def _family_record(document: YamlDocument) -> Family:
     from cfmkit import families
 
     try:
-        return families.family(document.family(_known(_family_of(document))))
+        return families.family(document.family(_known_families(_family_of(document))))
     except families.Unusable as problem:
         raise SpecError([document.problem(("family",), str(problem))]) from None
 
@@ -194,7 +194,7 @@ def _requirement_faults(
     for index, requirement in requirements:
         for problem in requirement_problems((requirement,), known, branches=family.branches):
             key = problem.path.rpartition(".")[2]
-            yield placed(document, f"requirements.{index}.{key}", problem.message)
+            yield place_problem(document, f"requirements.{index}.{key}", problem.message)
 
 
 def _sweep_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
@@ -237,7 +237,7 @@ def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
         yield document.problem(("requirements", index, "metric"), f"{one.metric!r} {lacking}")
 
 
-def placed(document: YamlDocument, path: str, message: str) -> Problem:
+def place_problem(document: YamlDocument, path: str, message: str) -> Problem:
     """Return a problem with the place of a path in the file, or the option that set it."""
     found = document.problem(path, message)
     return found if found.line else Problem("--set", 0, 0, path, message)
@@ -253,11 +253,11 @@ def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
             yield index, requirement
 
 
-def _below(path: str, reported: set[str]) -> bool:
+def _is_below(path: str, reported: set[str]) -> bool:
     return any(path == other or path.startswith(f"{other}.") for other in reported if other)
 
 
-def renamed(error: SpecError, old: str, new: str) -> SpecError:
+def rename_source(error: SpecError, old: str, new: str) -> SpecError:
     """Return the error with another name for the source of some problems."""
     return SpecError([replace(one, source=new) if one.source == old else one for one in error.problems])
 
@@ -266,14 +266,14 @@ def _similar(name: str) -> str:
     """Return a hint with the names in that folder that look alike."""
     folder, base = os.path.split(name)
     if folder and not os.path.isdir(folder):
-        return f" (nor a folder {visible(folder)}){_shipped(base)}"
+        return f" (nor a folder {visible(folder)}){_shipped_hint(base)}"
     # without their endings: those are alike in any two names
     files = {os.path.splitext(file)[0]: file for file in _yaml_files(folder or ".")}
     near = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
-    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else _shipped(base)
+    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else _shipped_hint(base)
 
 
-def _shipped(base: str) -> str:
+def _shipped_hint(base: str) -> str:
     """Return how an example of that name is had: pages name it as it lies in the sources."""
     from cfmkit.runs.find_shipped_folder import shipped_folder
 
@@ -284,7 +284,7 @@ def _shipped(base: str) -> str:
     return f"; `cfmkit examples {there.stem}` copies the one that is shipped" if there is not None else ""
 
 
-def _inside(folder: str) -> str:
+def _path_inside(folder: str) -> str:
     found = _yaml_files(folder)
     return f", e.g. {visible(os.path.join(folder, found[0]))}" if found else ""
 

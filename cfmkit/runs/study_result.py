@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import named
+from cfmkit.arrays import shorten_values
 from cfmkit.documents.document import Document
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class StudyResult:
 
     def __post_init__(self) -> None:
         """Keep the texts of what is inside short."""
-        object.__setattr__(self, "summary", named(self.summary))
+        object.__setattr__(self, "summary", shorten_values(self.summary))
 
     def __repr__(self) -> str:
         """Return the study in a line."""
@@ -64,10 +64,10 @@ class StudyResult:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the document of the study, a figure, and the first points."""
-        from cfmkit.documents.notebook import shown
+        from cfmkit.documents.notebook import show_html
         from cfmkit.tables.html import first_rows
 
-        return shown(self.document, self.figures, first_rows(self.table))
+        return show_html(self.document, self.figures, first_rows(self.table))
 
     @property
     def figures(self) -> Mapping[str, Callable[[], Figure]]:

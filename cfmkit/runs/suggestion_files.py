@@ -10,7 +10,7 @@ from cfmkit.documents import html
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.errors import ExitCode
 from cfmkit.specs.units import format_short, to_border
-from cfmkit.studies.pool import until
+from cfmkit.studies.pool import give_up_at
 from cfmkit.studies.serial_and_cluster_executors import BUG
 from cfmkit.tables.json_writing import json_bytes
 
@@ -51,7 +51,7 @@ class Deadlines:
     files: Clock  # of proposals, all but ``design.yaml``
 
 
-def reported(proposal: Proposal) -> dict[str, Any]:
+def numbers_in_border_units(proposal: Proposal) -> dict[str, Any]:
     """Return a proposal's numbers in border units, by the name of its column."""
     found: dict[str, Any] = {}
     for name, value in proposal.numbers.items():
@@ -65,7 +65,9 @@ def reported(proposal: Proposal) -> dict[str, Any]:
 def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
     """Return the same with the mean in N or N*mm."""
     mean = proposal.numbers.get("mean")
-    return reported(proposal) | {"mean": None if mean is None else float(to_border(mean, found.request.kind))}
+    return numbers_in_border_units(proposal) | {
+        "mean": None if mean is None else float(to_border(mean, found.request.kind))
+    }
 
 
 STATUSES = {
@@ -198,8 +200,8 @@ def files(
     if command is not None:
         texts = {folder_name(number, one): one.text for number, one in enumerate(found.listed, 1)}
         yield html.NAME, page(as_json(found, block), exit_code(found), texts, drawn, command)
-    work = partial(_made, (plots, command is not None), deadlines, found.listed)
-    made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.listed))), lambda: False))
+    work = partial(_make_files, (plots, command is not None), deadlines, found.listed)
+    made = dict(give_up_at(run.executor, deadlines.files.deadline)(work, iter(range(len(found.listed))), lambda: False))
     for index, one in enumerate(found.listed):
         files = made.get(index)
         for name, data in files if isinstance(files, list) else [("design.yaml", one.text.encode())]:
@@ -214,7 +216,7 @@ def _picture(found: Suggestions) -> Figure:
     return to_one_scale(found.listed, found.request, links)
 
 
-def _made(
+def _make_files(
     wanted: tuple[bool, bool], deadlines: Deadlines, proposals: Sequence[Proposal], index: int
 ) -> list[tuple[str, bytes]]:
     """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
@@ -232,7 +234,7 @@ def _made(
     if left is not None and left < SLOWER * proposal.seconds:  # its analysis would not end in time, its drawing does
         return [
             ("design.yaml", proposal.text.encode()),
-            *_drawn(spec, plots=wanted[0] and not deadlines.figures.late()),
+            *_draw_part(spec, plots=wanted[0] and not deadlines.figures.late()),
         ]
     plots, page = wanted
     found = dict(files(report_on(api.analyze(spec), design), plots and not deadlines.figures.late(), page))
@@ -243,7 +245,7 @@ SLOWER = 2.0
 """How much longer than before an analysis may take: others run beside it, and figures are drawn."""
 
 
-def _drawn(spec: Spec, plots: bool) -> Iterator[tuple[str, bytes]]:
+def _draw_part(spec: Spec, plots: bool) -> Iterator[tuple[str, bytes]]:
     """Yield the files to cut or print, and the drawing, which need no analysis."""
     from cfmkit.runs.files_a_run_writes import geometry, part_of
     from cfmkit.runs.part_on_paper import part_on_paper
@@ -305,10 +307,10 @@ def page(
     document = document_of(record, code)
     found = (*record["proposals"], *record["unjudged"])
     specs = [(f"Specification {one['folder']}", texts[one["folder"]]) for one in found]
-    return html.page(document, drawn, subject=_listed(record["suggest"]), command=command, texts=specs)
+    return html.page(document, drawn, subject=_list_in_words(record["suggest"]), command=command, texts=specs)
 
 
-def _listed(pairs: Mapping[str, Any]) -> str:
+def _list_in_words(pairs: Mapping[str, Any]) -> str:
     """Return keys and values in words.
 
     Examples
@@ -332,5 +334,5 @@ def _words(key: str, value: Any) -> str:
     if isinstance(value, list | tuple):
         return JOINED.get(key, " to ").join(_words(key, one) for one in value)
     if isinstance(value, dict):
-        return str(value.get("name") or _listed(value))
+        return str(value.get("name") or _list_in_words(value))
     return format_short(value, "ratio", 3) if key in SHARES and isinstance(value, float | int) else str(value)

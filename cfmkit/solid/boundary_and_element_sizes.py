@@ -60,7 +60,7 @@ class Ring:
         """
         ring = np.asarray(points, float)
         ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
-        found = cls(read_only(_without_steps(ring, step)))
+        found = cls(read_only(_merge_steps(ring, step)))
         return found if (found.area > 0) != hole else cls(read_only(found.points[::-1]))
 
     @property
@@ -124,7 +124,7 @@ class Ring:
         return np.column_stack([-along[:, 1], along[:, 0]])
 
 
-def _without_steps(ring: FloatArray, least: float) -> FloatArray:
+def _merge_steps(ring: FloatArray, least: float) -> FloatArray:
     """Return a closed chain (n, 2) [m] with one vertex for the two of a step: opposite corners `least` [m] apart."""
     chain = Ring(ring)
     corner, turns = np.abs(chain.turns) > CORNER, chain.turns
@@ -177,14 +177,14 @@ def sizes(rings: tuple[Ring, ...], largest: float, share: float, across: float) 
         If the part is so thin somewhere, or its edge so sharply curved, that it would need elements `MOST_REFINED`
         times smaller than the largest.
     """
-    coarse = _resolved(*_wanted(rings, 0.5 * largest, largest, share, across), largest)[1]
+    coarse = _resolve_sizes(*_wanted_sizes(rings, 0.5 * largest, largest, share, across), largest)[1]
     around = sum(float(ring.places[-1]) for ring in rings)
     step = 0.5 * max(min(largest, float(coarse.min())), around / MOST_PLACES)
-    places, wanted = _resolved(*_wanted(rings, step, largest, share, across), largest)
-    return Sizes(places, _graded(places, wanted), largest)
+    places, wanted = _resolve_sizes(*_wanted_sizes(rings, step, largest, share, across), largest)
+    return Sizes(places, _grade_sizes(places, wanted), largest)
 
 
-def _resolved(places: FloatArray, wanted: FloatArray, largest: float) -> tuple[FloatArray, FloatArray]:
+def _resolve_sizes(places: FloatArray, wanted: FloatArray, largest: float) -> tuple[FloatArray, FloatArray]:
     """Return the places and the sizes wanted there, if elements can be so small; GeometryError if they cannot."""
     least = int(wanted.argmin())
     if wanted[least] * MOST_REFINED < largest:
@@ -204,7 +204,7 @@ def place_text(place: Sequence[float] | FloatArray) -> str:
     return f"({', '.join(format_short(round(float(one), 9) + 0.0, 'length') for one in place)})"
 
 
-def _wanted(
+def _wanted_sizes(
     rings: tuple[Ring, ...], step: float, largest: float, share: float, across: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return places along the boundary (m, 2) no farther apart than a step, and what is wanted there (m,) [m]."""
@@ -250,7 +250,7 @@ def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray,
     return found
 
 
-def _graded(places: FloatArray, wanted: FloatArray) -> FloatArray:
+def _grade_sizes(places: FloatArray, wanted: FloatArray) -> FloatArray:
     """Return sizes that nowhere grow faster than `GRADING`: the smallest of (size there + grading x distance)."""
     order = np.argsort(wanted)
     sizes = wanted.copy()

@@ -107,15 +107,15 @@ def mesh(
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
         raise _too_many(int(around / size))
     field = sizes(rings, size, share, across)
-    laid = [_laid(ring, field, _crossings(ring, seams, field, near)) for ring in rings]
+    laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, near)) for ring in rings]
     fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
     on_seams = [_sewn(region, field, seam) for seam in seams]
     sewn = np.concatenate([np.zeros((0, 2)), *on_seams])
     kept_from = Spacing(field, sewn)
-    inside = kept_from(_thrown(region, field, np.random.default_rng(seed)))
+    inside = kept_from(_sample_interior(region, field, np.random.default_rng(seed)))
     if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
         raise _too_many(4 * (len(inside) + len(fixed)))
-    inside = _relaxed(region, kept_from, np.concatenate([fixed, sewn]), inside)
+    inside = _relax_points(region, kept_from, np.concatenate([fixed, sewn]), inside)
     for _ in range(HALVINGS):
         fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
         points = np.concatenate([fixed, *on_seams, inside])
@@ -129,7 +129,7 @@ def mesh(
             next((middles[0] for middles in crossed if len(middles)), np.zeros(2)),
         )
         on_seams = [np.concatenate([known, more]) for known, more in zip(on_seams, crossed, strict=True)]
-        laid = [_halved(ring, arc, at) for ring, arc, at in zip(rings, laid, missing, strict=True)]
+        laid = [_halve_pieces(ring, arc, at) for ring, arc, at in zip(rings, laid, missing, strict=True)]
     reason = "it touches itself, or is thinner than an element"
     raise GeometryError(f"the outline cannot be meshed at {place_text(first)}: {reason}")
 
@@ -144,7 +144,7 @@ def _region(rings: tuple[Ring, ...]) -> Any:
         raise GeometryError("an outline of fewer than three points has nothing inside")
     for shell in shells:
         if not shell.is_valid:
-            raise _crossed(shell)
+            raise _explain_crossing(shell)
     holes = [shell for shell in shells if signed_area(shell.exterior) < 0]
     for hole in holes:
         if not any(shell.covers(hole) for shell in shells if shell not in holes):
@@ -157,12 +157,12 @@ def _region(rings: tuple[Ring, ...]) -> Any:
         ]
     )
     if not region.is_valid:
-        raise _crossed(region)
+        raise _explain_crossing(region)
     prepare(region)
     return region
 
 
-def _crossed(shape: Any) -> GeometryError:
+def _explain_crossing(shape: Any) -> GeometryError:
     """Return what is wrong with a polygon that is not valid, and where."""
     from shapely.validation import explain_validity
 
@@ -212,7 +212,7 @@ def _leaving(ring: Ring, start: FloatArray, end: FloatArray, near: float) -> NDA
     return np.asarray(close & ~(np.roll(close, 1) & np.roll(close, -1)))
 
 
-def _laid(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArray:
+def _boundary_nodes(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArray:
     """Return the arc lengths (k,) [m] of the nodes on a ring: corners, crossings, and between them places by size."""
     stops = np.unique(np.concatenate([ring.places[ring.corners], crossings]))
     stops = np.unique(np.concatenate([stops, _curvature_jumps(ring, stops, field)]))
@@ -251,7 +251,7 @@ APART = 0.4
 """Distance between nodes that stand at stops, in sizes, from which on both do."""
 
 
-def _thrown(region: Any, field: Sizes, random: np.random.Generator) -> FloatArray:
+def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> FloatArray:
     """Return points inside (k, 2) [m], as dense as the sizes ask: a lattice, thinned by chance [PS, step 2]."""
     from shapely import contains_xy
 
@@ -349,7 +349,7 @@ class Spacing:
         return points[far]
 
 
-def _relaxed(region: Any, room: Spacing, fixed: FloatArray, inside: FloatArray) -> FloatArray:
+def _relax_points(region: Any, room: Spacing, fixed: FloatArray, inside: FloatArray) -> FloatArray:
     """Return the points inside (k, 2) [m] where bars that push each other apart let them rest."""
     from shapely import contains_xy
 
@@ -444,7 +444,7 @@ STRAIGHT = 1e-9
 """Distance from a seam up to which a point is on it [m]."""
 
 
-def _halved(ring: Ring, arc: FloatArray, pieces: IntArray) -> FloatArray:
+def _halve_pieces(ring: Ring, arc: FloatArray, pieces: IntArray) -> FloatArray:
     """Return the arc lengths [m] of the nodes on a ring, with one more in the middle of some pieces."""
     ends = np.append(arc[1:], arc[0] + ring.places[-1])
     return np.sort(np.concatenate([arc, 0.5 * (arc[pieces] + ends[pieces])]))

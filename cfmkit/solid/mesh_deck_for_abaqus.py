@@ -101,8 +101,8 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
             hub = Hub.on(places, group.center, spare)
             yield from _stiff(word, hub, start, share * to_border(part.width, "length"), part.law.youngs_modulus)
             nodes, start, spare = list(dict.fromkeys([*nodes, hub.center])), start + len(hub.triangles), hub.spare
-            made = _guided(group, travel, hub.center, spare)
-            turned = _turned(word, hub, travel * float(group.driven[2]), spare + GUIDES, poses)
+            made = _guide_lines(group, travel, hub.center, spare)
+            turned = _turn_lines(word, hub, travel * float(group.driven[2]), spare + GUIDES, poses)
             spare += GUIDES + 2
         elif group.free.shape[1]:
             made, turned = _rigid(word, group, travel, spare), Lines()
@@ -233,16 +233,16 @@ def _nodes(places: dict[int, FloatArray]) -> list[str]:
 
 def _rigid(word: str, group: Group, travel: float, spare: int) -> Lines:
     """Return a rigid body that does not turn, with its guides: a centre, a node that turns with it, and carriers."""
-    guided = _guided(group, travel, spare, spare + 2)
+    guided = _guide_lines(group, travel, spare, spare + 2)
     body = f"*RIGID BODY, NSET={word}, REF NODE={spare}, ROT NODE={spare + 1}"
     model = [*_nodes(dict.fromkeys((spare, spare + 1), group.center)), body, *guided.model]
     return Lines(model, [f"{spare}, 3, 3, 0", f"{spare + 1}, 1, 3, 0", *guided.moves])
 
 
-def _guided(group: Group, travel: float, center: int, carrier: int) -> Lines:
+def _guide_lines(group: Group, travel: float, center: int, carrier: int) -> Lines:
     """Return what moves a centre along every direction that is not free, by nodes from `carrier` on."""
     model, moves = _nodes(dict.fromkeys(range(carrier, carrier + GUIDES), group.center)), []
-    for way in _prescribed(group.free):
+    for way in _prescribed_directions(group.free):
         terms = [(center, 1 + k, float(way[k])) for k in (0, 1) if abs(way[k]) > 1e-12]
         terms.sort(key=lambda term: -abs(term[2]))  # the first is eliminated: it must not vanish
         model += _equation(*terms, (carrier, 1, -1.0))
@@ -258,7 +258,7 @@ def _equation(*terms: tuple[int, int, float]) -> list[str]:
     return ["*EQUATION", str(len(terms)), reported]
 
 
-def _turned(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> Lines:
+def _turn_lines(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> Lines:
     """Return what turns a hub by an angle [rad], nothing without one: two nodes lead its arm round the centre.
 
     The torque is the moment of the force on the arm about the centre.
@@ -282,7 +282,7 @@ def _turned(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> Line
     return Lines(model, moves)
 
 
-def _prescribed(free: FloatArray) -> list[FloatArray]:
+def _prescribed_directions(free: FloatArray) -> list[FloatArray]:
     """Return unit displacements (2,) that are prescribed: those across all free ones."""
     flat = free[:2, np.abs(free[2]) < 0.5]
     if flat.shape[1] == 0:

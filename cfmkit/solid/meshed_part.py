@@ -27,7 +27,7 @@ from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh
 from cfmkit.solid.mesh_refinement import refine
 from cfmkit.solid.path_following import PathEnd, PosePath, follow, pose_between
-from cfmkit.solid.rigid_groups import Group, Supports, within
+from cfmkit.solid.rigid_groups import Group, Supports, find_within
 from cfmkit.solid.sections_of_mesh import check_mesh
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ class Part:
         taken = ~holdable
         found: list[Group] = []
         for place in self.places:
-            inside = np.flatnonzero(within(nodes, place.shapes, self.near) & ~taken)
+            inside = np.flatnonzero(find_within(nodes, place.shapes, self.near) & ~taken)
             if len(inside):
                 found.append(Group(place.name, inside, place.at, place.driven, place.free, place.load))
                 taken[inside] = True
@@ -257,7 +257,7 @@ class Meshed:
         allowed: float = ALLOWED,
     ) -> MeshSolution:
         """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
-        course, off = refined(self.problem, follow(self.problem, stops, report), allowed)
+        course, off = refine_path(self.problem, follow(self.problem, stops, report), allowed)
         return MeshSolution(self.part, self.problem, course, self.unjudged, off)
 
 
@@ -343,7 +343,7 @@ SHORTEST = 2.0**-10
 """Intervals are not halved below this part of the travel: there the curve has a corner, which is a pose."""
 
 
-def refined(problem: SolidProblem, course: PosePath, allowed: float = ALLOWED) -> tuple[PosePath, float]:
+def refine_path(problem: SolidProblem, course: PosePath, allowed: float = ALLOWED) -> tuple[PosePath, float]:
     """Return a path with poses added where the curve needs them, and what the curve is off between poses.
 
     Parameters
@@ -370,7 +370,7 @@ def refined(problem: SolidProblem, course: PosePath, allowed: float = ALLOWED) -
     off: list[float] = []
     skipped: set[float] = set()
     for _ in range(len(course.poses)):
-        found = _checked(problem, course, skipped)
+        found = _check_interval(problem, course, skipped)
         if found is None:
             break
         course, difference = found
@@ -380,7 +380,7 @@ def refined(problem: SolidProblem, course: PosePath, allowed: float = ALLOWED) -
     return course, max(off[-CHECKS:], default=float("nan"))
 
 
-def _checked(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tuple[PosePath, float] | None:
+def _check_interval(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tuple[PosePath, float] | None:
     """Return the path with a pose in the middle of its worst interval, and how far the curve was from it [N or N m]."""
     travel = course.travel
     span = abs(travel[-1] - travel[0])

@@ -307,7 +307,7 @@ def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
         rigid[group.nodes] = number
     of = np.where(rigid[pieces[:, 0]] == rigid[pieces[:, 1]], rigid[pieces[:, 0]], -1)
     lines = linestrings(places[pieces])
-    if (spot := _at_obstacle(problem, pieces, lines)) is not None:
+    if (spot := _find_obstacle(problem, pieces, lines)) is not None:
         return spot
     own, others = STRtree(lines).query(lines)
     apart = (own < others) & ((of[own] < 0) | (of[own] != of[others]))
@@ -320,7 +320,7 @@ def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
     return np.asarray(lines[own[met[0]]].intersection(lines[others[met[0]]]).coords[0])
 
 
-def _at_obstacle(problem: SolidProblem, pieces: Any, lines: Any) -> FloatArray | None:
+def _find_obstacle(problem: SolidProblem, pieces: Any, lines: Any) -> FloatArray | None:
     """Return where a piece of the boundary, of two nodes each, is in a frame that it was not in at rest [m]."""
     if not problem.obstacles:
         return None

@@ -107,7 +107,7 @@ def travel_for(
     return MARGIN * travel
 
 
-def up_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
+def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
     """Return the part's path up to a load [N or N m] or to where it leads, with a pose there, and what that is."""
     course = solved.course
     found = LoadPath.of(course, load, through_maxima)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.solid.elements import shape_functions, slopes
-from cfmkit.solid.rigid_groups import turned
+from cfmkit.solid.rigid_groups import rotation_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,14 +45,16 @@ def motion(solved: MeshSolution, place: FloatArray, name: str) -> Callable[[Floa
 
         def of_group(unknowns: FloatArray, travel: float) -> FloatArray:
             x, y, turn = solved.problem.supports.motions(unknowns, travel)[number]
-            return np.array([*(np.array([x, y]) + (turned(turn) - np.eye(2)) @ arm), turn])
+            return np.array([*(np.array([x, y]) + (rotation_matrix(turn) - np.eye(2)) @ arm), turn])
 
-        return _between(solved, of_group)
+        return _reading_between(solved, of_group)
     found = MaterialPoint.at(solved.problem.elements, place)
     if found is None:
         return lambda travel: np.full((len(travel), 3), np.nan)
     supports = solved.problem.supports
-    return _between(solved, lambda unknowns, travel: found.motion(supports.displaced(unknowns, travel)), turns=True)
+    return _reading_between(
+        solved, lambda unknowns, travel: found.motion(supports.displaced(unknowns, travel)), turns=True
+    )
 
 
 def reaction(
@@ -73,10 +75,10 @@ def reaction(
         forces = own.forces(supports.displaced(unknowns, travel))
         return np.asarray(supports.reactions(unknowns, travel, forces)[number])
 
-    return _between(solved, read)
+    return _reading_between(solved, read)
 
 
-def _between(
+def _reading_between(
     solved: MeshSolution, read: Callable[[FloatArray, float], FloatArray], turns: bool = False
 ) -> Callable[[FloatArray], FloatArray]:
     """Return a reading of the part's state as a function of the travel; `turns`: its last value is an angle."""

@@ -37,7 +37,7 @@ class Group:
     load: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
-def within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDArray[np.bool_]:
+def find_within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDArray[np.bool_]:
     """Return which nodes (n, 2) [m] lie in polygons, or on lines of two points, or within `near` [m] of them."""
     from shapely import LineString, Polygon, distance, points, union_all
 
@@ -45,7 +45,7 @@ def within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDAr
     return np.asarray(distance(covered, points(nodes)) <= near)
 
 
-def turned(angle: float, derivative: int = 0) -> FloatArray:
+def rotation_matrix(angle: float, derivative: int = 0) -> FloatArray:
     """Return a rotation matrix, or its derivative with respect to the angle [rad]."""
     c, s = np.cos(angle + derivative * np.pi / 2), np.sin(angle + derivative * np.pi / 2)
     return np.array([[c, -s], [s, c]])
@@ -86,14 +86,14 @@ class Supports:
         moved.ravel()[self.loose] = unknowns[: len(self.loose)]
         for group, motion in zip(self.groups, self.motions(unknowns, travel), strict=True):
             arm = self.places[group.nodes] - group.center
-            moved[group.nodes] = motion[:2] + arm @ (turned(motion[2]) - np.eye(2)).T
+            moved[group.nodes] = motion[:2] + arm @ (rotation_matrix(motion[2]) - np.eye(2)).T
         return moved
 
     def _levers(self, motions: list[FloatArray]) -> list[FloatArray]:
         """Return, for every group, how its nodes' displacements follow its motions, (2k, 3)."""
         found = []
         for group, motion in zip(self.groups, motions, strict=True):
-            arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 1).T
+            arm = (self.places[group.nodes] - group.center) @ rotation_matrix(motion[2], 1).T
             lever = np.zeros((len(group.nodes), 2, 3))
             lever[:, 0, 0] = lever[:, 1, 1] = 1.0
             lever[:, :, 2] = arm
@@ -135,7 +135,7 @@ class Supports:
             last = first + group.free.shape[1]
             ways[rows, first:last] = lever @ group.free
             ways[rows, -1] = lever @ group.driven
-            arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 2).T
+            arm = (self.places[group.nodes] - group.center) @ rotation_matrix(motion[2], 2).T
             turns = np.zeros(count + 1)
             turns[first:last], turns[-1] = group.free[2], group.driven[2]
             curved += float((forces[group.nodes] * arm).sum()) * np.outer(turns, turns)

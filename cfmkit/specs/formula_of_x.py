@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,11 +61,11 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{shown(text)} is not a formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
+        raise ValueError(f"{quote(text)} is not a formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
     try:
         _value(tree, np.ones(1))
     except RecursionError:
-        raise ValueError(f"{shown(text)} is nested too deep for a formula") from None
+        raise ValueError(f"{quote(text)} is nested too deep for a formula") from None
 
     def function(x: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
@@ -139,7 +139,7 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
             raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
         with np.errstate(all="ignore"):
             return _FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
-    reported = shown(ast.unparse(node))
+    reported = quote(ast.unparse(node))
     raise ValueError(
         f"{reported} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}"
     )

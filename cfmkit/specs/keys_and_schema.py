@@ -55,9 +55,12 @@ def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:
     each = {name: json_schema(model) for name, model in models.items()}
     if len(each) == 1:
         return {"$schema": DIALECT} | next(iter(each.values()))
-    shared = {f"{name}.{key}": _renamed(block, name) for name, one in each.items() for key, block in _blocks(one)}
+    shared = {
+        f"{name}.{key}": _rename_references(block, name) for name, one in each.items() for key, block in _blocks(one)
+    }
     choices = [
-        {key: value for key, value in _renamed(one, name).items() if key != "$defs"} for name, one in each.items()
+        {key: value for key, value in _rename_references(one, name).items() if key != "$defs"}
+        for name, one in each.items()
     ]
     return {"$schema": DIALECT, "title": "cfmkit specification", "oneOf": choices, "$defs": shared}
 
@@ -103,7 +106,7 @@ def _bounds_as_text(node: dict[str, Any], dimension: str) -> None:
 def keys(model: type[Spec]) -> tuple[Key, ...]:
     """Return every key that a specification of a family may have, in the order of its model."""
     whole = json_schema(model)
-    return tuple(_below(whole, dict(_blocks(whole)), ""))
+    return tuple(_keys_below(whole, dict(_blocks(whole)), ""))
 
 
 def _blocks(whole: dict[str, Any]) -> Iterable[tuple[str, Any]]:
@@ -111,20 +114,20 @@ def _blocks(whole: dict[str, Any]) -> Iterable[tuple[str, Any]]:
     return found.items()
 
 
-def _renamed(node: Any, prefix: str) -> Any:
+def _rename_references(node: Any, prefix: str) -> Any:
     """Return a schema whose references point to definitions with a prefix."""
     if isinstance(node, list):
-        return [_renamed(item, prefix) for item in node]
+        return [_rename_references(item, prefix) for item in node]
     if not isinstance(node, dict):
         return node
     start = "#/$defs/"
-    result = {key: _renamed(value, prefix) for key, value in node.items()}
+    result = {key: _rename_references(value, prefix) for key, value in node.items()}
     if isinstance(target := node.get("$ref"), str) and target.startswith(start):
         result["$ref"] = f"{start}{prefix}.{target.removeprefix(start)}"
     return result
 
 
-def _below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Iterator[Key]:
+def _keys_below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Iterator[Key]:
     required = block.get("required", ())
     for name, node in block.get("properties", {}).items():
         here = f"{path}.{name}" if path else name
@@ -134,7 +137,7 @@ def _below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Iterator
             key = replace(key, description=block.get("description", ""))
         yield key
         for inner, marker in _inner_blocks(node, blocks):
-            yield from _below(inner, blocks, here + marker)
+            yield from _keys_below(inner, blocks, here + marker)
 
 
 def _inner_blocks(node: dict[str, Any], blocks: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
@@ -166,7 +169,7 @@ def _key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool
         path,
         " or ".join(dict.fromkeys(_kind(one, blocks) for one in members)),
         next((one["examples"][0] for one in quantities if one.get("examples")), ""),
-        "; ".join(dict.fromkeys(filter(None, map(_allowed, members)))),
+        "; ".join(dict.fromkeys(filter(None, map(_describe_allowed, members)))),
         _default(default) if default not in (_NOTHING, None, "", []) else "",
         required,
         node.get("description") or next((one["description"] for one in members if "description" in one), ""),
@@ -193,11 +196,11 @@ def _items(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     return count + " or ".join(kinds)
 
 
-def _allowed(node: dict[str, Any]) -> str:
+def _describe_allowed(node: dict[str, Any]) -> str:
     if "x-allowed" in node:
         return str(node["x-allowed"])
     if node.get("type") == "array":
-        return _allowed(node.get("items", {}))
+        return _describe_allowed(node.get("items", {}))
     signs = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
     return " and ".join(f"{sign} {node[word]:g}" for word, sign in signs.items() if word in node)
 

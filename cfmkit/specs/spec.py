@@ -383,7 +383,7 @@ class Spec(Model):
         """
         data = {**keys_of(self), "family": self.family}
         for path, value in changes.items():
-            data = _with(data, path.split("."), value, path)
+            data = _set_value(data, path.split("."), value, path)
         try:
             return type(self).model_validate(data, context={AS_MADE: as_made})
         except ValidationError as error:
@@ -391,7 +391,7 @@ class Spec(Model):
 
             whole = self.model_dump(exclude_unset=True) | {"family": self.family}
             for path, value in changes.items():
-                whole = _with(whole, path.split("."), value, path)
+                whole = _set_value(whole, path.split("."), value, path)
             raise spec_error(error, type(self), whole) from None
 
     def leaves(self) -> Iterator[tuple[str, float | int]]:
@@ -430,21 +430,21 @@ def _child(value: Any, part: str, path: str) -> Any:
     raise KeyError(f"there is no {part!r} on the way to {path!r}")
 
 
-def _with(data: Any, parts: list[str], value: Any, path: str) -> Any:
+def _set_value(data: Any, parts: list[str], value: Any, path: str) -> Any:
     """Return `data` with `value` at `parts`; blocks on the way are made where they are missing."""
     head, rest = parts[0], parts[1:]
     if isinstance(data, tuple | list):
         if not head.isdigit() or int(head) >= len(data):
             raise KeyError(f"{head!r} is not an index from 0 to {len(data) - 1} on the way to {path!r}")
         items = list(data)
-        items[int(head)] = _with(items[int(head)], rest, value, path) if rest else frozen(value)
+        items[int(head)] = _set_value(items[int(head)], rest, value, path) if rest else frozen(value)
         return tuple(items)
     if isinstance(data, Model):
         data = keys_of(data)
     if data is not None and not isinstance(data, Mapping):
         raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
     block = dict(data or {})
-    block[head] = _with(block.get(head), rest, value, path) if rest else frozen(value)
+    block[head] = _set_value(block.get(head), rest, value, path) if rest else frozen(value)
     return block
 
 

@@ -16,7 +16,7 @@ from cfmkit.errors import QuantityError
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
-from cfmkit.specs.units.fields import described
+from cfmkit.specs.units.fields import describe_value
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed_laws
 from cfmkit.stock.materials import UnknownMaterial, material
 from cfmkit.stock.printing import LAYER_STRENGTHS, Layers
@@ -201,7 +201,7 @@ def _as_block(value: Any) -> Any:
     if isinstance(value, bool | int | float | tuple | list):
         # As with quantities, a list is a misfit where lists are allowed, too: what is wrong in it is told then.
         raise QuantityError(
-            f"{described(value)} is no material: give a name from `show materials`, or values such as "
+            f"{describe_value(value)} is no material: give a name from `show materials`, or values such as "
             "{youngs_modulus: 2 GPa, yield_strength: 50 MPa}"
         )
     return value

@@ -89,11 +89,11 @@ def origin(libraries: Iterable[str] = NUMERICAL) -> dict[str, str]:
         Distributions whose versions count; one that is not installed counts as that.
     """
     found = {"cfmkit": __version__, "content": code_stamp(), "python": platform.python_version()}
-    return found | {name: installed(name) or "not installed" for name in libraries}
+    return found | {name: installed_version(name) or "not installed" for name in libraries}
 
 
 @lru_cache(maxsize=32)
-def installed(name: str) -> str | None:
+def installed_version(name: str) -> str | None:
     """Return the version of a distribution, None if it is not installed.
 
     It stands in the name of a folder beside the library's own. The standard library reads the file in that folder: to

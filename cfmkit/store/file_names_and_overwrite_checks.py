@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store.content_hashes_and_versions import file_hash
-from cfmkit.store.safe_disk_changes import shown
+from cfmkit.store.safe_disk_changes import quote_path
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,11 +58,11 @@ def refuse_in_the_way(root: Path, name: str, *, ours: bool) -> None:
         place = place / part
         mode = mode_of(place)
         if mode is not None and not stat.S_ISDIR(mode):
-            raise OutputError(f"{shown(place)} is in the way: it is {_what(mode)}, not a folder; {CURE}")
+            raise OutputError(f"{quote_path(place)} is in the way: it is {_what(mode)}, not a folder; {CURE}")
     mode = mode_of(root / name)
     if mode is None or (ours and stat.S_ISREG(mode)):
         return
-    raise OutputError(f"{shown(root / name)} is in the way: it is {_what(mode)} that no earlier run wrote; {CURE}")
+    raise OutputError(f"{quote_path(root / name)} is in the way: it is {_what(mode)} that no earlier run wrote; {CURE}")
 
 
 def hash_in(root: Path, name: str) -> str | None:

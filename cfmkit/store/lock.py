@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import FolderInUse, OutputError
 from cfmkit.store import safe_disk_changes
-from cfmkit.store.safe_disk_changes import shown
+from cfmkit.store.safe_disk_changes import quote_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,7 +56,7 @@ _descriptors: set[int] = set()
 
 
 @contextlib.contextmanager
-def without_locks() -> Iterator[None]:
+def disable_locks() -> Iterator[None]:
     """Lock no folder inside the block: the user makes sure that one run at a time uses a folder (``--no-lock``)."""
     before = os.environ.get(NO_LOCK)
     os.environ[NO_LOCK] = "1"
@@ -109,7 +109,7 @@ class FolderLock:
         file = self._folder / self.name
         present = self._soft.is_lock_held_by_us if self._soft else not self.name or _same(self._descriptor, file)
         if not present:
-            raise OutputError(f"{shown(file)} was removed during the run: another run may be in the folder")
+            raise OutputError(f"{quote_path(file)} was removed during the run: another run may be in the folder")
 
     def release(self) -> None:
         """Remove the lock file and unlock; in a forked copy of the owner nothing happens."""
@@ -208,7 +208,7 @@ def _lock_softly(file: Path, folder: Path) -> Any:
     try:
         soft.acquire(timeout=SOFT_LOCK_TIMEOUT, poll_interval=SOFT_LOCK_TIMEOUT / 10)
     except filelock.Timeout:
-        cure = f"if no run is there any more, remove {shown(file)} or add --no-lock"
+        cure = f"if no run is there any more, remove {quote_path(file)} or add --no-lock"
         raise _busy(folder, *_soft_signature(file), cure) from None
     _report_soft_locks(os.path.dirname(folder))
     return soft
@@ -217,7 +217,7 @@ def _lock_softly(file: Path, folder: Path) -> Any:
 @cache
 def _report_soft_locks(folder: str) -> None:
     message = "warning  no file locks in %s: the file %s marks a live run (--no-lock: none)"
-    _LOG.warning(message, shown(folder), SOFT_LOCK)
+    _LOG.warning(message, quote_path(folder), SOFT_LOCK)
 
 
 def _same(descriptor: int, file: Path) -> bool:
@@ -258,9 +258,9 @@ def _soft_signature(file: Path) -> tuple[str, str]:
 
 
 def _busy(folder: Path, process: str, host: str, cure: str = "wait for it or give another --out") -> FolderInUse:
-    place = f" on {shown(host)}" if host and host != platform.node() else ""
+    place = f" on {quote_path(host)}" if host and host != platform.node() else ""
     who = f"process {process}{place}" if process.isdigit() else "another process"
-    return FolderInUse(f"{shown(folder)} is in use by a live run ({who}); {cure}")
+    return FolderInUse(f"{quote_path(folder)} is in use by a live run ({who}); {cure}")
 
 
 def _close_in_child() -> None:

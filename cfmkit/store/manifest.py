@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit._version import __version__
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store.file_names_and_overwrite_checks import CURE, MANIFEST, checked_name, hash_in, mode_of
-from cfmkit.store.safe_disk_changes import FileRecord, reporting, shown
+from cfmkit.store.safe_disk_changes import FileRecord, quote_path, reporting
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -101,9 +101,9 @@ class Manifest:
         if mode is None:
             return None
         with reporting(path, "read"):
-            data = _parsed(path.read_bytes()) if stat.S_ISREG(mode) else None
+            data = _parse(path.read_bytes()) if stat.S_ISREG(mode) else None
         if data is None:
-            raise OutputError(f"{shown(path)} is in the way: cfmkit did not write it; {CURE}")
+            raise OutputError(f"{quote_path(path)} is in the way: cfmkit did not write it; {CURE}")
         files = {name: FileRecord(**record) for name, record in data["files"].items()}
         return cls(MappingProxyType(files), MappingProxyType(data))
 
@@ -112,7 +112,7 @@ class Manifest:
         return tuple(name for name, record in self.files.items() if hash_in(folder, name) != record.sha256)
 
 
-def _parsed(content: bytes) -> dict[str, Any] | None:
+def _parse(content: bytes) -> dict[str, Any] | None:
     """Return a manifest's data, or None if it is not one of ours.
 
     The names decide what the next run removes, so nothing odd may pass.

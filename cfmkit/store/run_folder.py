@@ -27,7 +27,7 @@ from cfmkit.store.file_names_and_overwrite_checks import (
 )
 from cfmkit.store.lock import FolderLock
 from cfmkit.store.manifest import Manifest
-from cfmkit.store.safe_disk_changes import TEMPORARY, FileRecord, reporting, shown
+from cfmkit.store.safe_disk_changes import TEMPORARY, FileRecord, quote_path, reporting
 from cfmkit.store.transaction import NEW, RUN
 
 if TYPE_CHECKING:
@@ -87,14 +87,14 @@ class RunFolder:
         self._started = datetime.now(UTC)
         self._clock = time.monotonic()
         try:
-            with _undisturbed(), reporting(self.path, "use the folder"):
+            with _defer_signals(), reporting(self.path, "use the folder"):
                 atexit.register(self._leave)
                 self._create_and_lock()
                 self._take_over()
             self._owner = os.getpid()
             return self
         except BaseException:
-            with _undisturbed():
+            with _defer_signals():
                 self._leave()
             raise
 
@@ -103,10 +103,10 @@ class RunFolder:
     ) -> None:
         """Drop what was not committed and unlock the folder; a signal that comes meanwhile acts afterwards."""
         try:
-            with _undisturbed():
+            with _defer_signals():
                 self._leave()
         except BaseException:
-            with _undisturbed():  # the signal may have come just before
+            with _defer_signals():  # the signal may have come just before
                 self._leave()
             raise
 
@@ -253,7 +253,7 @@ class RunFolder:
     def _require_open(self) -> None:
         if self._owner != os.getpid():
             state = "is not open in this process, or was committed already"
-            raise CfmError(f"cannot write to {shown(self.path)}: the run folder {state}")
+            raise CfmError(f"cannot write to {quote_path(self.path)}: the run folder {state}")
 
     def _leave(self) -> None:
         """Drop the working folder, unlock, and remove what was created for nothing; once.
@@ -270,7 +270,7 @@ class RunFolder:
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
+def _defer_signals() -> Iterator[None]:
     """Hold back the signals that end a run: between making a folder and remembering it they would leave it there.
 
     Not by the mask of signals of this thread: another thread would take them, and Python acts on them in this one.

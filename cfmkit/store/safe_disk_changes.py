@@ -54,7 +54,7 @@ class FileRecord(NamedTuple):
     sha256: str
 
 
-def shown(path: str | os.PathLike[str]) -> str:
+def quote_path(path: str | os.PathLike[str]) -> str:
     """Return a path for a message: on one line, whatever characters it holds."""
     text = os.fspath(path)
     return text if text.isprintable() else ascii(text)
@@ -66,7 +66,7 @@ def reporting(path: str | os.PathLike[str], doing: str = "write") -> Iterator[No
     try:
         yield
     except OSError as error:
-        raise OutputError(f"cannot {doing} {shown(path)}: {reason(error)}") from error
+        raise OutputError(f"cannot {doing} {quote_path(path)}: {reason(error)}") from error
 
 
 def reason(error: OSError) -> str:
@@ -93,7 +93,7 @@ def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
         If anything fails; the old file is still there and the temporary file is not.
     """
     if "\0" in os.fspath(path):
-        raise OutputError(f"cannot write {shown(path)}: a path holds no NUL character")
+        raise OutputError(f"cannot write {quote_path(path)}: a path holds no NUL character")
     target = Path(os.path.realpath(path))
     temporary = target.parent / TEMPORARY.format(pid=os.getpid(), count=next(_counter))
     with reporting(path):

@@ -33,7 +33,7 @@ from cfmkit.store.file_names_and_overwrite_checks import (
     mode_of,
     refuse_in_the_way,
 )
-from cfmkit.store.safe_disk_changes import reason, remove_empty, reporting, shown, sync_folder
+from cfmkit.store.safe_disk_changes import quote_path, reason, remove_empty, reporting, sync_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -86,8 +86,8 @@ def execute(root: Path, plan: CommitPlan) -> None:
         with suppress(OSError, OutputError):
             _turn_back(root, plan)
         if isinstance(error, OSError) and _pending(root):
-            half = f"{shown(root)} is half-way between two runs; the next run into it repairs it"
-            raise OutputError(f"cannot write {shown(root)}: {reason(error)}; {half}") from error
+            half = f"{quote_path(root)} is half-way between two runs; the next run into it repairs it"
+            raise OutputError(f"cannot write {quote_path(root)}: {reason(error)}; {half}") from error
         raise
 
 
@@ -103,7 +103,7 @@ def recover(root: Path) -> None:
     if (mode := mode_of(run)) is None:
         return
     if not run.is_dir() or run.is_symlink():
-        raise OutputError(f"{shown(run)} is in the way: it is not a folder of cfmkit (mode {mode:o}); {CURE}")
+        raise OutputError(f"{quote_path(run)} is in the way: it is not a folder of cfmkit (mode {mode:o}); {CURE}")
     with reporting(root, "repair"):
         if mode_of(run / UNDO) is not None:
             _roll_back(root, _read_plan(root, UNDO))
@@ -166,7 +166,7 @@ def _refuse_changed(root: Path, change: Change) -> None:
     """Raise if the file in place is neither the one that the plan knew nor the new one."""
     place = root / change.name
     if mode_of(place) is not None and hash_in(root, change.name) not in {change.old, change.new} - {None}:
-        raise OutputError(f"{shown(place)} was changed while a run was replacing it; {CURE}")
+        raise OutputError(f"{quote_path(place)} was changed while a run was replacing it; {CURE}")
 
 
 def _resume(root: Path, plan: CommitPlan) -> None:
@@ -228,7 +228,9 @@ def _read_plan(root: Path, name: str) -> CommitPlan:
         for item in (*names, *plan.folders):
             checked_name(item)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OutputError):
-        raise OutputError(f"{shown(path)} is not a plan of cfmkit; remove {shown(path.parent)} to go on") from None
+        raise OutputError(
+            f"{quote_path(path)} is not a plan of cfmkit; remove {quote_path(path.parent)} to go on"
+        ) from None
     for change in plan.changes:
         refuse_in_the_way(root, change.name, ours=True)
     return plan

@@ -208,7 +208,7 @@ def folders(files: Sequence[str]) -> tuple[str, ...]:
     """
     paths = [Path(os.path.abspath(file)).with_suffix("") for file in files]
     depths = dict.fromkeys(paths, 1)
-    while twice := _repeated(depths):
+    while twice := _find_repeated(depths):
         depths |= {path: depths[path] + 1 for path in twice}
     return tuple(_distinct(_tail(path, depths[path]) for path in paths))
 
@@ -217,7 +217,7 @@ def _tail(path: Path, depth: int) -> str:
     return "-".join(path.parts[1:][-depth:]) or "spec"
 
 
-def _repeated(depths: Mapping[Path, int]) -> list[Path]:
+def _find_repeated(depths: Mapping[Path, int]) -> list[Path]:
     """Return different paths whose tails are the same, capitals apart, and could be longer."""
     counts = Counter(_tail(path, depth).lower() for path, depth in depths.items())
     return [

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Designer
 
 
-def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
+def run_design(spec: Spec, designer: Designer, run: Run) -> Design:
     """Return the design of a specification, with all that its block `design` asks for, or why there is none.
 
     Parameters
@@ -49,9 +49,9 @@ def _finished_design(spec: Spec, designer: Designer, run: Run) -> Design:
     plain = getattr(asked, "yield", None) is None
     result = designer(spec, run) if plain else _with_yield(spec, designer, run)
     if getattr(asked, "verify", None) is not None:
-        from cfmkit.studies.verify_design_by_solid_model import verified
+        from cfmkit.studies.verify_design_by_solid_model import verify_by_solid
 
-        result = verified(spec, result, run)
+        result = verify_by_solid(spec, result, run)
     return result
 
 

@@ -15,7 +15,15 @@ from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
 from cfmkit.studies.journal import Memory
 from cfmkit.studies.point_evaluation import Row
-from cfmkit.studies.row_blocks_for_journal import ResultRows, cut, gathered, joined, recalled, recalled_row, record
+from cfmkit.studies.row_blocks_for_journal import (
+    ResultRows,
+    cut_rows,
+    gather_rows,
+    join_rows,
+    recall_rows,
+    recalled_row,
+    record,
+)
 from cfmkit.studies.serial_and_cluster_executors import Lost, serial
 from cfmkit.studies.variants_in_rows import BLOCK, are_solved_together, evaluate_rows
 
@@ -109,11 +117,11 @@ class Work:
 
     def gather(self, *rows: Row) -> ResultRows:
         """Return single rows as the rows of this study."""
-        return gathered(rows, len(self.study.metrics), len(self.study.spec.part_requirements))
+        return gather_rows(rows, len(self.study.metrics), len(self.study.spec.part_requirements))
 
     def recall(self, reported: Any) -> ResultRows:
         """Return the rows that are stored in a record of the journal."""
-        return recalled(reported, len(self.study.metrics), len(self.study.spec.part_requirements))
+        return recall_rows(reported, len(self.study.metrics), len(self.study.spec.part_requirements))
 
 
 class Monitor(Protocol):
@@ -225,7 +233,7 @@ class Records:
         whole: list[ResultRows] = []
         for single, run_of in runs:
             whole += [self.work.gather(*run_of)] if single else run_of  # type: ignore[arg-type]
-        return joined(whole)
+        return join_rows(whole)
 
     def _pieces(self) -> Iterator[tuple[int, ResultRows | Row]]:
         at = 0
@@ -259,9 +267,9 @@ class Records:
         """Return the row of one finished point."""
         if int(self._places[index]) == HELD:
             start = max(at for at in self._held if at <= index)
-            return cut(self._held[start], index - start, index - start + 1)
+            return cut_rows(self._held[start], index - start, index - start + 1)
         rows, start = self.work.recall(self._reported(index)), index - index % self.work.step
-        return rows if len(rows) == 1 else cut(rows, index - start, index - start + 1)
+        return rows if len(rows) == 1 else cut_rows(rows, index - start, index - start + 1)
 
 
 def run(
@@ -310,7 +318,7 @@ def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Mo
                     continue
                 outcome = work.gather(Row(outcome.status, message=outcome.message, bug=outcome.bug))
             for block in job.blocks or (job,):
-                records.keep(block, cut(outcome, block.start - job.start, block.stop - job.start))
+                records.keep(block, cut_rows(outcome, block.start - job.start, block.stop - job.start))
             watch.done(len(outcome), outcome.failed, False)
     return lost
 
@@ -330,17 +338,17 @@ def _neighbours(queue: Iterator[Job], most: int) -> Iterator[Job]:
     held: list[Job] = []
     for job in queue:
         if held and (job.start != held[-1].stop or job.stop - held[0].start > most):
-            yield _merged(held)
+            yield _merge_jobs(held)
             held = []
         held.append(job)
         if job.stop - held[0].start >= most:
-            yield _merged(held)
+            yield _merge_jobs(held)
             held = []
     if held:
-        yield _merged(held)
+        yield _merge_jobs(held)
 
 
-def _merged(jobs: list[Job]) -> Job:
+def _merge_jobs(jobs: list[Job]) -> Job:
     first, last = jobs[0], jobs[-1]
     return first if first is last else Job(first.start, last.stop, first.key, tuple(jobs))
 

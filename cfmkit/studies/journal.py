@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cfmkit.errors import OutputError
 from cfmkit.store.lock import locks_can_be_used
-from cfmkit.store.safe_disk_changes import discard, reporting, shown
+from cfmkit.store.safe_disk_changes import discard, quote_path, reporting
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -61,7 +61,7 @@ class Journal:
     def __enter__(self) -> Self:
         """Open the file; one that is no sound database is begun anew."""
         if self.path.is_symlink():
-            raise OutputError(f"cannot open {shown(self.path)}: it is a link")
+            raise OutputError(f"cannot open {quote_path(self.path)}: it is a link")
         with reporting(self.path, "open"), self._reporting("open"):
             try:
                 self._open()
@@ -70,7 +70,7 @@ class Journal:
                     raise
                 _remove(self.path)
                 self._open()
-                _LOG.warning("journal  %s was damaged: everything is computed again", shown(self.path))
+                _LOG.warning("journal  %s was damaged: everything is computed again", quote_path(self.path))
         self._forget_older()
         return self
 
@@ -104,7 +104,7 @@ class Journal:
         """
         record = self._record("", key)
         if record is None:
-            raise OutputError(f"cannot read {shown(self.path)}: it was changed during the run; run it again")
+            raise OutputError(f"cannot read {quote_path(self.path)}: it was changed during the run; run it again")
         return record
 
     def add(self, key: str, record: Any) -> None:
@@ -195,7 +195,7 @@ class Journal:
         except sqlite3.Error as error:
             name = _name_of(error)
             why = next((text for start, text in _REASONS.items() if name.startswith(start)), str(error))
-            raise OutputError(f"cannot {doing} {shown(self.path)}: {why}") from error
+            raise OutputError(f"cannot {doing} {quote_path(self.path)}: {why}") from error
 
 
 class Memory:

@@ -58,19 +58,19 @@ def earlier(folder: str) -> Known:
     cfmkit.errors.UsageError
         If the folder is none of a batch.
     """
-    whole = _read(os.path.join(folder, "metrics.json"))
+    whole = _read_json(os.path.join(folder, "metrics.json"))
     if whole is None or not isinstance(listed := whole.get("specs"), list):
         raise UsageError(f"--compare: {visible(folder)} is not the folder of a batch: it has no metrics.json of one")
     known = {}
     for one in listed:
         if isinstance(one, dict) and isinstance(name := one.get("folder"), str):
-            own = _read(os.path.join(folder, name, "metrics.json")) or {}
+            own = _read_json(os.path.join(folder, name, "metrics.json")) or {}
             metrics = flat_metrics(own.get("metrics", {}))
             known[name] = Earlier(str(one.get("status", "")), int(one.get("exit_code", 0)), metrics)
     return known
 
 
-def _read(path: str) -> dict[str, Any] | None:
+def _read_json(path: str) -> dict[str, Any] | None:
     try:
         with open(path, encoding="utf-8") as file:
             found = json.load(file)
@@ -104,7 +104,7 @@ def changes(
             ends = _ends(before.status, before.exit_code), _ends(entry.status, int(entry.code))
             found.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
-            own = _read(os.path.join(folder, entry.folder, "metrics.json")) or {}
+            own = _read_json(os.path.join(folder, entry.folder, "metrics.json")) or {}
             now = flat_metrics(own.get("metrics", {}))
             sides = Compared("the earlier batch", metrics=before.metrics), Compared(entry.spec, metrics=now)
             found += compare(*sides, tolerance=tolerance).changes
@@ -117,7 +117,7 @@ def _ends(status: str, code: int) -> str:
     return f"{status}, requirement missed" if missed and status == Status.COMPLETE.key else status
 
 
-def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
+def list_gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
     """Return the folders of specifications that the earlier batch had and this one has not."""
     there = {entry.folder for entry in entries}
     return tuple(name for name in known if name not in there)

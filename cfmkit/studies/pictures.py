@@ -42,7 +42,7 @@ def findings(records: Records, summary: Summary) -> StudyMarks:
     study, plan = records.work.study, records.work.plan
     values = np.concatenate([values for _, values, _ in summary.kept])
     meets = np.concatenate([meets for _, _, meets in summary.kept])
-    metrics = [_drawn(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
+    metrics = [_drawn_scale(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
     kinds = [(item.path, item.dimension) for item in plan.variables]
     varied = scales(study.spec, kinds, [*plan.shown(0, len(plan))], [[*map(str, one.shown)] for one in plan.variables])
@@ -80,7 +80,7 @@ def best_words(name: str, sense: str, ties: int) -> str:
     return f"best: {sense} {name.replace('_', ' ')}{more}"
 
 
-def _drawn(metric: Metric, values: FloatArray) -> DrawnScale:
+def _drawn_scale(metric: Metric, values: FloatArray) -> DrawnScale:
     if metric.words:
         return DrawnScale(metric.name, metric.dimension, values, metric.words)
     return measured_scale(metric.name, metric.dimension, border_values(values, metric.dimension))
@@ -136,10 +136,10 @@ def _nominal(table: Table) -> Table:
     rows = list(zip(*(column.cells() for column in table.columns[:labels]), strict=True)) or [()] * len(table)
     first = [number for number, row in enumerate(rows) if row == rows[0]]
     # the cells of a column once, not once a row: a study has thousands of these
-    return Table(tuple(_taken(one, first) for one in table.columns[labels : labels + 3]))
+    return Table(tuple(_take_column(one, first) for one in table.columns[labels : labels + 3]))
 
 
-def _taken(column: TableColumn, rows: list[int]) -> TableColumn:
+def _take_column(column: TableColumn, rows: list[int]) -> TableColumn:
     cells = column.cells()
     return TableColumn(column.name, tuple(cells[k] for k in rows), column.unit)
 

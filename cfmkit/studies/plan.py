@@ -123,10 +123,10 @@ def grid(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     """
     size = math.prod(item.count or 0 for item in axes)
     refuse_too_many(size, most)
-    return Plan(tuple(map(stepped, axes)), size)
+    return Plan(tuple(map(step_axis, axes)), size)
 
 
-def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
+def zip_axes(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     """Return the values side by side: the first of each, the second of each, ...
 
     Raises
@@ -140,7 +140,7 @@ def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
         raise UsageError(f"values varied in step must be equally many: {reported}")
     size = next(iter(counts.values()))
     refuse_too_many(size, most)
-    plan = Plan(tuple(map(stepped, axes)), size, joint=True)
+    plan = Plan(tuple(map(step_axis, axes)), size, joint=True)
     seen: dict[tuple[Any, ...], int] = {}
     for index in range(size):
         if (first := seen.setdefault(plan.point(index), index)) != index:
@@ -157,7 +157,7 @@ class Draw:
     seed: int = 0
 
 
-def sampled(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Plan:
+def sample_axes(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Plan:
     """Return points drawn from ranges without a number of steps, or from lists.
 
     Lists and whole numbers get each of their values with the same probability.
@@ -176,7 +176,7 @@ def sampled(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Plan:
         # A Sobol sequence that is not a power of two long is less balanced, not wrong.
         warnings.simplefilter("ignore", UserWarning)
         unit = engine.random(draw.count)
-    return Plan(tuple(_drawn(item, unit[:, k]) for k, item in enumerate(axes)), draw.count, joint=True)
+    return Plan(tuple(_drawn_variable(item, unit[:, k]) for k, item in enumerate(axes)), draw.count, joint=True)
 
 
 def refuse_too_many(size: int, most: int) -> None:
@@ -191,22 +191,24 @@ def refuse_too_many(size: int, most: int) -> None:
         raise UsageError(f"{size} points are more than {most}; vary less, or allow them with --max-points {size}")
 
 
-def stepped(axis: Axis) -> Variable:
+def step_axis(axis: Axis) -> Variable:
     """Return the variable that goes through the values of an axis."""
     place = is_place(axis)
     if axis.ends is None:
         plain = tuple(float(value) if place else value for value in axis.listed)
-        return Variable(axis.leaf.path, axis.dimension, plain, tuple(_shown(v, axis.dimension) for v in plain), place)
+        return Variable(
+            axis.leaf.path, axis.dimension, plain, tuple(_show_value(v, axis.dimension) for v in plain), place
+        )
     count = axis.count or 0
     if axis.leaf.kind == "whole":
         whole = np.linspace(*axis.ends, count).round().astype(np.int64)
         return Variable(axis.leaf.path, axis.dimension, whole, whole)
-    ends = [_shown(end, axis.dimension) for end in axis.ends]
+    ends = [_show_value(end, axis.dimension) for end in axis.ends]
     shown = even_grid(ends[0], ends[1], count)
-    return Variable(axis.leaf.path, axis.dimension, _inside(shown, axis.dimension), shown, place)
+    return Variable(axis.leaf.path, axis.dimension, _border_to_si(shown, axis.dimension), shown, place)
 
 
-def _shown(value: Any, dimension: str) -> Any:
+def _show_value(value: Any, dimension: str) -> Any:
     """Return a value as tables show it: in the border unit, with no more digits than it needs."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -215,7 +217,7 @@ def _shown(value: Any, dimension: str) -> Any:
     return float(format_quantity(value, dimension).split(" ")[0])
 
 
-def _inside(shown: FloatArray, dimension: str) -> FloatArray:
+def _border_to_si(shown: FloatArray, dimension: str) -> FloatArray:
     """Return border values in SI; where the factor is a power of ten, each the float nearest to its decimal."""
     factor = float(to_border(1.0, dimension))
     power = round(math.log10(factor))
@@ -225,11 +227,11 @@ def _inside(shown: FloatArray, dimension: str) -> FloatArray:
     return values
 
 
-def _drawn(axis: Axis, unit: FloatArray) -> Variable:
+def _drawn_variable(axis: Axis, unit: FloatArray) -> Variable:
     """Return the variable whose values are an axis at places in [0, 1)."""
     path, dimension, place = axis.leaf.path, axis.dimension, is_place(axis)
     if axis.ends is None:
-        levels = stepped(axis)
+        levels = step_axis(axis)
         index = np.minimum((unit * len(levels.values)).astype(np.intp), len(levels.values) - 1)
         return Variable(path, dimension, _array(levels.values)[index], _array(levels.shown)[index], place)
     low, high = axis.ends

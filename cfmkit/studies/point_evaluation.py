@@ -162,7 +162,7 @@ class Study:
         except CfmError as error:
             if _STATUS_OF.get(error.exit_code) is Status.CRASHED:
                 return _bug(error)
-            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_reported(error))
+            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_error_line(error))
         except Exception as error:
             return _bug(error)
 
@@ -217,7 +217,7 @@ def _curve(result: Result) -> bytes:
     return to_csv(curve_table(result.curves))
 
 
-def _reported(error: CfmError) -> str:
+def _error_line(error: CfmError) -> str:
     """Return an error in one line; of a specification, paths and messages without the empty source."""
     if isinstance(error, SpecError):
         return "; ".join(": ".join(filter(None, (one.path, one.message))) for one in error.problems)

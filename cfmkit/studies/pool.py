@@ -152,7 +152,7 @@ class _Crew:
             while len(one.given) < self._ahead() and (job := self._next()) is not None:
                 one.give(job)
         while len(self.workers) < self.pool.processes and (job := self._next()) is not None:
-            self.workers.append(_started())
+            self.workers.append(_start_worker())
             self.workers[-1].give(job)
             self.workers[-1].listen(self.what, self.messages)
         return any(one.given for one in self.workers)
@@ -272,7 +272,7 @@ _MAIN_MODULE = b"__main__"
 """Name of the module of a notebook or a script, as pickles have it: in a worker it is another one."""
 
 
-def until(executor: Executor, deadline: float | None) -> Executor:
+def give_up_at(executor: Executor, deadline: float | None) -> Executor:
     """Return an executor that gives up what runs at a deadline, in `time.time` [s]; as it is if it has one process."""
     return replace(executor, deadline=deadline) if isinstance(executor, Pool) else executor
 
@@ -287,7 +287,7 @@ def _cause(code: int) -> str:
     return f"signal {-code}"
 
 
-def _started() -> _Worker:
+def _start_worker() -> _Worker:
     """Return a new worker."""
     if not sys.executable:
         raise UsageError("this Python cannot start other processes; use one job (-j 1)")

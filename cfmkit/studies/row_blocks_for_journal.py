@@ -58,7 +58,7 @@ class ResultRows:
         return self.odd.get(index, (Status.COMPLETE, ""))
 
 
-def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> ResultRows:
+def gather_rows(rows: Sequence[Row], metrics: int, requirements: int) -> ResultRows:
     """Return single rows as one."""
     nothing, none_met = (math.nan,) * metrics, (False,) * requirements
     values = np.array([row.values or nothing for row in rows], dtype=np.float64).reshape(len(rows), metrics)
@@ -83,16 +83,16 @@ def record(rows: ResultRows) -> Any:
     """
     if len(rows) != 1:
         odd = {str(k): [status.key, message] for k, (status, message) in rows.odd.items()}
-        reported = {"n": len(rows), "v": squeezed(rows.values), "q": _packed(np.packbits(rows.met)), "o": odd}
+        reported = {"n": len(rows), "v": squeeze(rows.values), "q": _pack(np.packbits(rows.met)), "o": odd}
         if rows.warned:
-            reported["w"] = {name: _packed(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
+            reported["w"] = {name: _pack(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
         return reported | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
     status, message = rows.status(0)
     reported = {"s": status.key}
     if message:
         reported["m"] = message
     if status.usable:
-        reported["v"] = _packed(rows.values)
+        reported["v"] = _pack(rows.values)
         reported["q"] = "".join("01"[met] for met in rows.met[0].tolist())
     if names := [name for name, mask in sorted(rows.warned.items()) if mask[0]]:
         reported["w"] = names
@@ -101,16 +101,16 @@ def record(rows: ResultRows) -> Any:
     return reported
 
 
-def recalled(reported: Any, metrics: int, requirements: int) -> ResultRows:
+def recall_rows(reported: Any, metrics: int, requirements: int) -> ResultRows:
     """Return the rows that are stored in a record."""
     if "n" not in reported:
-        return gathered([recalled_row(reported)], metrics, requirements)
-    values = unsqueezed(reported["v"], reported["n"], metrics)
+        return gather_rows([recalled_row(reported)], metrics, requirements)
+    values = unsqueeze(reported["v"], reported["n"], metrics)
     met = _mask(reported["q"], reported["n"] * requirements).reshape(reported["n"], requirements)
     curves = {int(k): _bytes(text) for k, text in reported.get("u", {}).items()}
     odd = {int(k): (_STATUS[s], m) for k, (s, m) in reported["o"].items()}
     masks = {
-        name: np.unpackbits(_unpacked(bits, np.uint8), count=reported["n"])
+        name: np.unpackbits(_unpack(bits, np.uint8), count=reported["n"])
         for name, bits in reported.get("w", {}).items()
     }
     return ResultRows(values, met, odd, curves, warned={name: mask.astype(bool) for name, mask in masks.items()})
@@ -119,12 +119,12 @@ def recalled(reported: Any, metrics: int, requirements: int) -> ResultRows:
 def recalled_row(reported: Any) -> Row:
     """Return the single row that is stored in a record."""
     curve = _bytes(reported["u"]) if "u" in reported else b""
-    noted = tuple(_unpacked(reported["v"], np.float64).tolist()) if "v" in reported else ()
+    noted = tuple(_unpack(reported["v"], np.float64).tolist()) if "v" in reported else ()
     met = tuple(map("1".__eq__, reported.get("q", "")))
     return Row(_STATUS[reported["s"]], noted, met, reported.get("m", ""), curve, warnings=tuple(reported.get("w", ())))
 
 
-def joined(parts: Sequence[ResultRows]) -> ResultRows:
+def join_rows(parts: Sequence[ResultRows]) -> ResultRows:
     """Return several pieces as one."""
     if len(parts) == 1:
         return parts[0]
@@ -149,7 +149,7 @@ def _joined_masks(parts: Sequence[ResultRows]) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def cut(rows: ResultRows, start: int, stop: int) -> ResultRows:
+def cut_rows(rows: ResultRows, start: int, stop: int) -> ResultRows:
     """Return some of the rows."""
     if (start, stop) == (0, len(rows)):
         return rows
@@ -162,11 +162,11 @@ def cut(rows: ResultRows, start: int, stop: int) -> ResultRows:
     return ResultRows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs, warned)
 
 
-def _packed(values: NDArray[Any]) -> str:
+def _pack(values: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode()
 
 
-def _unpacked(text: str, dtype: Any) -> NDArray[Any]:
+def _unpack(text: str, dtype: Any) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(text), dtype=dtype)
 
 
@@ -177,7 +177,7 @@ _PROBED = 512
 """Rows from which the order is chosen."""
 
 
-def squeezed(values: FloatArray) -> str:
+def squeeze(values: FloatArray) -> str:
     """Return the bits of a table of numbers, (n, m), in few characters.
 
     Neighbours in a grid are alike: the bit patterns of a column, as whole numbers, are nearly a polynomial, and
@@ -188,7 +188,7 @@ def squeezed(values: FloatArray) -> str:
     tried = [bits]
     while len(tried) < ORDERS:
         tried.append(np.diff(tried[-1], axis=1, prepend=np.uint64(0)))
-    folded = [_folded(one) for one in tried]
+    folded = [_fold_sign(one) for one in tried]
     middle = slice(bits.shape[1] // 2, bits.shape[1] // 2 + _PROBED)
     lengths = [np.log2(one[:, middle].astype(np.float64) + 1.0).sum(axis=1) for one in folded]
     order = np.argmin(lengths, axis=0).astype(np.uint8)
@@ -197,7 +197,7 @@ def squeezed(values: FloatArray) -> str:
     return base64.b64encode(order.tobytes() + compress(planes.tobytes())).decode()
 
 
-def unsqueezed(text: str, rows: int, columns: int) -> FloatArray:
+def unsqueeze(text: str, rows: int, columns: int) -> FloatArray:
     """Return the table that `squeezed` made a text of."""
     data = base64.b64decode(text)
     order = np.frombuffer(data[:columns], dtype=np.uint8)
@@ -211,14 +211,14 @@ def unsqueezed(text: str, rows: int, columns: int) -> FloatArray:
     return values
 
 
-def _folded(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def _fold_sign(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Return whole numbers with the sign in the last bit: small negative ones have zeros in front, too."""
     signed = bits.view(np.int64)
     return ((signed << 1) ^ (signed >> 63)).view(np.uint64)
 
 
 def _mask(text: str, count: int) -> NDArray[np.bool_]:
-    return np.unpackbits(_unpacked(text, np.uint8), count=count).astype(bool)
+    return np.unpackbits(_unpack(text, np.uint8), count=count).astype(bool)
 
 
 def _text(data: bytes) -> str:

@@ -381,7 +381,7 @@ def do_parcel(stamp: Stamp, family: str, parcel: bytes) -> Any:
     ours = _stamp_of_worker(family)
     if ours != stamp:
         return OtherCode(_worker_name(), ours)
-    work, job = _unpacked(parcel)
+    work, job = _unpack(parcel)
     return surviving(work, job)
 
 
@@ -391,7 +391,7 @@ def _stamp_of_worker(family: str) -> Stamp:
 
 
 @lru_cache(maxsize=1)
-def _unpacked(parcel: bytes) -> Any:
+def _unpack(parcel: bytes) -> Any:
     return pickle.loads(parcel)
 
 

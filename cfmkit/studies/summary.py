@@ -20,7 +20,7 @@ from cfmkit.metrics import other_name
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import WINDOW_OUTSIDE, Status
 from cfmkit.specs.units import border_unit, to_border
-from cfmkit.studies.varied_axes import written
+from cfmkit.studies.varied_axes import write_value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -235,7 +235,7 @@ class Summary:
         values = zip(plan.variables, plan.point(self.best), strict=True)
         return {
             "point": self.best + 1,
-            "values": {item.path: written(value, item.dimension) for item, value in values},
+            "values": {item.path: write_value(value, item.dimension) for item, value in values},
             "by": self.study.names[self._goal.column],
             "sense": self._goal.sense,
             "ties": self.ties,

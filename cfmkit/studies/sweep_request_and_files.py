@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from cfmkit.errors import UsageError
 from cfmkit.families import family
 from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
-from cfmkit.studies.design_with_margins_and_verification import delivered
+from cfmkit.studies.design_with_margins_and_verification import run_design
 from cfmkit.studies.engine import Work
-from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
+from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sample_axes, zip_axes
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.tables import curves_csv, results_csv
@@ -63,14 +63,14 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
     if not asked:
         raise UsageError(NOTHING.replace("{example}", _example(spec)))
     plan = _plan(spec, request, asked)
-    design = _given(request.design, block.design if block else False)
+    design = _is_given(request.design, block.design if block else False)
     drawn = request.pictures and len(plan.variables) == 1 and len(plan) <= MOST_CURVES
     curves = writes_curves(spec, request) or drawn
     if design and family(spec.family).design is None:
         raise UsageError(f"{family(spec.family).phrase} cannot be designed, only analysed")
     names = request.metrics or (block.metrics if block else ())
     metrics = metrics_of(spec, names, sample_curve(spec, plan, design))
-    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed, deliver=delivered), plan)
+    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed, deliver=run_design), plan)
 
 
 def _example(spec: Spec) -> str:
@@ -81,10 +81,10 @@ def _example(spec: Spec) -> str:
 
 def writes_curves(spec: Spec, request: SweepRequest) -> bool:
     """Return whether curves.csv is requested."""
-    return _given(request.curves, spec.sweep.curves if spec.sweep else False)
+    return _is_given(request.curves, spec.sweep.curves if spec.sweep else False)
 
 
-def _given(option: bool | None, otherwise: bool) -> bool:
+def _is_given(option: bool | None, otherwise: bool) -> bool:
     return otherwise if option is None else option
 
 
@@ -97,8 +97,8 @@ def _plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...])
     if combine == "grid":
         return grid(axes(spec, asked), request.most)
     if combine == "zip":
-        return zipped(axes(spec, asked, joint=True), request.most)
-    return sampled(axes(spec, asked, drawn=True), _draw(combine, samples, request.seed), request.most)
+        return zip_axes(axes(spec, asked, joint=True), request.most)
+    return sample_axes(axes(spec, asked, drawn=True), _draw(combine, samples, request.seed), request.most)
 
 
 def _draw(combine: Literal["lhs", "sobol"], samples: int | None, seed: int) -> Draw:
@@ -122,13 +122,13 @@ def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterato
     yield "results.csv", results_csv(records, summary.add)
     if curves:
         yield "curves.csv", curves_csv(records)
-    yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _drawn(records, summary)})
+    yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _drawn_data(records, summary)})
     resolve = family(study.spec.family).resolve
     resolved = resolve(study.spec) if resolve else study.spec
     yield "resolved.yaml", dump(resolved, complete=True).encode()
 
 
-def _drawn(records: Records, summary: Summary) -> dict[str, Any]:
+def _drawn_data(records: Records, summary: Summary) -> dict[str, Any]:
     """Return what the pictures of a sweep show: so they can be drawn again from its files, in a figure of several."""
     study, plan = records.work.study, records.work.plan
     shown = [study.metrics[column] for column in summary.shown]

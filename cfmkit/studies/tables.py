@@ -47,16 +47,16 @@ def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]
 def results_table(records: Records, indices: NDArray[np.int64], rows: ResultRows) -> Table:
     """Return some rows as a table in border units."""
     study = records.work.study
-    metrics = (_noted(one, rows.values[:, k]) for k, one in enumerate(study.metrics))
-    met = [TableColumn("requirements_met", _met(rows))] if study.spec.part_requirements else []
+    metrics = (_noted_column(one, rows.values[:, k]) for k, one in enumerate(study.metrics))
+    met = [TableColumn("requirements_met", _met_words(rows))] if study.spec.part_requirements else []
     reported = [rows.status(k) for k in range(len(rows))] if rows.odd else None
     status = tuple(one.key for one, _ in reported) if reported else ("complete",) * len(rows)
     message = tuple(text or None for _, text in reported) if reported else (None,) * len(rows)
     ends = TableColumn("status", status), TableColumn("warnings", _warnings(rows)), text_column("message", message)
-    return Table((*varied(records.work.plan, indices), *metrics, *met, *ends))
+    return Table((*varied_columns(records.work.plan, indices), *metrics, *met, *ends))
 
 
-def _noted(one: Metric, values: FloatArray) -> TableColumn:
+def _noted_column(one: Metric, values: FloatArray) -> TableColumn:
     """Return a metric as a column: numbers in the border unit, or words."""
     if not one.words:
         return border_column(one.label, values, one.dimension)
@@ -64,7 +64,7 @@ def _noted(one: Metric, values: FloatArray) -> TableColumn:
     return TableColumn(one.label, tuple(words[np.where(np.isfinite(values), values, -1).astype(int)].tolist()))
 
 
-def varied(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColumn]:
+def varied_columns(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColumn]:
     """Yield the columns of what varies, in border units."""
     if not len(indices):
         yield from (_column(item, ()) for item in plan.variables)
@@ -80,7 +80,7 @@ def _column(item: Variable, shown: Any) -> TableColumn:
     return TableColumn(item.path, shown, border_unit(item.dimension))
 
 
-def _met(rows: ResultRows) -> tuple[str | None, ...]:
+def _met_words(rows: ResultRows) -> tuple[str | None, ...]:
     """Return ``true`` or ``false`` for each row; nothing where nothing was solved."""
     words = np.where(rows.met.all(axis=1), "true", "false").tolist()
     unsolved = {k for k, (status, _) in rows.odd.items() if not status.usable}
@@ -117,7 +117,7 @@ def curves_csv(records: Records) -> Iterator[bytes]:
             yield from _pieces(table, first)
             first = False
     if first:
-        yield from _pieces(Table(tuple(varied(records.work.plan, np.arange(0)))), first)
+        yield from _pieces(Table(tuple(varied_columns(records.work.plan, np.arange(0)))), first)
 
 
 def _headers(records: Records) -> tuple[str, ...]:
@@ -136,7 +136,9 @@ def _headers(records: Records) -> tuple[str, ...]:
 def _with_values(plan: Plan, index: int, curve: Table, headers: tuple[str, ...]) -> Table:
     """Return the curve of one point with the point's values in front and every column of the file."""
     count = len(curve)
-    leading = (TableColumn(one.name, tuple(one.cells()) * count, one.unit) for one in varied(plan, np.array([index])))
+    leading = (
+        TableColumn(one.name, tuple(one.cells()) * count, one.unit) for one in varied_columns(plan, np.array([index]))
+    )
     own = {column.header: column for column in curve.columns}
     return Table((*leading, *(own.get(header) or _empty(header, count) for header in headers)))
 

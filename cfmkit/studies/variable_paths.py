@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units import BareFloat, UnitField, place_of
-from cfmkit.specs.units.fields import described
-from cfmkit.specs.yamlio.allowed_at_path import Slot, expected, required
+from cfmkit.specs.units.fields import describe_value
+from cfmkit.specs.yamlio.allowed_at_path import Slot, describe_expected, required_keys
 from cfmkit.specs.yamlio.explain_validation_errors import not_among
 
 if TYPE_CHECKING:
@@ -58,11 +58,11 @@ class Leaf:
             if self.choices and given not in self.choices:
                 raise CannotVary(not_among(given, self.choices))
             if not isinstance(given, str | int) or isinstance(given, bool):
-                raise CannotVary(f"{described(given)} is not text")
+                raise CannotVary(f"{describe_value(given)} is not text")
             return given, "text"
         if self.kind == "switch":
             if not isinstance(given, bool):
-                raise CannotVary(f"{described(given)} is not true or false")
+                raise CannotVary(f"{describe_value(given)} is not true or false")
             return given, "text"
         return self._number(given)
 
@@ -76,7 +76,7 @@ class Leaf:
 
     def _number(self, given: Any) -> tuple[Value, str]:
         if isinstance(given, bool) or not isinstance(given, int | float):
-            raise CannotVary(f"{described(given)} is not a {'whole ' * (self.kind == 'whole')}number")
+            raise CannotVary(f"{describe_value(given)} is not a {'whole ' * (self.kind == 'whole')}number")
         if self.kind == "whole":
             if given != int(given):
                 raise CannotVary(f"{given} is not a whole number")
@@ -119,19 +119,19 @@ def leaf(spec_type: type[Spec], path: str) -> Leaf:
         if not below:
             raise CannotVary(_unknown(spec_type, path, ".".join(parts[:depth]), here))
         here = below
-    return _of(path, here)
+    return _leaf_of(path, here)
 
 
-def _of(path: str, slots: tuple[Slot, ...]) -> Leaf:
+def _leaf_of(path: str, slots: tuple[Slot, ...]) -> Leaf:
     """Return the leaf that one of several allowed types is; the first that can be varied."""
     for slot in slots:
         if (kind := _kind(slot)) is not None:
             return Leaf(path, kind, slot.quantity, slot.choices)
     blocks = [slot.model for slot in slots if slot.model is not None]
     if blocks:
-        names = ", ".join(list(blocks[0].model_fields)[:6]) or ", ".join(required(blocks[0]))
+        names = ", ".join(list(blocks[0].model_fields)[:6]) or ", ".join(required_keys(blocks[0]))
         raise CannotVary(f"{path!r} is a block; vary one of its values: {names}")
-    raise CannotVary(f"{path!r} holds {expected(slots, plain=True)}: vary one item of it, as {path}.0")
+    raise CannotVary(f"{path!r} holds {describe_expected(slots, plain=True)}: vary one item of it, as {path}.0")
 
 
 def _kind(slot: Slot) -> Kind | None:
@@ -161,17 +161,17 @@ def paths(spec_type: type[Spec]) -> Iterator[str]:
     """Yield the path of every leaf that can be varied; items of lists as ``.0``, of named ones as ``.NAME``."""
     for name in spec_type.model_fields:
         if name not in FIXED:
-            yield from _below(Slot(spec_type).child(name), name, 1)
+            yield from _paths_below(Slot(spec_type).child(name), name, 1)
 
 
-def _below(slots: tuple[Slot, ...], path: str, depth: int) -> Iterator[str]:
+def _paths_below(slots: tuple[Slot, ...], path: str, depth: int) -> Iterator[str]:
     if any(_kind(slot) for slot in slots):
         yield path
     for slot in slots if depth < _DEEPEST else ():
         if slot.model is not None:
             for name in slot.model.model_fields:
-                yield from _below(slot.child(name), f"{path}.{name}", depth + 1)
+                yield from _paths_below(slot.child(name), f"{path}.{name}", depth + 1)
         elif slot.origin in (tuple, list):
-            yield from _below(slot.child(0), f"{path}.0", depth + 1)
+            yield from _paths_below(slot.child(0), f"{path}.0", depth + 1)
         elif slot.origin is dict:
-            yield from _below(slot.child(NAME), f"{path}.{NAME}", depth + 1)
+            yield from _paths_below(slot.child(NAME), f"{path}.{NAME}", depth + 1)

@@ -15,8 +15,8 @@ from cfmkit.metrics.branches_cut_to_window import TOLERANCE
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.metrics.requirements import Bounds
-from cfmkit.specs.units import TravelShare, between
-from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
+from cfmkit.specs.units import TravelShare, window_places
+from cfmkit.studies.row_blocks_for_journal import ResultRows, gather_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -84,11 +84,11 @@ class SolvedVariants:
         if all(one is None for one in ends):
             return None
         start, stop = self._travels
-        if len(ends) == 1 and ends[0] is not None and (first := _between(ends[0], start, stop)) is not None:
+        if len(ends) == 1 and ends[0] is not None and (first := _window_places(ends[0], start, stop)) is not None:
             return first
         every = list(ends) if len(ends) == len(self) else list(ends) * len(self)
         travels = zip(start.tolist(), stop.tolist(), strict=True)
-        found = [between(one, travel) for one, travel in zip(every, travels, strict=True) if one is not None]
+        found = [window_places(one, travel) for one, travel in zip(every, travels, strict=True) if one is not None]
         low, high = np.array(found).T
         return low, high
 
@@ -179,7 +179,7 @@ class SolvedVariants:
         return self.solved.findings()
 
 
-def _between(ends: Ends, start: FloatArray, stop: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+def _window_places(ends: Ends, start: FloatArray, stop: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Return a window of all in places, (m,) each; None where it has no width for one of them."""
     places = [
         start + float(end) * (stop - start) if isinstance(end, TravelShare) else np.full(len(start), float(end))
@@ -223,7 +223,7 @@ def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows
         for name, mask in rows.warned.items():
             warned.setdefault(name, np.zeros(count[0], dtype=bool))[chosen[usable]] = mask[usable]
     singly = sorted(set(range(count[0])) - members)
-    rest = gathered([study.evaluate(plan.point(start + k)) for k in singly], *count[1:])
+    rest = gather_rows([study.evaluate(plan.point(start + k)) for k in singly], *count[1:])
     values[singly], met[singly] = rest.values, rest.met
     for name, mask in rest.warned.items():
         warned.setdefault(name, np.zeros(count[0], dtype=bool))[singly] = mask

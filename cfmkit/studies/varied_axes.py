@@ -54,20 +54,20 @@ def parse_variation(option: str) -> WantedVariation:
     cfmkit.errors.SpecError
         If its list holds what no specification may.
     """
-    from cfmkit.specs.units.strict_decimal_number import shown
-    from cfmkit.specs.yamlio.tree_builder import read
+    from cfmkit.specs.units.strict_decimal_number import quote
+    from cfmkit.specs.yamlio.tree_builder import read_text
 
     path, equals, content = (part.strip() for part in option.partition("="))
     if not equals or not content:
-        raise UsageError(f"--vary {shown(option)}: no values; {EXAMPLE}")
+        raise UsageError(f"--vary {quote(option)}: no values; {EXAMPLE}")
     if not path or not all(part.strip() for part in path.split(".")):
-        raise UsageError(f"--vary {shown(option)}: {shown(path)} is not a dotted path; {EXAMPLE}")
+        raise UsageError(f"--vary {quote(option)}: {quote(path)} is not a dotted path; {EXAMPLE}")
     source = f"--vary {path}"
     if not content.startswith("["):
         return WantedVariation(path, content, source)
-    reading = read(content)
+    reading = read_text(content)
     if reading.faults or not isinstance(reading.tree, tuple):
-        faults = [fault.message for fault in reading.faults] or [f"{shown(content)} is not a list"]
+        faults = [fault.message for fault in reading.faults] or [f"{quote(content)} is not a list"]
         raise SpecError([Problem(source, 0, 0, "", message) for message in faults])
     return WantedVariation(path, reading.tree, source)
 
@@ -119,7 +119,7 @@ def faults(
             yield one, str(problem)
             continue
         if not joint and (twice := [value for k, value in enumerate(found.listed) if value in found.listed[:k]]):
-            yield one, f"{written(twice[0], found.dimension)} appears twice in the list"
+            yield one, f"{write_value(twice[0], found.dimension)} appears twice in the list"
         for other in asked[:index]:
             if one.path == other.path or f"{one.path}.".startswith(f"{other.path}."):
                 yield one, f"{other.path!r} is varied already; one of them is enough"
@@ -136,7 +136,7 @@ def axis(spec: Spec, one: WantedVariation, drawn: bool) -> Axis:
         If path or values are wrong.
     """
     found = leaf(type(spec), one.path)
-    made = _listed(found, one.content) if isinstance(one.content, tuple) else _range(found, one.content, drawn)
+    made = _listed_axis(found, one.content) if isinstance(one.content, tuple) else _range(found, one.content, drawn)
     _try(spec, one.path, made.listed[0] if made.listed else made.ends)
     return made
 
@@ -151,7 +151,7 @@ def _try(spec: Spec, path: str, value: Any) -> None:
         return  # a value out of bounds is a matter of one point
 
 
-def _listed(found: Leaf, items: tuple[Any, ...]) -> Axis:
+def _listed_axis(found: Leaf, items: tuple[Any, ...]) -> Axis:
     if not items:
         raise CannotVary("the list is empty")
     read = [found.read(item) for item in items]
@@ -207,7 +207,7 @@ def _count(text: str) -> int:
     return count
 
 
-def written(value: Any, dimension: str) -> str:
+def write_value(value: Any, dimension: str) -> str:
     """Return a value as a user would write it."""
     if dimension == "text":
         return str(value).lower() if isinstance(value, bool) else str(value)

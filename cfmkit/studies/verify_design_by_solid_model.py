@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import searched
+from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
@@ -39,7 +39,7 @@ AT_END = {"design.rescale.force": "nominal_force"}
 """Levels that are no mean over the window, but the force at its end; and the metric that is compared."""
 
 
-def verified(given: Spec, design: Design, run: Run) -> Design:
+def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
     """Return a design that ends with its part as a solid, whose force is the wanted one: the mean, or that at the end.
 
     Parameters
@@ -81,9 +81,9 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
         f"{format_short(found, kind)} ({100 * (found / own - 1):+.2g} %){where}"
     )
     if _sheet(as_solid):
-        return _relevelled(given, design, as_solid, path, factor, begun, run)
+        return _relevel(given, design, as_solid, path, factor, begun, run)
     corrected = {path: float(f"{factor * width:.{DIGITS}g}") for path, width in _widths(as_solid).items()}
-    outside = _outside(given, design.spec, corrected)
+    outside = _explain_outside(given, design.spec, corrected)
     if outside is not None:
         return outside
     reported = "; ".join(
@@ -99,11 +99,11 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
         "verified_solid_before": (found, kind, f"{which} of the part as a solid, before its correction"),
         "verified_width_factor": (factor, "ratio", "factor by which all widths were multiplied"),
     }
-    about = searched(numbers, "solid", solid.travel or (0.0, 0.0), made.motion or "length")
+    about = search_values(numbers, "solid", solid.travel or (0.0, 0.0), made.motion or "length")
     return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))
 
 
-def _relevelled(
+def _relevel(
     given: Spec, design: Design, as_solid: Spec, path: str | None, factor: float, begun: str, run: Run
 ) -> Design:
     """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
@@ -140,10 +140,10 @@ def _means(beams: Result, solid: Result) -> tuple[float | None, float | None, st
     low, high = sorted((abs(window.lo), abs(window.hi))) if window is not None else (0.0, far)
     reported = format_short(min(high, far), solid.spec.motion or "length")
     over = f" over the travel up to {reported}, which both reach"
-    return _over_travel(beams, low, min(high, far)), _over_travel(solid, low, min(high, far)), over
+    return _mean_over_travel(beams, low, min(high, far)), _mean_over_travel(solid, low, min(high, far)), over
 
 
-def _over_travel(result: Result, low: float, high: float) -> float | None:
+def _mean_over_travel(result: Result, low: float, high: float) -> float | None:
     """Return the mean over a travel of either sign [m or rad], whatever points the curve has; None if it turns back."""
     from scipy.interpolate import PchipInterpolator
 
@@ -178,7 +178,7 @@ def _level(spec: Spec, path: str) -> float:
         return 0.0
 
 
-def _outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Design | None:
+def _explain_outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Design | None:
     """Return why there is no design, where a corrected width is not in the range that it is designed in."""
     record = family(given.family)
     ranges = function_named(record.free)(given, designed) if record.free is not None else {}

@@ -62,7 +62,7 @@ def main(parent: int) -> None:
     _ask_the_kernel(parent)
     inlet, outlet = _pipes()
     received: SimpleQueue[bytes] = SimpleQueue()
-    threading.Thread(target=_read, args=(inlet, received), daemon=True).start()
+    threading.Thread(target=_read_on, args=(inlet, received), daemon=True).start()
     for register, added in pickle.loads(received.get()):
         register(added)
     work = pickle.loads(received.get())
@@ -101,7 +101,7 @@ def _outcome(work: Any, job: Any) -> bytes:
         return BROKEN + pickle.dumps((reported, "".join(traceback.format_exception(error))))
 
 
-def _read(inlet: IO[bytes], received: SimpleQueue[bytes]) -> None:
+def _read_on(inlet: IO[bytes], received: SimpleQueue[bytes]) -> None:
     """Read on; end the process with its parent."""
     while (message := receive(inlet)) is not None:
         received.put(message)

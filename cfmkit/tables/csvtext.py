@@ -46,15 +46,15 @@ def csv_chunks(table: Table) -> Iterator[bytes]:
     """Yield the CSV of a table piece by piece, for tables that are large."""
     lone = len(table.columns) == 1
     if table.columns:
-        yield _encoded([[_text(header)] for header in table.headers])
+        yield _encode_rows([[_text(header)] for header in table.headers])
     for start in range(0, len(table), _CHUNK):
         columns = [_texts(column.values[start : start + _CHUNK]) for column in table.columns]
         if lone:  # an empty line would not count as a row
             columns = [[text or '""' for text in columns[0]]]
-        yield _encoded(columns)
+        yield _encode_rows(columns)
 
 
-def _encoded(columns: Sequence[Sequence[str]]) -> bytes:
+def _encode_rows(columns: Sequence[Sequence[str]]) -> bytes:
     """Return rows as UTF-8; bytes that were never text (an odd file name) stand as ``\\udc..``."""
     return ("\n".join(map(",".join, zip(*columns, strict=True))) + "\n").encode("utf-8", "backslashreplace")
 
@@ -102,7 +102,7 @@ def read_csv(source: str | bytes | Path) -> Table:
         If the file cannot be read.
     """
     name = str(source) if isinstance(source, Path) else "CSV"
-    rows = _rows(_decoded(source, name), name)
+    rows = _rows(_decode_source(source, name), name)
     _, headers = next(rows)
     body = []
     for line, row in rows:
@@ -115,7 +115,7 @@ def read_csv(source: str | bytes | Path) -> Table:
         raise DataError(f"{name}: {error}") from None
 
 
-def _decoded(source: str | bytes | Path, name: str) -> str:
+def _decode_source(source: str | bytes | Path, name: str) -> str:
     """Return the text of `source`, checked for what concerns the whole file."""
     try:
         data = source.read_bytes() if isinstance(source, Path) else source
@@ -154,9 +154,9 @@ def _quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
 
 def _column(header: str, cells: Sequence[str]) -> TableColumn:
     """Return the column that these raw cells are."""
-    match = HEADER.fullmatch(_unquoted(header))
+    match = HEADER.fullmatch(_unquote(header))
     if not match:
-        raise CfmError(f"{_unquoted(header)!r} is not a header such as 'force [N]'")
+        raise CfmError(f"{_unquote(header)!r} is not a header such as 'force [N]'")
     values = _plain_floats(cells)
     return TableColumn(match["name"], tuple(map(_value, cells)) if values is None else values, match["unit"])
 
@@ -176,9 +176,9 @@ def _value(raw: str) -> Cell:
         return None
     if _NUMBER.fullmatch(raw):
         return int(raw) if _INTEGER.fullmatch(raw) else float(raw)
-    return _unquoted(raw)
+    return _unquote(raw)
 
 
-def _unquoted(raw: str) -> str:
+def _unquote(raw: str) -> str:
     text = raw[1:-1].replace('""', '"') if raw.startswith('"') else raw
     return text[1:] if text.startswith("'") and _FORMULA.match(text) else text

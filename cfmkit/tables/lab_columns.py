@@ -16,7 +16,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import DataError, QuantityError, UsageError
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.units.table import COMMON, UNITS
 from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
 
@@ -71,7 +71,7 @@ class ColumnInfo:
     @property
     def label(self) -> str:
         """Name and unit for messages: ``'Kraft' [N]``."""
-        return f"{shown(self.name)} [{self.unit}]" if self.unit else f"{shown(self.name)} without a unit"
+        return f"{quote(self.name)} [{self.unit}]" if self.unit else f"{quote(self.name)} without a unit"
 
     def states(self, unit: str, source: str, file: str, place: str = "") -> ColumnInfo:
         """Return the column with a unit that something says of it.
@@ -86,7 +86,7 @@ class ColumnInfo:
         if unit != self.unit:
             verb = "give" if self.source == CELLS else "gives"
             raise DataError(
-                f"{file}: {place}{self.source} {verb} {shown(self.name)} in {self.unit}, {source} in {unit}; correct "
+                f"{file}: {place}{self.source} {verb} {quote(self.name)} in {self.unit}, {source} in {unit}; correct "
                 "the one that is wrong"
             )
         return self
@@ -110,11 +110,11 @@ def read_units(text: str | None) -> dict[str, str]:
             continue
         if not equals or not name or not unit or name in found:
             raise UsageError(
-                f'--units: {shown(part)} is not \'column=unit\'; write e.g. --units "s=mm,F=N", or --units "1=mm,2=N" '
+                f'--units: {quote(part)} is not \'column=unit\'; write e.g. --units "s=mm,F=N", or --units "1=mm,2=N" '
                 "by number"
             )
         if dimension_of(unit) is None:
-            raise UsageError(f"--units: {shown(unit)} is not a unit of a time, displacement, angle, force or torque")
+            raise UsageError(f"--units: {quote(unit)} is not a unit of a time, displacement, angle, force or torque")
         found[name] = spelt(unit)
     return found
 
@@ -140,7 +140,7 @@ def describe(
     cfmkit.errors.DataError
         If two of them contradict each other, or ``--units`` names a column that is not there.
     """
-    columns = [_described(index, *pair, file) for index, pair in enumerate(zip(names, unit_row, strict=True))]
+    columns = [_describe_column(index, *pair, file) for index, pair in enumerate(zip(names, unit_row, strict=True))]
     for index, unit in cells.items():
         columns[index] = columns[index].states(unit, CELLS, file)
     for key, unit in units.items():
@@ -156,12 +156,12 @@ def _index(key: str, columns: Sequence[ColumnInfo], file: str) -> int:
         return named[0]
     if len(named) > 1:
         numbers = " and ".join(str(index + 1) for index in named)
-        raise DataError(f"{file}: columns {numbers} are both called {shown(key)}; name the one that is meant by number")
+        raise DataError(f"{file}: columns {numbers} are both called {quote(key)}; name the one that is meant by number")
     if key.isdecimal() and 1 <= int(key) <= len(columns):
         return int(key) - 1
     near = get_close_matches(key, [column.name for column in columns], n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(shown(c.name) for c in columns)}"
-    raise DataError(f"{file}: there is no column {shown(key)}{hint}")
+    hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(quote(c.name) for c in columns)}"
+    raise DataError(f"{file}: there is no column {quote(key)}{hint}")
 
 
 def column_named(key: str, columns: Sequence[ColumnInfo], file: str) -> ColumnInfo:
@@ -175,7 +175,7 @@ def column_named(key: str, columns: Sequence[ColumnInfo], file: str) -> ColumnIn
     return columns[_index(key, columns, file)]
 
 
-def _described(index: int, text: str, below: str, file: str) -> ColumnInfo:
+def _describe_column(index: int, text: str, below: str, file: str) -> ColumnInfo:
     """Return a column as the header and the line of units describe it."""
     name, unit = split_header(text)
     under = _bare_unit(below)
@@ -212,16 +212,16 @@ def is_unit_row(cells: Iterable[str]) -> bool:
     if len(cells) > 1 and _LABEL_OF_UNITS.fullmatch(cells[0]):
         cells = cells[1:]
     known = [(unit := _bare_unit(cell)) is not None and is_known(unit) for cell in cells]
-    return any(known) and all(good or not cell or _bracketed(cell) for good, cell in zip(known, cells, strict=True))
+    return any(known) and all(good or not cell or _is_bracketed(cell) for good, cell in zip(known, cells, strict=True))
 
 
-def _bracketed(cell: str) -> bool:
+def _is_bracketed(cell: str) -> bool:
     return cell[:1] + cell[-1:] in ("[]", "()")
 
 
 def _bare_unit(cell: str) -> str | None:
     cell = cell.strip(' "')
-    return (cell[1:-1].strip() if _bracketed(cell) else cell) or None
+    return (cell[1:-1].strip() if _is_bracketed(cell) else cell) or None
 
 
 @lru_cache(maxsize=1)
@@ -231,11 +231,11 @@ def _words() -> dict[str, str]:
     for unit in UNITS:
         if unit.dimension in ROLES:
             names = (unit.symbol, *unit.aliases, unit.name, unit.name + "s", unit.name.replace("meter", "metre"))
-            found |= {_folded(word): unit.symbol for word in names if len(word) > 1}
+            found |= {_fold_case(word): unit.symbol for word in names if len(word) > 1}
     return {word: symbol for word, symbol in (found | _OTHER_WORDS).items() if word not in _AMBIGUOUS}
 
 
-def _folded(unit: str) -> str:
+def _fold_case(unit: str) -> str:
     return re.sub(r"[\s._-]", "", unit).lower()
 
 
@@ -253,11 +253,11 @@ def spelt(unit: str) -> str:
         return _NUMBERS_OF_ITEMS[unit]
     if is_unit(unit):
         return unit
-    if _folded(unit) in _words():
-        return _words()[_folded(unit)]
+    if _fold_case(unit) in _words():
+        return _words()[_fold_case(unit)]
     joined = re.fullmatch(r"(?P<one>.*N)(?P<other>[cm]?m)", unit)  # Nmm
     parts = joined.groups() if joined else re.split(r"\s*[·⋅×*.\s-]\s*", unit)
-    symbols = [part if is_unit(part) else _words().get(_folded(part), "") for part in parts]
+    symbols = [part if is_unit(part) else _words().get(_fold_case(part), "") for part in parts]
     return "*".join(symbols) if len(symbols) == 2 and all(symbols) else unit
 
 
@@ -355,7 +355,7 @@ def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     if weighed is not None and "force" not in there:
         return (
             f"{name}: {weighed.label} is a mass; if the gauge shows the force of that mass, say so: --units "
-            f'"{key(weighed)}={_folded(weighed.unit or "").removesuffix("s")}f"'
+            f'"{key(weighed)}={_fold_case(weighed.unit or "").removesuffix("s")}f"'
         )
     labels = ", ".join(column.label for column in columns)
     return (
@@ -365,4 +365,4 @@ def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
 
 
 def _is_mass(unit: str) -> bool:
-    return _folded(unit).removesuffix("s") in ("kg", "g", "lb", "oz")
+    return _fold_case(unit).removesuffix("s") in ("kg", "g", "lb", "oz")

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import DataError
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.tables.lab_columns import CELLS, ColumnInfo, describe, dimension_of, is_unit_row, spelt, split_header
 
 if TYPE_CHECKING:
@@ -192,7 +192,7 @@ class LabTable:
         found = self.shape.dialect.number(cell)
         if found is None:
             refuse_group(cell, self.file)
-            what = "is empty" if not cell else f"holds {shown(cell)}, which is not a number"
+            what = "is empty" if not cell else f"holds {quote(cell)}, which is not a number"
             raise DataError(f"{place}: column {column.label} {what}; remove the line or correct it")
         value, unit = found
         if column.unit_column is not None:
@@ -223,7 +223,7 @@ def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
     return values * float(factor)
 
 
-def decoded(data: bytes, name: str) -> tuple[str, str]:
+def decode_file(data: bytes, name: str) -> tuple[str, str]:
     """Return the text of a file and the name of its encoding.
 
     Raises
@@ -390,7 +390,7 @@ def _header(
         if len(cells) > shape.width and not any(split_header(cell)[1] for cell in cells[shape.width :])
     ]
     if not fitting:
-        if near and shape.dialect.separator == "," and _halved(near[0][1], shape.width):
+        if near and shape.dialect.separator == "," and _has_half_header(near[0][1], shape.width):
             raise DataError(
                 f"{name}: line {first_line} has {shape.width} cells but the header {len(near[0][1])}: comma seems to "
                 "be both separator and decimal sign; export with another separator"
@@ -405,7 +405,7 @@ def _header(
     return names, unit_row, header
 
 
-def _halved(header: Sequence[str], width: int) -> bool:
+def _has_half_header(header: Sequence[str], width: int) -> bool:
     """Return whether a header has half the cells of the numbers below it, and is not just a title."""
     return width == 2 * len(header) and (len(header) > 1 or bool(split_header(header[0])[1]))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import DataError, reason_of
-from cfmkit.tables.lab_file import decoded, lines_of, tables_in
+from cfmkit.tables.lab_file import decode_file, lines_of, tables_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +43,7 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
     points, table = _points(path)
     side = next((column for column in table.columns if column.name.lower() == "side"), None)
     sides = np.where(points[:, 0] > 0, "right", "left") if side is None else _sides(table, side)
-    right, left = _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
+    right, left = _order_points(points, sides == "right", name), _order_points(points, sides == "left", name)
     if right[:, 0].mean() < left[:, 0].mean():
         raise DataError(
             f"{name}: the points of the right flank have smaller x than those of the left one; is the sign of x "
@@ -79,7 +79,7 @@ def _points(path: Path) -> tuple[FloatArray, LabTable]:
     """Return the points of a file [m] and its table."""
     name = path.name
     try:
-        text, _ = decoded(path.read_bytes(), name)
+        text, _ = decode_file(path.read_bytes(), name)
     except OSError as error:
         raise DataError(f"{name}: cannot be read: {reason_of(error)}") from None
     tables = tables_in(lines_of(text), name)
@@ -111,7 +111,7 @@ def _sides(table: LabTable, column: ColumnInfo) -> NDArray[np.str_]:
     return np.array([SIDES[word] for word in words])
 
 
-def _ordered(points: FloatArray, chosen: NDArray[np.bool_], name: str) -> FloatArray:
+def _order_points(points: FloatArray, chosen: NDArray[np.bool_], name: str) -> FloatArray:
     side = points[chosen]
     if len(side) < FEWEST:
         raise DataError(

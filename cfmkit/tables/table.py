@@ -180,7 +180,7 @@ def curve_table(curves: Sequence[Curve]) -> Table:
     """
     labels: list[Part] = [(_label_columns(curve), len(curve)) for curve in curves]
     columns: list[Part] = [(dict(curve.columns()), len(curve)) for curve in curves]
-    return Table((*_stacked(labels), *_stacked(columns)))
+    return Table((*_stack_columns(labels), *_stack_columns(columns)))
 
 
 def text_column(name: str, values: Iterable[str | None]) -> TableColumn:
@@ -247,7 +247,7 @@ def _label_columns(curve: Curve) -> dict[str, Column]:
     return {name: Column(np.full(len(curve), value), kind) for name, (value, kind) in curve.label.items()}
 
 
-def _stacked(parts: Sequence[Part]) -> list[TableColumn]:
+def _stack_columns(parts: Sequence[Part]) -> list[TableColumn]:
     """Return every column that occurs in `parts`, one part below the other."""
     kinds = {name: column.dimension for columns, _ in parts for name, column in columns.items()}
     return [border_column(name, _stack(name, kind, parts), kind) for name, kind in kinds.items()]

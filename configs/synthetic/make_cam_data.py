@@ -20,7 +20,7 @@ import numpy as np
 import cfmkit
 from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank, arc_lengths
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.numerics.rigid_point_registration import turned
+from cfmkit.numerics.rigid_point_registration import turn_points
 
 HERE = Path(__file__).resolve().parent
 WIDER, WAVES, NOISE = 15.5e-6, 17e-6, 2e-6
@@ -40,7 +40,7 @@ def flank(design: DesignFlank, rng: np.random.Generator) -> np.ndarray:
     waves = np.cos(2.0 * np.pi * along[:, None] / LENGTHS + phases).sum(axis=1)
     error = WIDER + WAVES * (2.0 / len(LENGTHS)) ** 0.5 * waves
     noise = rng.normal(0.0, NOISE, (len(along), 2))
-    return turned(at.points + error[:, None] * at.normals + noise, *ASKEW)
+    return turn_points(at.points + error[:, None] * at.normals + noise, *ASKEW)
 
 
 def flanks_csv(profile) -> str:

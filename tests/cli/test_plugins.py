@@ -33,11 +33,11 @@ def site(tmp_path, monkeypatch):
     here.mkdir()
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.chdir(here)
-    entry_point_plugins._imported.cache_clear()
+    entry_point_plugins._import_record.cache_clear()
     entry_point_plugins._offers_on.cache_clear()
     yield folder
     packages.forget(folder)
-    entry_point_plugins._imported.cache_clear()
+    entry_point_plugins._import_record.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ REQUEST = ("suggest", "--force", "10 N", "--travel", "3 mm", "--envelope", "80x6
 def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site, arguments, capsys, monkeypatch):
     """Of the request in this process, and without the families of cfmkit, which search for seconds."""
     monkeypatch.setattr(search, "names", lambda: ("oblique", "broken"))
-    monkeypatch.setattr(search, "until", lambda _executor, _deadline: serial)
+    monkeypatch.setattr(search, "give_up_at", lambda _executor, _deadline: serial)
     packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
     code = 4 if arguments is REQUEST else 0
     assert main(list(arguments)) == code

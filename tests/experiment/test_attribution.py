@@ -10,7 +10,7 @@ from cam_support import analyze, cam
 
 import cfmkit
 from cfmkit.experiment.comparison import compare
-from cfmkit.experiment.curves_and_metrics_of_recording import measured
+from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 from cfmkit.experiment.reading import Recording, read_recording
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -22,7 +22,7 @@ def recorded(curve, noise=0.0, keep=slice(None)):
     """Return the curve of a model as a recording."""
     force = curve.force + np.random.default_rng(0).normal(0.0, noise, len(curve)) if noise else curve.force
     good = np.isfinite(force)
-    return measured(Recording("made.csv", curve.motion[good][keep], force[good][keep]), None)
+    return measure_recording(Recording("made.csv", curve.motion[good][keep], force[good][keep]), None)
 
 
 def causes(source, **changes):
@@ -45,7 +45,7 @@ def test_the_area_that_the_paper_measured_is_a_friction_of_0_00225():
     """0.259 N m from 40 to 210 mm [SS, table 3], with the measured 1.365 N/mm; area and friction are proportional."""
     truth = analyze(cam(rolling_friction=0.002, springs={"stiffness": 1365.0})).curve
     half = 0.5 * np.where(truth.branch == "load", 1, -1) * (0.259 - 0.23044378) / 0.170
-    source = measured(Recording("made.csv", truth.motion, np.nan_to_num(truth.force + half)), None)
+    source = measure_recording(Recording("made.csv", truth.motion, np.nan_to_num(truth.force + half)), None)
     assert causes(source, springs={"stiffness": 1365.0})["data_friction"] == pytest.approx(0.00225, abs=5e-6)
 
 
@@ -64,7 +64,7 @@ def test_the_parts_are_those_of_the_closed_forms():
 
 def test_on_the_shipped_built_cam_profile_friction_and_rest_length_are_told_apart():
     result = cfmkit.analyze(cfmkit.load(CONFIGS / "cam_as_built.yaml"))
-    source = measured(read_recording(CONFIGS / "synthetic/cam_loop.csv"), None)
+    source = measure_recording(read_recording(CONFIGS / "synthetic/cam_loop.csv"), None)
     found = {name: item.value for name, item in compare(result, source).causes(result).items()}
     assert found["data_friction"] == pytest.approx(0.00225, abs=2e-5)
     assert found["data_rest_error"] == pytest.approx(0.3e-3, abs=1e-5)

@@ -9,9 +9,9 @@ from experiment_support import triangle
 
 import cfmkit
 from cfmkit.errors import DataError, SolutionError, UsageError
-from cfmkit.experiment.calibration import calibrate, resolved
+from cfmkit.experiment.calibration import calibrate, resolve_spec
 from cfmkit.experiment.comparison import compare
-from cfmkit.experiment.curves_and_metrics_of_recording import measured
+from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
@@ -22,7 +22,7 @@ STIFFNESS, CONSTANT = "mechanism.springs.stiffness", "mechanism.profile.force_co
 
 def built(friction=0.002, **changes):
     """The published cam as a finished part, measured from 5 to 230 mm."""
-    return resolved(fixed(cam(analysis__window=("5 mm", "230 mm")), rolling_friction=friction, **changes))
+    return resolve_spec(fixed(cam(analysis__window=("5 mm", "230 mm")), rolling_friction=friction, **changes))
 
 
 def recording(spec, noise=0.0, seed=0, shift=0.0, drift=0.0, moved=0.0):
@@ -34,7 +34,7 @@ def recording(spec, noise=0.0, seed=0, shift=0.0, drift=0.0, moved=0.0):
     good = np.isfinite(curve.force)
     spread = np.random.default_rng(seed).normal(0.0, noise, int(good.sum())) if noise else 0.0
     force = curve.force[good] + spread + shift + drift * np.linspace(0.0, 1.0, int(good.sum()))
-    return measured(Recording("made.csv", curve.motion[good] + moved, force), None)
+    return measure_recording(Recording("made.csv", curve.motion[good] + moved, force), None)
 
 
 def test_a_model_has_no_error_beside_its_own_curve():
@@ -62,10 +62,10 @@ def test_model_and_measurement_are_compared_where_both_exist():
 def test_a_measurement_elsewhere_or_of_another_kind_is_refused():
     spec = built()
     motion = triangle(1) / 1e3
-    far = measured(Recording("far.csv", 1.0 + motion, 50 + motion), None)
+    far = measure_recording(Recording("far.csv", 1.0 + motion, 50 + motion), None)
     with pytest.raises(DataError, match="no travel in common; is the zero of the displacement the same"):
         compare(analyze(spec), far)
-    turned = measured(Recording("turned.csv", motion, 50 + motion, kind="torque"), None)
+    turned = measure_recording(Recording("turned.csv", motion, 50 + motion, kind="torque"), None)
     with pytest.raises(DataError, match="holds a torque curve, but the mechanism has a force curve"):
         compare(analyze(spec), turned)
 
@@ -74,7 +74,7 @@ def test_points_that_are_averaged_are_neighbours_of_one_cycle():
     """The end of a cycle and the start of the next averaged would be a place never passed with that force."""
     motion = triangle(3, 1503, 240.0) / 1e3
     hollow = 50.0 + 0.2e3 * np.abs(motion - 0.1175)
-    found = compare(analyze(built()), measured(Recording("hollow.csv", motion, hollow), None))
+    found = compare(analyze(built()), measure_recording(Recording("hollow.csv", motion, hollow), None))
     for item in found.samples:
         assert len(item.motion) < 2000
         assert item.effort == pytest.approx(50.0 + 0.2e3 * np.abs(item.motion - 0.1175), abs=0.03)
@@ -102,7 +102,7 @@ def test_outliers_hardly_move_the_robust_fit():
     source, start = recording(built(0.00225), 0.02), built(0.002)
     effort = np.array(source.recording.effort)
     effort[50::40] += 5.0
-    spoilt = measured(Recording("spoilt.csv", source.recording.motion, effort), None)
+    spoilt = measure_recording(Recording("spoilt.csv", source.recording.motion, effort), None)
     errors = {
         loss: abs(calibrate(start, spoilt, parameters(start, [STIFFNESS]), loss).fit.values[0] - 682.5)
         for loss in ("linear", "soft_l1")
@@ -112,7 +112,7 @@ def test_outliers_hardly_move_the_robust_fit():
 
 def test_the_built_cam_keeps_its_shape_while_the_rest_length_is_fitted():
     """Else the fit would cut a new cam for every trial, whose force does not depend on the rest length at all."""
-    start = resolved(cam(analysis__window=("5 mm", "230 mm")))
+    start = resolve_spec(cam(analysis__window=("5 mm", "230 mm")))
     source = recording(built(rest_half_width="68.25 mm", friction=0.0))
     found = calibrate(start, source, parameters(start, [REST]))
     assert found.fit.values == pytest.approx([0.06825], rel=1e-7)
@@ -225,7 +225,7 @@ def test_vibration_that_the_sampling_resolves_is_no_lack_of_fit():
     truth = built(0.00225, rest_half_width="68.25 mm")
     source = recording(truth, 0.02)
     shaken = source.recording.effort + 0.2 * np.sin(np.arange(len(source.recording)) * 2 * np.pi / 10.3)
-    source = measured(Recording("shaken.csv", source.recording.motion, shaken), None)
+    source = measure_recording(Recording("shaken.csv", source.recording.motion, shaken), None)
     found = calibrate(built(), source, parameters(built(), [REST, FRICTION]))
     assert found.warnings == ()
 
@@ -268,7 +268,7 @@ def lossy(spec, gap=1.0, thin=1):
     way = np.repeat([1.0, -1.0], [len(load.motion), len(load.motion[::thin])])
     effort = np.interp(motion, load.motion, load.effort) + 0.5 * gap * way
     good = np.isfinite(effort)
-    return measured(Recording("lossy.csv", motion[good], effort[good]), None)
+    return measure_recording(Recording("lossy.csv", motion[good], effort[good]), None)
 
 
 @pytest.mark.parametrize("thin", [1, 7])
@@ -300,10 +300,10 @@ def test_a_fit_counts_the_way_and_not_the_samples():
     load = analyze(spec).curve.on("load")
     places = np.concatenate([np.linspace(0.006, 0.08, 4000)[:-1], np.linspace(0.08, 0.229, 200)])
     effort = np.interp(places, load.motion, load.effort) + np.where(places < 0.08, 1.0, 0.0)
-    dense = measured(Recording("dense.csv", places, effort), None)
+    dense = measure_recording(Recording("dense.csv", places, effort), None)
     even = np.linspace(0.006, 0.229, 2000)
     plain = np.interp(even, load.motion, load.effort) + np.where(even < 0.08, 1.0, 0.0)
-    uniform = measured(Recording("even.csv", even, plain), None)
+    uniform = measure_recording(Recording("even.csv", even, plain), None)
     one, other = (calibrate(spec, item, parameters(spec, [STIFFNESS]), "linear").fit for item in (dense, uniform))
     assert one.values[0] == pytest.approx(other.values[0], rel=2e-4)
     errors = [compare(analyze(spec), item).metrics() for item in (dense, uniform)]
@@ -316,7 +316,7 @@ def test_an_interval_stays_within_the_bounds_and_what_is_unknown_is_said_so():
     from cfmkit.experiment.measurement_and_calibration_outputs import calibration_lines
 
     start, source = built(0.0002), recording(built(0.0002), 2.0)
-    few = measured(Recording("few.csv", source.recording.motion[::40], source.recording.effort[::40]), None)
+    few = measure_recording(Recording("few.csv", source.recording.motion[::40], source.recording.effort[::40]), None)
     found = calibrate(start, few, parameters(start, [FRICTION]))
     (record,) = table(found)
     assert record["low_95"] >= 0.0
@@ -331,7 +331,7 @@ def test_errors_over_a_hole_have_no_value_and_the_fit_uses_what_there_is():
     spec = built(0.00225)
     whole = recording(spec).recording
     keep = (whole.motion < 0.08) | (whole.motion > 0.14)
-    source = measured(Recording("hole.csv", whole.motion[keep], whole.effort[keep]), None)
+    source = measure_recording(Recording("hole.csv", whole.motion[keep], whole.effort[keep]), None)
     found = calibrate(built(0.002), source, parameters(built(), [FRICTION]))
     assert found.fit.values[0] == pytest.approx(0.00225, rel=1e-4)
     assert all(item.value is None for item in found.after.metrics().values())

@@ -57,13 +57,13 @@ def test_the_error_grows_with_the_waviness():
 
 
 def test_the_drawn_waviness_has_the_stated_deviation():
-    from cfmkit.families.cam.manufacturing_scatter import _drawn
+    from cfmkit.families.cam.manufacturing_scatter import _draw_error
 
     places = np.linspace(0, 0.27, 1600)
     flank = flanks()[0]
     nominal = flank.frame(np.linspace(*flank.ends, 1600))
     rng = np.random.default_rng(0)
-    drawn = [_drawn(rng, Manufacturing(waviness=20e-6), nominal, places).at(places) for _ in range(200)]
+    drawn = [_draw_error(rng, Manufacturing(waviness=20e-6), nominal, places).at(places) for _ in range(200)]
     assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(20e-6, rel=0.05)
 
 

@@ -8,7 +8,7 @@ from experiment_support import reference_case
 from scipy.signal import sosfreqz
 
 from cfmkit.experiment.branches import split
-from cfmkit.experiment.curves_and_metrics_of_recording import Measurement, measured, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import Measurement, measure_recording, numbers_of
 from cfmkit.experiment.low_pass import LowPass, low_passed
 from cfmkit.metrics import Window
 
@@ -24,7 +24,7 @@ def two_pass_gain(filtered_by: LowPass, frequency: float, step: float) -> float:
 
 @pytest.fixture(scope="module")
 def source():
-    return measured(reference_case(), TWO_HERTZ)
+    return measure_recording(reference_case(), TWO_HERTZ)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_metrics_of_the_contract_are_there_raw_and_filtered_per_branch(numbers):
 
 def test_a_filter_over_the_displacement_gives_the_same_loop_as_one_over_time(numbers):
     """500 mm/min: 2 Hz are 0.24 cycles per mm."""
-    other = numbers_of(measured(reference_case(), LowPass(240.0, "length", 6)), window=WINDOW)
+    other = numbers_of(measure_recording(reference_case(), LowPass(240.0, "length", 6)), window=WINDOW)
     for name in ("force_mean[load]", "force_sd[unload]", "hysteresis_area"):
         assert other.filtered[name].value == pytest.approx(numbers.filtered[name].value, rel=1e-9)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from experiment_support import triangle
 
-from cfmkit.experiment.curves_and_metrics_of_recording import measured
+from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 from cfmkit.experiment.figures import figures
 from cfmkit.experiment.measurement_and_calibration_outputs import report_on
 from cfmkit.experiment.reading import Recording
@@ -18,7 +18,8 @@ def report(rise):
     motion = triangle(2)
     way = np.sign(np.diff(motion, append=motion[-2]))
     return report_on(
-        measured(Recording("made.csv", motion * 1e-3, 50 + 0.5 * way + rise * motion)), window=Window(0.01, 0.03)
+        measure_recording(Recording("made.csv", motion * 1e-3, 50 + 0.5 * way + rise * motion)),
+        window=Window(0.01, 0.03),
     )
 
 

@@ -9,10 +9,10 @@ import pytest
 from experiment_support import lossy_loop, reference_case, rows, triangle
 
 import cfmkit
-from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measure_recording, numbers_of
 from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import Recording
-from cfmkit.experiment.zeros_and_signs import corrected
+from cfmkit.experiment.zeros_and_signs import correct_recording
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import spikes
 
@@ -33,7 +33,7 @@ def names(*findings):
 @pytest.mark.parametrize("cycles", [1, 2, 5])
 @pytest.mark.parametrize(("points", "stroke"), [(200, 100.0), (450, 60.0), (900, 240.0)])
 def test_the_sample_at_a_reversal_spoils_no_filtered_number(cycles, points, stroke):
-    source = measured(lossy_loop(triangle(cycles, points, stroke)))
+    source = measure_recording(lossy_loop(triangle(cycles, points, stroke)))
     assert ripples(numbers_of(source)) == pytest.approx(np.ones(4), abs=2e-3)
     assert source.warnings == ()
 
@@ -42,7 +42,7 @@ def test_the_sample_at_a_reversal_spoils_no_filtered_number(cycles, points, stro
 @pytest.mark.parametrize(("elastic", "gap"), [(0.3, 1.0), (1.0, 1.0), (1.0, 0.3), (3.0, 2.0)])
 @pytest.mark.parametrize(("points", "stroke"), [(200, 100.0), (1000, 60.0)])
 def test_an_elastic_reversal_spoils_neither_raw_nor_filtered_numbers(elastic, gap, decay, points, stroke):
-    source = measured(lossy_loop(triangle(2, points, stroke), gap, elastic, decay))
+    source = measure_recording(lossy_loop(triangle(2, points, stroke), gap, elastic, decay))
     numbers = numbers_of(source)
     assert ripples(numbers, gap) == pytest.approx(np.ones(4), abs=5e-3)
     # A passage shorter than a sample costs the sample at the reversal only, which is no news.
@@ -53,9 +53,9 @@ def test_an_elastic_reversal_spoils_neither_raw_nor_filtered_numbers(elastic, ga
 @pytest.mark.parametrize("seed", range(4))
 def test_an_elastic_reversal_is_seen_through_noise(seed):
     """0.05 N of noise, 20 samples per mm: the filter leaves 3 mN of it, the passage would be 1 N."""
-    source = measured(lossy_loop(triangle(2, 2000), 1.0, 1.0, noise=0.05, seed=seed))
+    source = measure_recording(lossy_loop(triangle(2, 2000), 1.0, 1.0, noise=0.05, seed=seed))
     assert ripples(numbers_of(source))[[1, 3]] == pytest.approx(np.ones(2), abs=0.15)
-    as_recorded = measured(lossy_loop(triangle(2, 2000), 1.0, 1.0, noise=0.05, seed=seed), leave_out=())
+    as_recorded = measure_recording(lossy_loop(triangle(2, 2000), 1.0, 1.0, noise=0.05, seed=seed), leave_out=())
     assert ripples(numbers_of(as_recorded))[3] > 1.5
 
 
@@ -68,7 +68,7 @@ def test_play_at_a_reversal_is_left_out():
         assert top > last
         effort[top : top + 4] = effort[top - 1]
         last = top
-    source = measured(replace(case, motion=motion, effort=effort))
+    source = measure_recording(replace(case, motion=motion, effort=effort))
     assert ripples(numbers_of(source)) == pytest.approx(np.ones(4), abs=3e-3)
 
 
@@ -79,7 +79,7 @@ def test_where_the_force_jumps_at_the_reversal_noise_costs_few_points(gap, seed)
     motion = triangle(2, 400)
     way = np.sign(np.diff(motion, prepend=-0.1))
     force = 50 + 0.5 * gap * way + np.random.default_rng(seed).normal(0, 0.1, len(motion))
-    source = measured(Recording("made.csv", motion * 1e-3, force))
+    source = measure_recording(Recording("made.csv", motion * 1e-3, force))
     assert source.warnings == ()
 
 
@@ -89,12 +89,12 @@ def test_what_both_branches_have_in_common_is_no_passage():
     level = 50 * np.minimum(up / 3.0, 1.0)
     half = 0.5 - 0.003 * up
     force = np.concatenate([level + half, (level - half)[::-1]])
-    source = measured(Recording("made.csv", np.concatenate([up, up[::-1]]) * 1e-3, force))
+    source = measure_recording(Recording("made.csv", np.concatenate([up, up[::-1]]) * 1e-3, force))
     assert source.warnings == ()
 
 
 def test_a_window_that_touches_a_reversal_is_shortened_and_the_user_is_told():
-    source = measured(lossy_loop(triangle(2), elastic=1.0))
+    source = measure_recording(lossy_loop(triangle(2), elastic=1.0))
     numbers = numbers_of(source, window=Window(0.0, 0.1))
     assert names(*numbers.warnings) == {"window_at_reversal"}
     assert numbers.warnings[0].message.startswith(
@@ -105,18 +105,18 @@ def test_a_window_that_touches_a_reversal_is_shortened_and_the_user_is_told():
 
 
 def test_a_window_to_the_very_reversal_is_said_to_touch_it():
-    numbers = numbers_of(measured(lossy_loop(triangle(2))), window=Window(0.0, 0.1))
+    numbers = numbers_of(measure_recording(lossy_loop(triangle(2))), window=Window(0.0, 0.1))
     assert (numbers.window.lo, numbers.window.hi) == pytest.approx((0.0005, 0.0995))
     assert names(*numbers.warnings) == {"window_at_reversal"}
 
 
 def test_the_reference_case_loses_no_point():
-    source = measured(reference_case())
+    source = measure_recording(reference_case())
     assert sum(len(stroke.points) for stroke in source.strokes.strokes) == 2016
 
 
 def test_as_recorded_keeps_every_point():
-    source = measured(lossy_loop(triangle(2), elastic=1.0), leave_out=())
+    source = measure_recording(lossy_loop(triangle(2), elastic=1.0), leave_out=())
     assert source.warnings == ()
     assert sum(len(stroke.points) for stroke in source.strokes.strokes) == 801
 
@@ -130,9 +130,9 @@ def test_spikes_are_left_out_and_counted(seed, noise):
     effort = np.array(case.effort)
     where = rng.choice(np.arange(5, len(effort) - 5, 7), 15, replace=False)
     effort[where] += rng.choice([-1, 1], 15) * rng.uniform(5.0, 40.0, 15)
-    numbers = numbers_of(measured(replace(case, effort=effort), leave_out=LEFT_OUT))
-    clean = numbers_of(measured(case))
-    finding = measured(replace(case, effort=effort), leave_out=LEFT_OUT).warnings[0]
+    numbers = numbers_of(measure_recording(replace(case, effort=effort), leave_out=LEFT_OUT))
+    clean = numbers_of(measure_recording(case))
+    finding = measure_recording(replace(case, effort=effort), leave_out=LEFT_OUT).warnings[0]
     assert finding.name == "spikes"
     assert finding.message.startswith(f"15 of {len(effort)} points are far from their neighbours")
     assert ripples(numbers) == pytest.approx(ripples(clean), rel=0.02 if noise == 0 else 0.15)
@@ -142,7 +142,7 @@ def test_spikes_of_the_displacement_make_no_strokes():
     case = lossy_loop(triangle(1, 400))
     motion = np.array(case.motion)
     motion[[100, 350, 351, 600]] = [0.09, 0.0, 0.0, 0.2]
-    source = measured(replace(case, motion=motion), leave_out=LEFT_OUT)
+    source = measure_recording(replace(case, motion=motion), leave_out=LEFT_OUT)
     assert [stroke.branch for stroke in source.strokes.strokes] == ["load", "unload"]
     assert ripples(numbers_of(source)) == pytest.approx(np.ones(4), abs=3e-3)
 
@@ -154,9 +154,9 @@ def test_one_glitch_of_the_displacement_changes_neither_filter_nor_tare_nor_boun
     motion[300] = 10.0
     glitch = replace(case, motion=motion)
     assert glitch.travel == case.travel == np.ptp(case.motion)
-    assert measured(glitch, leave_out=LEFT_OUT).low_pass == measured(case).low_pass
-    assert ripples(numbers_of(measured(glitch, leave_out=LEFT_OUT))) == pytest.approx(np.ones(4), abs=3e-3)
-    assert corrected(glitch, tare="start").zeros == corrected(case, tare="start").zeros
+    assert measure_recording(glitch, leave_out=LEFT_OUT).low_pass == measure_recording(case).low_pass
+    assert ripples(numbers_of(measure_recording(glitch, leave_out=LEFT_OUT))) == pytest.approx(np.ones(4), abs=3e-3)
+    assert correct_recording(glitch, tare="start").zeros == correct_recording(case, tare="start").zeros
     spec = cfmkit.load("configs/cam.yaml")
     zeros = [parameters(spec, ["data.displacement_offset"], recording=one)[0] for one in (glitch, case)]
     assert zeros[0] == zeros[1]
@@ -180,7 +180,7 @@ def test_a_corner_that_every_stroke_shows_is_no_spike():
     case = lossy_loop(triangle(2, 400))
     extra = np.interp(1e3 * case.motion, [0.0, 0.25, 0.5, 0.75, 1.0, 1.5], [-50.0, 4.0, 2.0, 1.0, 0.0, 0.0])
     detent = 5.0 * (np.abs(1e3 * case.motion - 60.0) < 0.2)
-    source = measured(replace(case, effort=case.effort + extra + detent), leave_out=LEFT_OUT)
+    source = measure_recording(replace(case, effort=case.effort + extra + detent), leave_out=LEFT_OUT)
     assert source.warnings == ()
 
 

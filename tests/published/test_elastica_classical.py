@@ -35,7 +35,7 @@ from cfmkit.elastica import (
     Taper,
     TorsionSpring,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -231,7 +231,7 @@ def test_pretensioned_beam_is_stiffened_as_a_tie_rod() -> None:
     pull = 2e-5 * LENGTH
     nodes = {
         "root": Node(0, 0, Support(True, True, True, displacement=(-pull, 0, 0))),
-        "tip": Node(LENGTH, 0, guided(np.pi / 2)),
+        "tip": Node(LENGTH, 0, slider_support(np.pi / 2)),
     }
     p = trace(Network(nodes, {"beam": Beam("root", "tip", section)}), Displacement("tip", np.pi / 2, [1e-7]), FINE)
     stretch, tension = 1 + 2e-5, 2.4e9 * 0.1 * 1e-3 * 2e-5
@@ -242,7 +242,7 @@ def test_pretensioned_beam_is_stiffened_as_a_tie_rod() -> None:
 def test_precompressed_clamped_beam_buckles_at_four_pi_squared() -> None:
     """P = 4 pi^2 EI / L^2 [TG, sec. 2.2], here of a beam that is shorter by its strain."""
     section = Section(2.4e9, 0.1, 1e-3)
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, guided(0.0))}
+    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, slider_support(0.0))}
     p = trace(Network(nodes, {"beam": Beam("root", "tip", section)}), Displacement("tip", np.pi, [1e-4 * LENGTH]), FINE)
     critical = 4 * np.pi**2 * RIGIDITY / LENGTH**2
     event = p.events[0]

@@ -28,7 +28,7 @@ from cfmkit.elastica import (
     PathStatus,
     PointLoad,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -45,7 +45,7 @@ def elastica(approach: float) -> float:
 def column(slenderness: float, clamped: bool) -> tuple[Network, float]:
     """Return a column whose far end is guided along it, and its critical load [N]."""
     section = Section(2e9, 1e-2, LENGTH * np.sqrt(12) / slenderness)
-    ends = (CLAMPED, guided(0.0)) if clamped else (PINNED, guided(0.0, rotates=True))
+    ends = (CLAMPED, slider_support(0.0)) if clamped else (PINNED, slider_support(0.0, rotates=True))
     nodes = {"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}
     rigidity = 2e9 * 1e-2 * section.thickness**3 / 12  # type: ignore[operator]
     return Network(nodes, {"x": Beam("a", "b", section)}), (4 if clamped else 1) * np.pi**2 * rigidity / LENGTH**2
@@ -70,8 +70,8 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
 
 ENDS = {
     "free": (CLAMPED, FREE, 0.25),
-    "guided": (CLAMPED, guided(0.0), 4.0),
-    "pinned": (PINNED, guided(0.0, True), 1.0),
+    "guided": (CLAMPED, slider_support(0.0), 4.0),
+    "pinned": (PINNED, slider_support(0.0, True), 1.0),
 }
 
 

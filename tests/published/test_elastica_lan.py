@@ -22,7 +22,7 @@ from cfmkit.elastica import (
     PathStatus,
     Polynomial,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -38,7 +38,7 @@ def table_4() -> Network:
         "n1": Node(1 * CM, 0.2 * CM, CLAMPED),
         "n2": Node(0.99 * CM, 0.55 * CM),
         "n3": Node(0.15 * CM, 0.64 * CM),
-        "n4": Node(0, 1 * CM, guided(np.pi / 2)),
+        "n4": Node(0, 1 * CM, slider_support(np.pi / 2)),
     }
     beams = {
         "b1": Beam("n1", "n2", section, Polynomial((1.6401, 0.9920, -1.5706))),

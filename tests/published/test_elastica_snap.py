@@ -28,7 +28,7 @@ from cfmkit.elastica import (
     PointLoad,
     Section,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -144,7 +144,7 @@ def test_lee_frame_through_snap_through_and_snap_back() -> None:
 def test_williams_toggle_through_its_limit_points() -> None:
     """Williams, Q. J. Mech. Appl. Math. 17 (1964) 451: snaps at 34 lb (read to 0.5), regains at about 31 lb."""
     section = Section(1.03e7, 0.753, 0.243)
-    nodes = {"a": Node(0, 0, CLAMPED), "tip": Node(12.943, 0.386, guided(np.pi / 2))}
+    nodes = {"a": Node(0, 0, CLAMPED), "tip": Node(12.943, 0.386, slider_support(np.pi / 2))}
     network = Network(nodes, {"beam": Beam("a", "tip", section)})
     p = traced(network, 35.0)
     assert [event.kind for event in p.events] == ["limit point", "limit point"]

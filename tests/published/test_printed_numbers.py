@@ -12,7 +12,7 @@ import pytest
 from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs import papers
-from cfmkit.runs.papers import VERDICTS, check, chosen, number, rows
+from cfmkit.runs.papers import VERDICTS, check, choose_rows, number, rows
 
 ROOT = Path(__file__).parents[2]
 TABLES = {  # numbers in the body of each table, counted in the papers
@@ -119,7 +119,7 @@ def test_a_printed_number_counts_to_its_last_digit():
 
 
 def test_papers_are_chosen_by_name_or_family():
-    assert {row.paper for row in chosen("slider-crank")} == {"bilancia-2019", "li-2019"}
-    assert {row.family for row in chosen("Lan-2010")} == {"beam"}
+    assert {row.paper for row in choose_rows("slider-crank")} == {"bilancia-2019", "li-2019"}
+    assert {row.family for row in choose_rows("Lan-2010")} == {"beam"}
     with pytest.raises(UsageError, match="did you mean 'lan-2010'"):
-        chosen("lan2010")
+        choose_rows("lan2010")

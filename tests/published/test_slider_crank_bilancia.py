@@ -16,7 +16,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, least_squares
-from cfmkit.families.slider_crank.unit_springs import along_slider
+from cfmkit.families.slider_crank.unit_springs import curves_along_slider
 from cfmkit.metrics import Window
 
 TABLE = {
@@ -53,7 +53,7 @@ def test_the_force_at_the_stretched_start_is_a_buckling_load():
     r1, r2, (k1, k2, k3, _) = 54.0, BILANCIA.coupler, TABLE_1
     limit = math.cos(ALPHA) * (k1 / r1**2 + k2 * (1 / r1 + 1 / r2) ** 2 + k3 / r2**2) / (1 / r1 + 1 / r2)
     assert limit == pytest.approx(1.51193452, abs=5e-9)
-    sides = [TABLE_1 @ along_slider(BILANCIA, ALPHA, side, np.array([0.0])).effort for side in (1, -1)]
+    sides = [TABLE_1 @ curves_along_slider(BILANCIA, ALPHA, side, np.array([0.0])).effort for side in (1, -1)]
     assert sides == [pytest.approx(limit, rel=1e-14), pytest.approx(limit, rel=1e-14)]
     spec = config("bilancia2019", mechanism__unloaded_angle=None, mechanism__unloaded_offset=0.0)
     assert cfmkit.analyze(spec).values["start_force"].value == pytest.approx(limit, rel=1e-12)
@@ -61,7 +61,7 @@ def test_the_force_at_the_stretched_start_is_a_buckling_load():
 
 def test_eq_3_to_5_need_parentheses_and_the_other_sign():
     """Printed left to right they give -32 N at 10 mm; bracketed, and with T = -K psi, they are right."""
-    units = along_slider(BILANCIA, 0.542, 1, np.array([10.0]))
+    units = curves_along_slider(BILANCIA, 0.542, 1, np.array([10.0]))
     psi1, psi2, psi3 = units.turn[:3, 0]
     th1, x, r1, e = float(units.angle[0]), float(units.position[0]), 54.0, 60.0
     th3 = math.pi - math.asin((r1 * math.sin(th1) - e) / BILANCIA.coupler)
@@ -82,7 +82,7 @@ def test_eq_3_to_5_need_parentheses_and_the_other_sign():
 
 
 def test_rotations_over_the_stroke():
-    units = along_slider(BILANCIA, ALPHA, 1, np.array([35.0]))
+    units = curves_along_slider(BILANCIA, ALPHA, 1, np.array([35.0]))
     np.testing.assert_allclose(np.degrees(units.turn[:3, 0]), [56.2, -81.6, -25.4], atol=0.05)
     assert float(units.angle[0]) == pytest.approx(1.521230, abs=5e-7)
 
@@ -106,7 +106,7 @@ def test_error_of_eq_8_on_points_even_in_the_travel(start, rms):
     [(0.542, 0, 0.15216518), (ALPHA, 0, 0.01315005), (0.542, 1, 0.02582215), (ALPHA, 1, 0.01316188)],
 )
 def test_error_of_eq_8_on_points_even_in_the_crank_angle(start, first, rms):
-    end = float(along_slider(BILANCIA, start, 1, np.array([35.0])).angle[0])
+    end = float(curves_along_slider(BILANCIA, start, 1, np.array([35.0])).angle[0])
     share = np.arange(1, 101) / 100 if first else np.arange(100) / 99
     angle = start + (end - start) * share
     travel = BILANCIA.slider_position(np.array(start)) - BILANCIA.slider_position(angle)
@@ -152,9 +152,9 @@ def test_the_optimum_that_starts_stretched(spacing, wanted, error):
     share = np.arange(1, 101) / 100
     travel = 35.0 * share
     if spacing == "crank":
-        end = float(along_slider(BILANCIA, ALPHA, 1, np.array([35.0])).angle[0])
+        end = float(curves_along_slider(BILANCIA, ALPHA, 1, np.array([35.0])).angle[0])
         travel = 100.0 - BILANCIA.slider_position(ALPHA + (end - ALPHA) * share)
-    units = along_slider(BILANCIA, ALPHA, 1, travel)
+    units = curves_along_slider(BILANCIA, ALPHA, 1, travel)
     goal = RateGoal(units.effort[:3].T / 1.5, np.ones(100), np.full(3, np.inf))
     rates = least_squares(goal)
     np.testing.assert_allclose(rates, wanted, atol=2e-5)
@@ -195,10 +195,10 @@ def test_a_crank_of_12_mm_cannot_make_the_stroke():
 
 def test_both_papers_have_the_same_model():
     """The force is the torque over the slider's velocity ratio, -T/x'."""
-    from cfmkit.families.slider_crank.unit_springs import along_crank
+    from cfmkit.families.slider_crank.unit_springs import curves_along_crank
 
-    units = along_slider(BILANCIA, 0.542, 1, np.array([1.0, 10.0, 35.0]))
-    torque = along_crank(BILANCIA, 0.542, units.angle)
-    ratio = along_crank(BILANCIA, 0.542, units.angle).effort[3] / torque.turn[3]
+    units = curves_along_slider(BILANCIA, 0.542, 1, np.array([1.0, 10.0, 35.0]))
+    torque = curves_along_crank(BILANCIA, 0.542, units.angle)
+    ratio = curves_along_crank(BILANCIA, 0.542, units.angle).effort[3] / torque.turn[3]
     np.testing.assert_allclose(units.effort[:3], -torque.effort[:3] / ratio, rtol=1e-10)
     assert Linkage(54.0, BILANCIA.coupler, 60.0).turns_fully is False

@@ -23,7 +23,7 @@ from flexure_support import (
 from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, PressingEnd
 from cfmkit.families.slider_crank.printed.flexure_sizing import rotations
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity, Flexure
-from cfmkit.families.slider_crank.unit_springs import along_slider
+from cfmkit.families.slider_crank.unit_springs import curves_along_slider
 from cfmkit.numerics.roots import bracketed_root
 
 STRETCHED = LINKAGE.stretched_angle
@@ -79,7 +79,7 @@ def test_flexures_of_finite_length_are_stiffer_than_springs(length: float, facto
         thickness = (12 * rate * length * MM / (1.8e9 * 2.73)) ** 0.25
         parts.append(Flexure(length * MM, thickness, 2.73 * thickness))
     beams = force(lumped_chain(STRETCHED, parts), [0.1])
-    springs = RATES @ along_slider(LINKAGE, STRETCHED, 1, np.array([0.1 * MM])).effort[:3]
+    springs = RATES @ curves_along_slider(LINKAGE, STRETCHED, 1, np.array([0.1 * MM])).effort[:3]
     assert float(beams[0] / springs[0]) == pytest.approx(factor, abs=3e-4)
 
 
@@ -127,7 +127,7 @@ def test_lumped_mechanism_stroke(unloaded: float, travel: float) -> None:
 def test_lumped_mechanism_agrees_with_its_springs() -> None:
     """Table 2's beams against Table 1's springs, straight start: 0.03 % at the start, 0.8 % at 35 mm."""
     travel = np.array([0.1, 35.0])
-    springs = RATES @ along_slider(LINKAGE, STRETCHED, 1, travel * MM).effort[:3]
+    springs = RATES @ curves_along_slider(LINKAGE, STRETCHED, 1, travel * MM).effort[:3]
     np.testing.assert_allclose(
         np.abs(force(lumped_chain(STRETCHED), travel.tolist()) / springs - 1), [0, 8e-3], atol=5e-4
     )

@@ -16,7 +16,7 @@ import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.bistability_class import scale_factors, small_angle_number
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
-from cfmkit.families.slider_crank.unit_springs import along_crank
+from cfmkit.families.slider_crank.unit_springs import curves_along_crank
 
 T2 = LI.stretched_angle
 PER_DEG = 180 / math.pi
@@ -41,7 +41,7 @@ def test_eq_13a_prints_another_position_than_the_folded_one():
     printed = math.asin(LI.offset / (LI.crank - LI.coupler))
     assert printed / DEG == pytest.approx(-4.301222, abs=5e-7)
     assert LI.folded_angle / DEG == pytest.approx(184.301222, abs=5e-7)
-    slope = [along_crank(LI, START, np.array([angle])).effort[3] for angle in (printed, LI.folded_angle)]
+    slope = [curves_along_crank(LI, START, np.array([angle])).effort[3] for angle in (printed, LI.folded_angle)]
     assert abs(slope[0]) > 1e-2
     assert abs(slope[1]) < 1e-12
 
@@ -93,7 +93,7 @@ def test_eq_21_needs_cos_2_theta_where_it_prints_sin_cos():
             second = -r1 * math.cos(t) - (term + e * r1 * math.sin(t)) / a - b**2 / a**3
             return first**2 + travel * second
 
-        right = along_crank(LI, START, np.array([t])).stiffness[3, 0]
+        right = curves_along_crank(LI, START, np.array([t])).stiffness[3, 0]
         assert slope(r1**2 * math.cos(2 * t)) == pytest.approx(right, rel=1e-12)
         assert abs(slope(r1**2 * math.sin(t) * math.cos(t)) / right - 1) > 1e-3
 
@@ -102,7 +102,7 @@ def test_eq_21_needs_cos_2_theta_where_it_prints_sin_cos():
     ("place", "slope"), [(START, 2.7068319842), (T2, -1.3591519961), (10.742790603840236 * DEG, 2.6919925411)]
 )
 def test_slope_of_the_sliders_spring(place, slope):
-    assert along_crank(LI, START, np.array([place])).stiffness[3, 0] == pytest.approx(slope, abs=1e-9)
+    assert curves_along_crank(LI, START, np.array([place])).stiffness[3, 0] == pytest.approx(slope, abs=1e-9)
 
 
 SLIDER = {
@@ -176,14 +176,14 @@ def test_the_spring_at_the_slider_pin_alone_is_not_only_positive():
 
 def test_eq_33_coefficients():
     """Printed: 1, 1.438020, 0.039670, -1.359152."""
-    slope = along_crank(LI, START, np.array([T2])).stiffness[:, 0]
+    slope = curves_along_crank(LI, START, np.array([T2])).stiffness[:, 0]
     np.testing.assert_allclose(slope, [1, 1.4380202214, 0.0396697324, -1.3591519961], atol=6e-11)
     np.testing.assert_allclose(slope, [1, 1.438020, 0.039670, -1.359152], atol=5.1e-7)
 
 
 def test_the_zero_stiffness_spring_is_off_by_rounded_coefficients():
     """Printed: 34.261457 N cm/rad, the ratio of the six-digit coefficients; exact: 34.261688 = 0.59797928 N cm/deg."""
-    slope = along_crank(LI, START, np.array([T2])).stiffness[:, 0]
+    slope = curves_along_crank(LI, START, np.array([T2])).stiffness[:, 0]
     assert -slope[3] / slope[2] == pytest.approx(34.261688038, abs=5e-10)
     assert pytest.approx(34.261457, abs=5e-7) == 1.359152 / 0.039670
     assert -slope[3] / slope[2] * DEG == pytest.approx(0.5979792636, abs=5e-11)
@@ -208,7 +208,7 @@ def test_fig_12_torque_and_its_tiny_hump():
     rates = np.array([0, 0, 34.261688038, 1.0])
     torque = rates @ li([-3, 0, 5, 8, 10]).effort
     np.testing.assert_allclose(torque, [0.10955162, 0.17890305, 0.19178449, 0.23808309, 0.32244676], atol=5.1e-9)
-    bend = rates @ along_crank(LI, START, np.array([T2]), bend=True).bend
+    bend = rates @ curves_along_crank(LI, START, np.array([T2]), bend=True).bend
     assert bend[0] == pytest.approx(-0.386650, abs=5e-7)
     found = values(config("li2019", mechanism__springs__slider_pin="34.261688038 N*cm/rad"))
     assert found["stiffness_drop"] == pytest.approx(1.1e-6, abs=5e-8)
@@ -320,7 +320,7 @@ def deviation(design):
     low, high = design.spec.design.angle
     angle = np.linspace(low, high, 4001)
     rates = assemble(design.spec).rates
-    torque = rates @ along_crank(Linkage(0.1, 0.5, 0.03), START, angle).effort
+    torque = rates @ curves_along_crank(Linkage(0.1, 0.5, 0.03), START, angle).effort
     slope = (design.spec.design.stiffness or 0.0) / 0.002
     return 100 * np.abs(torque / 0.002 - 1 - slope * (angle - T2)).max()
 
@@ -392,7 +392,7 @@ def slope_at_stretched(crank, rate):
     lead = 38 * math.sin(3 * DEG)
     linkage = Linkage(crank, 32.3, -0.15 * lead)
     start = -math.asin(lead / crank)
-    units = along_crank(linkage, start, np.array([linkage.stretched_angle]))
+    units = curves_along_crank(linkage, start, np.array([linkage.stretched_angle]))
     return 4934.2105263 * units.stiffness[2, 0] + rate * units.stiffness[3, 0]
 
 

@@ -10,7 +10,7 @@ import cfmkit.metrics
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.design import missed_by, task_of
 from cfmkit.families.beam.shaping.search import Found
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, audited, tolerated
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, audited, scatter_within_tolerances
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
@@ -33,7 +33,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     assert cfmkit.evaluate(result, ["stress_max"], window)["stress_max"].value < 76e6 / 1.58
     band = cfmkit.evaluate(bends, ["half_band"], window)["half_band"].value
     assert band == pytest.approx(0.058, abs=2e-3)  # stretching and shear move the force by more than the band is wide
-    drawn = tolerated(variables, found, NetworkScatter(1e-4, 0.02, 40))
+    drawn = scatter_within_tolerances(variables, found, NetworkScatter(1e-4, 0.02, 40))
     assert float(np.median(drawn.ranges)) == pytest.approx(0.45, abs=0.15)
     assert float(np.median(drawn.bands)) == pytest.approx(0.045, abs=0.01)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cam_support import MM, at, cam
 
-from cfmkit.families.cam.geometry.flank_from_roller_path import cut
+from cfmkit.families.cam.geometry.flank_from_roller_path import cut_cam
 from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
@@ -93,7 +93,7 @@ def test_the_path_passes_the_tabulated_points_by_height(height, friction):
     ],
 )
 def test_the_cam_has_the_tabulated_points_and_radii_of_curvature(x, point, radius, digits):
-    profile = cut(RollerPath(law(), 140 * MM), ROLLER, 140 * MM)
+    profile = cut_cam(RollerPath(law(), 140 * MM), ROLLER, 140 * MM)
     # The last x is rounded to 1e-8 mm, which the slope of 8 turns into 4e-8 mm of height.
     np.testing.assert_allclose(profile.flank(x * MM), MM * np.array(point), rtol=0, atol=8 * DIGITS)
     assert (law().curvature_radius(x * MM) - ROLLER) / MM == pytest.approx(radius, abs=0.51 * 10**-digits)
@@ -108,7 +108,7 @@ def test_the_published_roller_is_larger_than_the_radius_of_curvature_at_the_star
 
 def test_the_undercut_cam_begins_at_the_tabulated_corner():
     path, end = reach(law(), 240 * MM)
-    profile = cut(path, ROLLER, end)
+    profile = cut_cam(path, ROLLER, end)
     assert profile.corner is not None
     np.testing.assert_allclose(profile.corner.point, MM * np.array([61.90084727, 14.79190103]), rtol=0, atol=DIGITS)
     assert profile.corner.cusp / MM == pytest.approx(71.05622211, abs=0.51e-8)
@@ -155,7 +155,7 @@ def test_a_stroke_ends_at_the_tabulated_place(method, stroke, x, y, elongation, 
 @pytest.mark.parametrize(("stroke", "height"), [(240, 266.7), (250, 277.9)])
 def test_the_cam_has_the_tabulated_height(stroke, height):
     path, end = reach(law(), stroke * MM)
-    profile = cut(path, ROLLER, end)
+    profile = cut_cam(path, ROLLER, end)
     bottom, top = (profile.flank(x)[1] for x in (profile.start, end))
     assert (top - bottom) / MM == pytest.approx(height, abs=0.051)
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from cfmkit.elastica import LineSpring, Loading, Path, PointLoad, SlideSpring, TorsionSpring
 from cfmkit.elastica.mechanics.polynomials import basis
-from cfmkit.elastica.results.beam_states import elements_of, states, unloaded
+from cfmkit.elastica.results.beam_states import elements_of, states, unloaded_places
 from cfmkit.elastica.results.path import N_PLACES
 
 
@@ -24,7 +24,7 @@ def mean_motion(path: Path, beam: str) -> np.ndarray:
     """Return the integral of the displacements along a beam at every point, (n, 2) [m^2]."""
     places, own = basis(path.mesh.degree).places, elements_of(path.mesh, beam)
     weights = path.mesh.elements.weight[own].ravel() * path.mesh.scales.length
-    now, rest = states(path.network, path.at, beam, places), unloaded(path.network, path.at, beam, places)
+    now, rest = states(path.network, path.at, beam, places), unloaded_places(path.network, path.at, beam, places)
     return np.stack([(now.x - rest[:, 0]) @ weights, (now.y - rest[:, 1]) @ weights], axis=1)
 
 

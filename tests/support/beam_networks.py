@@ -30,7 +30,7 @@ from cfmkit.elastica import (
     Taper,
     TorsionSpring,
     arc,
-    guided,
+    slider_support,
 )
 
 PLACES = {"a": (0.0, 0.0), "b": (0.05, 0.03), "c": (0.1, -0.005), "d": (0.06, 0.075), "e": (0.012, 0.06)}
@@ -83,7 +83,7 @@ def _nodes(rng: Any) -> dict[str, Node]:
         "a": held(True, bool(rng.random() < 0.6)),
         "b": Support(),
         "c": held(*(bool(rng.random() < 0.5) for _ in range(2))),
-        "d": guided(float(rng.uniform(1, 2)), bool(rng.random() < 0.5)),
+        "d": slider_support(float(rng.uniform(1, 2)), bool(rng.random() < 0.5)),
         "e": CLAMPED if rng.random() < 0.5 else PINNED,
     }
     nodes = {name: Node(float(x), float(y), supports[name]) for name, (x, y) in at.items()}

@@ -284,7 +284,7 @@ class _Elements:
             name, cuts = names[number], path.mesh.elements.cuts
             own = beam_states.elements_of(path.mesh, name)
             now = beam_states.states(self.network, at, name, share)
-            rest = beam_states.unloaded(self.network, at, name, share)
+            rest = beam_states.unloaded_places(self.network, at, name, share)
             known = np.concatenate([cuts[k, 0] + (cuts[k, 1] - cuts[k, 0]) * share for k in own])
             moved[number] = known, (now.x[0] - rest[:, 0], now.y[0] - rest[:, 1], now.turn[0])
         first = 3 * len(self.first)

@@ -10,7 +10,7 @@ from cam_support import cam
 
 from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.numerics.rigid_point_registration import turned
+from cfmkit.numerics.rigid_point_registration import turn_points
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
@@ -56,5 +56,5 @@ def measured(errors: Errors | None = None, move=MOVE) -> list[np.ndarray]:
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(at.points, axis=0).T))])
         error = errors.offset + errors.waviness * np.sin(2 * np.pi * along / errors.length + number)
         points = at.points + error[:, None] * at.normals + errors.noise * rng.normal(size=at.points.shape)
-        found.append(turned(points, *move))
+        found.append(turn_points(points, *move))
     return found

@@ -15,8 +15,8 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     Flexure,
     Strip,
     flexure_ends,
+    flexure_network,
     joints,
-    lumped,
     spread,
 )
 
@@ -55,7 +55,7 @@ def lumped_chain(unloaded: float = UNLOADED, flexures: Sequence[Flexure] = TABLE
     """Return Table 2 as a chain."""
     pins = joints(LINKAGE, unloaded)
     ends = flexure_ends(pins, [item.length for item in flexures], [item.before for item in flexures])
-    return Chain(ends, pins, lambda p: lumped(p, flexures, ABS), np.pi, lambda p, i: knee(p, i, unloaded))
+    return Chain(ends, pins, lambda p: flexure_network(p, flexures, ABS), np.pi, lambda p, i: knee(p, i, unloaded))
 
 
 def strip_chain(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica import CLAMPED, Beam, Network, Node, Polynomial, guided
+from cfmkit.elastica import CLAMPED, Beam, Network, Node, Polynomial, slider_support
 
 if TYPE_CHECKING:
     from cfmkit.elastica import Section
@@ -49,7 +49,7 @@ def half(
         "n2": Node(3.45 * CM, 0, CLAMPED),
         "n3": Node(*inner["n3"]),
         "n4": Node(*inner["n4"]),
-        "n5": Node(0.25 * CM, 4 * CM, guided(np.pi / 2)),
+        "n5": Node(0.25 * CM, 4 * CM, slider_support(np.pi / 2)),
     }
     beams = {
         name: Beam(a, b, section, Polynomial(shapes[name], None if lengths is None else lengths[name]), closure)

@@ -9,7 +9,7 @@ import numpy as np
 
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider
+from cfmkit.families.slider_crank.unit_springs import curves_along_crank, curves_along_slider
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEG = math.pi / 180
@@ -32,12 +32,12 @@ def config(name, **changes):
 
 def li(degrees, start=START):
     """Return the unit curves of Li and Hao's linkage at crank angles [deg]."""
-    return along_crank(LI, start, np.asarray(degrees, dtype=float) * DEG)
+    return curves_along_crank(LI, start, np.asarray(degrees, dtype=float) * DEG)
 
 
 def force(travel, unloaded=0.542, linkage=BILANCIA, rates=TABLE_1):
     """Return Bilancia's force [N] at travels [mm]."""
-    return rates @ along_slider(linkage, unloaded, 1, np.asarray(travel, dtype=float)).effort
+    return rates @ curves_along_slider(linkage, unloaded, 1, np.asarray(travel, dtype=float)).effort
 
 
 def force_of_energy(link, unloaded, rates, side, travel):

@@ -28,7 +28,7 @@ from cfmkit.elastica import (
     Support,
     Taper,
     TorsionSpring,
-    guided,
+    slider_support,
 )
 
 LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 1.0, 2.0])
@@ -49,7 +49,7 @@ def arms(x: Any) -> Network:
         "b": Node(0.05, 0.02),
         "bb": Node(0.05 + x[1], 0.02 + x[2]),
         "c": Node(0.1, 0.0, CLAMPED),
-        "d": Node(0.06, 0.08, guided(np.pi / 2)),
+        "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
     }
     beams = {
         "ab": Beam("a", "b", section, Polynomial((0.0, 0.7)), end_offset=(x[3], 0.001)),
@@ -100,8 +100,8 @@ def zoo(x: Any) -> Network:
         "b": Node(x[0], x[1]),
         "bb": Node(0.05 + x[3], 0.022),
         "c": Node(0.1, 0.0, CLAMPED),
-        "d": Node(0.06, 0.08, guided(np.pi / 2)),
-        "e": Node(0.12, 0.05, guided(x[17], rotates=True)),
+        "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
+        "e": Node(0.12, 0.05, slider_support(x[17], rotates=True)),
         "f": Node(-0.02, 0.06, CLAMPED),
     }
     beams = {

@@ -208,7 +208,7 @@ def test_a_requirement_that_cannot_be_read_is_complained_about_once():
 
 def test_the_name_of_an_option_stands_for_the_option_that_it_is_short_for():
     error = cfmkit.SpecError([cfmkit.Problem("--set a", 0, 0, "a", "wrong"), cfmkit.Problem("f", 1, 1, "b", "wrong")])
-    assert [one.source for one in specfile.renamed(error, "--set a", "--a").problems] == ["--a", "f"]
+    assert [one.source for one in specfile.rename_source(error, "--set a", "--a").problems] == ["--a", "f"]
 
 
 def test_functions_take_the_path_of_a_file_as_well_as_a_specification(spec, result):

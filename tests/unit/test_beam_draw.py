@@ -7,7 +7,7 @@ import pytest
 from beam_support import CANTILEVER, MM, cantilever, config
 
 import cfmkit
-from cfmkit.families.beam.figures import bent, figures, rigid_parts
+from cfmkit.families.beam.figures import centre_line, figures, rigid_parts
 
 ARMED = CANTILEVER.replace(
     "  beams:",
@@ -32,7 +32,7 @@ def test_a_beam_under_an_end_moment_is_drawn_as_a_circle():
         ("travel: 100 mm", "moment: 150 N*mm"),
     )
     path = cfmkit.analyze(spec).state.path
-    line = bent(path, "beam", len(path) - 1)
+    line = centre_line(path, "beam", len(path) - 1)
     radius = 0.02 / 0.15
     np.testing.assert_allclose(np.hypot(line[:, 0], line[:, 1] - radius), radius, rtol=1e-6)
     turn = np.diff(np.unwrap(np.angle(np.diff(line @ np.array([1, 1j])))))

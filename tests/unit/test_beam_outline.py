@@ -16,10 +16,10 @@ from cfmkit.cli.main import main
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Drawing
-from cfmkit.export.union import OutlinePiece, merged
+from cfmkit.export.union import OutlinePiece, merge_pieces
 from cfmkit.families.beam import strips_and_gaps as strip_module
-from cfmkit.families.beam.network_from_spec import assemble, on_axis
-from cfmkit.families.beam.strips_and_gaps import mirrored, smallest_gap
+from cfmkit.families.beam.network_from_spec import assemble, is_on_axis
+from cfmkit.families.beam.strips_and_gaps import mirror_points, smallest_gap
 from cfmkit.numerics.arc_chain import points_on
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
@@ -32,19 +32,19 @@ def area(contours):
 
 
 def test_overlapping_squares_become_one_contour():
-    (one,) = merged(TWO, 10 * MM)
+    (one,) = merge_pieces(TWO, 10 * MM)
     assert one.closed
     assert area([one]) == pytest.approx(175e-6, rel=1e-3)
 
 
 def test_fillets_fill_inside_corners_and_leave_outside_ones():
     """Two inside corners of 90 deg, each filled by r^2 (1 - pi/4)."""
-    plain, rounded = area(merged(TWO, 10 * MM)), area(merged(TWO, 10 * MM, fillet=1 * MM))
+    plain, rounded = area(merge_pieces(TWO, 10 * MM)), area(merge_pieces(TWO, 10 * MM, fillet=1 * MM))
     assert rounded - plain == pytest.approx(2 * (1 - np.pi / 4) * 1e-6, rel=1e-9)
 
 
 def test_holes_stay_holes():
-    contours = merged(TWO[:1], 10 * MM, holes=[OutlinePiece.polygon(0.2 * SQUARE + 4 * MM)])
+    contours = merge_pieces(TWO[:1], 10 * MM, holes=[OutlinePiece.polygon(0.2 * SQUARE + 4 * MM)])
     assert [contour.hole for contour in contours] == [False, True]
     assert area(contours) == pytest.approx(96e-6, rel=1e-3)
 
@@ -109,7 +109,7 @@ def test_near_a_common_end_there_is_no_gap():
 
 def test_mirroring_twice_is_nothing():
     points = np.random.default_rng(1).normal(size=(7, 2))
-    again = mirrored(mirrored(points, 0.3 + 0.1j, 0.7), 0.3 + 0.1j, 0.7)
+    again = mirror_points(mirror_points(points, 0.3 + 0.1j, 0.7), 0.3 + 0.1j, 0.7)
     np.testing.assert_allclose(again, points, atol=1e-14)
 
 
@@ -121,7 +121,7 @@ def cuts(spec):
 def test_what_is_on_the_mirror_axis_depends_on_the_thickness_of_the_beams_there(usual, own, on):
     thick = ("thickness: 1 mm", f"thickness: {usual} mm"), ("end: tip}", f"end: tip, thickness: {own} mm}}")
     spec = cantilever(*thick, ("analysis:", "  copies: {mirror: [405 mm, 0 mm]}\nanalysis:"))
-    assert on_axis(assemble(spec), "tip") is on
+    assert is_on_axis(assemble(spec), "tip") is on
 
 
 def test_elastica_that_meet_on_the_mirror_axis_are_one_strip_without_a_hole():
@@ -160,7 +160,7 @@ def test_elastica_shorter_than_they_are_thick_that_meet_at_both_ends_have_no_gap
 def test_the_smallest_gap_is_found_without_looking_at_beams_far_away(monkeypatch):
     rng = np.random.default_rng(5)
     lines = {f"b{k}": rng.normal(size=(1, 2)) * 9 + np.cumsum(rng.normal(size=(40, 2)), axis=0) for k in range(12)}
-    lines |= {f"{name}'": mirrored(line, 30, np.pi / 2) for name, line in lines.items()}
+    lines |= {f"{name}'": mirror_points(line, 30, np.pi / 2) for name, line in lines.items()}
     halves = {f"b{k}": 0.02 + 0.01 * k for k in range(12)}
     looked, true = [], strip_module._gap
     every = [true(lines, halves, *pair) for pair in strip_module._pairs(lines)]
@@ -235,7 +235,7 @@ def test_windings_on_one_circle_become_a_ring(turns):
     points = radius * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
     full = np.full(len(angle), 1.0)
     strip = strip_module.BeamStrip(points, angle, thickness * full, full / radius, 0.0 * full)
-    assert area(merged([strip.piece], thickness)) == pytest.approx(2 * np.pi * radius * thickness, rel=2e-3)
+    assert area(merge_pieces([strip.piece], thickness)) == pytest.approx(2 * np.pi * radius * thickness, rel=2e-3)
 
 
 def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, capsys):

@@ -15,18 +15,18 @@ from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping import multistart, search
-from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
-from cfmkit.families.beam.shaping.multistart import explored
-from cfmkit.families.beam.shaping.report import judged, written
+from cfmkit.families.beam.shaping.design import find_blocking, missed_by, optimise_shape, task_of
+from cfmkit.families.beam.shaping.multistart import explore
+from cfmkit.families.beam.shaping.report import judge_design, write_design
 from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, searched
+from cfmkit.families.beam.shaping.search import Found, StartBudget, flatten, searched, verify
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     NetworkScatter,
     audited,
     half_band,
     lines_cross,
+    scatter_within_tolerances,
     strict_share,
-    tolerated,
 )
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
@@ -124,14 +124,14 @@ def test_table_3_has_the_half_band_that_its_range_says() -> None:
     task = lan()
     found, variables = found_of(task, table_3(task)), Variables(task, 2)
     assert audited(variables, found).sound
-    design = judged(load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"]), task, found)
+    design = judge_design(load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"]), task, found)
     assert design.half_band == pytest.approx(0.0309, abs=1e-4)
     assert metric(design.spec, "strict_range_fraction") == pytest.approx(0.479, abs=1e-3)
     assert metric(design.spec.replace({"analysis.fidelity": "reissner"}), "half_band") == pytest.approx(
         0.0344, abs=2e-4
     )
     assert metric(design.spec, "stress_max") == pytest.approx(48.31e6, rel=3e-3)
-    assert (tolerated(variables, found, NetworkScatter(1e-4, 0.02, 4)).bands > 0.02).all()
+    assert (scatter_within_tolerances(variables, found, NetworkScatter(1e-4, 0.02, 4)).bands > 0.02).all()
 
 
 def metric(spec: Any, name: str) -> float | None:
@@ -150,7 +150,7 @@ def seen_at(points: int) -> tuple[Task, Found]:
 
 def test_a_design_is_ranked_by_its_force_between_the_poses_too() -> None:
     task, found = seen_at(2)
-    kept = confirmed(replace(task, limits=TaskLimits()), found, StartBudget(), lambda _, design: design)
+    kept = verify(replace(task, limits=TaskLimits()), found, StartBudget(), lambda _, design: design)
     view = looked_at(task, Variables(task, 2).build(kept.x))
     assert view is not None
     assert kept.objective == view.half_band(found.start)
@@ -163,7 +163,7 @@ def test_a_design_that_is_to_follow_a_curve_is_ranked_by_how_well_it_does() -> N
     assert plain is not None
     own = ThroughPoints(tuple(plain.at.tolist()), tuple(plain.force.tolist()))  # what it does is what it is to do
     task = replace(task, limits=TaskLimits(), shape=TargetCurve(own, "force"))
-    kept = confirmed(task, replace(found, objective=0.0), StartBudget(), lambda _, design: design)
+    kept = verify(task, replace(found, objective=0.0), StartBudget(), lambda _, design: design)
     assert plain.half_band(found.start) > 0.004
     assert kept.objective < 1e-5
 
@@ -176,7 +176,7 @@ def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_t
         tried.append(finer.points)
         return replace(design, objective=1.0 if finer.points > 33 else design.objective)
 
-    kept = confirmed(replace(task, limits=TaskLimits()), found, StartBudget(), again)
+    kept = verify(replace(task, limits=TaskLimits()), found, StartBudget(), again)
     assert tried == [33, 65]
     assert kept.points == 65
 
@@ -184,7 +184,7 @@ def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_t
 def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=TaskLimits(), objective="range", half_band=0.05)
-    kept = confirmed(task, replace(found, start=3e-3, objective=0.05), StartBudget(), lambda _, design: design)
+    kept = verify(task, replace(found, start=3e-3, objective=0.05), StartBudget(), lambda _, design: design)
     assert 3e-3 < kept.start <= task.window[0]
     assert kept.objective <= 0.05
     wider = looked_at(task, Variables(task, 2).build(kept.x))
@@ -195,11 +195,11 @@ def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> 
 def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=TaskLimits(), objective="range", half_band=0.05)
-    kept = confirmed(task, replace(found, start=6.7e-3, objective=0.04), StartBudget(), lambda _, design: design)
+    kept = verify(task, replace(found, start=6.7e-3, objective=0.04), StartBudget(), lambda _, design: design)
     assert kept.start < 6.7e-3
     assert 0.0495 < kept.objective <= 0.05
     mean = 9.6  # of the force from 6.7 mm on; it is less over a wider window
-    kept = confirmed(
+    kept = verify(
         replace(task, limits=TaskLimits(force_min=mean)),
         replace(found, start=6.7e-3, objective=0.04),
         StartBudget(),
@@ -211,7 +211,7 @@ def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
 def test_stress_that_is_missed_at_few_poses_is_a_limit_that_is_missed() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=TaskLimits(stress=40e6))
-    kept = confirmed(task, found, StartBudget(), lambda _, design: design)
+    kept = verify(task, found, StartBudget(), lambda _, design: design)
     assert kept.violation == pytest.approx(48.2187e6 / task.allowable_stress - 1, abs=1e-3)  # Table 3 at 13.6 mm
     assert not kept.feasible
 
@@ -236,7 +236,7 @@ def test_a_design_says_of_itself_what_its_analysis_says(change: str) -> None:
         "configs/beam_design_arch.yaml",
         [change, "design.optimise.objective=range", "design.optimise.half_band=1.5 %", "design.optimise.orders=[1, 2]"],
     )
-    design = shaped(spec, spec.design.optimise, Run())
+    design = optimise_shape(spec, spec.design.optimise, Run())
     assert design.status is Status.COMPLETE
     written_again = loads(dumps(design.spec))
     result = analyze(written_again)
@@ -289,7 +289,7 @@ def test_random_starts_are_straight_inside_uncrossed_and_repeatable() -> None:
 def test_the_written_design_is_the_one_that_was_found() -> None:
     task = lan()
     spec = load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"])
-    new = written(spec, task, found_of(task, table_3(task), 7e-3))
+    new = write_design(spec, task, found_of(task, table_3(task), 7e-3))
     assert new.analysis.window == (pytest.approx(7e-3, abs=1e-6), 13.6e-3)
     from cfmkit.families.beam.network_from_spec import assemble
 
@@ -322,7 +322,7 @@ def test_the_objective_of_the_paper_falls_without_the_force_getting_flatter() ->
     # a search from their result itself may end in a local optimum: from shapes that are bent 1 % less, or more
     shapes = np.arange(len(table_3(task))) >= len(task.coordinates)
     begun = [found_of(task, table_3(task) * (1 + off * shapes)) for off in (-0.01, 0.01)]
-    ended = min((improved(task, one, StartBudget(flattening=15)) for one in begun), key=lambda one: one.objective)
+    ended = min((flatten(task, one, StartBudget(flattening=15)) for one in begun), key=lambda one: one.objective)
     view = program.view(ended.x)
     force = view.response.state.force[view.poses.window]
     assert ended.objective < 0.15
@@ -333,7 +333,7 @@ def test_a_force_out_of_reach_is_named_with_the_nearest_one() -> None:
     task = replace(lan(), limits=replace(lan().limits, force_min=200.0))
     start = found_of(task, table_3(task))
     assert next(iter(missed_by(task, start))) == "force"
-    found = blocked(task, [start], StartBudget(meeting=4))
+    found = find_blocking(task, [start], StartBudget(meeting=4))
     assert found.freed is None
     assert "force" in found.missed
     text = found.nearest.get("design.optimise.force.min", "at most 0 N")
@@ -356,9 +356,9 @@ class Recorder:
 def test_finished_starts_are_noted_and_used_again() -> None:
     task, notes = lan(), Recorder()
     plan = StartBudget(drawn=3, tries=1, meeting=1, flattening=1)
-    first = explored(task, plan, (2, 1), "x", Run(notes=notes))
-    again = explored(task, plan, (3, 1), "x", Run(notes=notes))
-    other = explored(task, plan, (2, 1), "y", Run(seed=1, notes=notes))
+    first = explore(task, plan, (2, 1), "x", Run(notes=notes))
+    again = explore(task, plan, (3, 1), "x", Run(notes=notes))
+    other = explore(task, plan, (2, 1), "y", Run(seed=1, notes=notes))
     assert (first.reused, again.reused, other.reused) == (0, 2, 0)
     for index in (0, 1):
         if first.found[index] is not None:
@@ -372,15 +372,17 @@ def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narr
         (2,),
         (4, 5),
     )
-    monkeypatch.setattr(search, "_flattened", lambda _task, found, order, _plan, _steps: replace(found, order=order))
+    monkeypatch.setattr(
+        search, "_minimise_objective", lambda _task, found, order, _plan, _steps: replace(found, order=order)
+    )
     gain = {4: 0.5e-3, 5: -0.5e-3}
     monkeypatch.setattr(
-        search, "widened", lambda _task, found, _plan: replace(found, start=found.start - gain[found.order])
+        search, "widen", lambda _task, found, _plan: replace(found, start=found.start - gain[found.order])
     )
     begun = Found(np.zeros(17), 3, 4e-3, 0.02, 0.0, "", 0)
-    ended = search.refined(task, begun, StartBudget())
+    ended = search.refine(task, begun, StartBudget())
     assert (ended.start, ended.order) == (3.5e-3, 4)
-    assert search.refined(task, replace(begun, objective=0.5), StartBudget()).start == 4e-3
+    assert search.refine(task, replace(begun, objective=0.5), StartBudget()).start == 4e-3
 
 
 def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -> None:
@@ -395,7 +397,7 @@ def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -
     for orders in ((1, 3), (1, 3, 4)):
         told.clear()
         task = replace(lan("range"), orders=orders)
-        explored(task, StartBudget(), (4, 2), "x", Run(progress=lambda share, _text: told.append(share)))
+        explore(task, StartBudget(), (4, 2), "x", Run(progress=lambda share, _text: told.append(share)))
         assert told == sorted(told)
         assert told[-1] == pytest.approx(1.0)
         assert len(set(told)) > 8
@@ -414,12 +416,12 @@ def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
         return replace(found, start=led[found.objective], objective=0.02)
 
     monkeypatch.setattr(multistart, "searched", lambda _task, _seed, _index, plan: near)
-    monkeypatch.setattr(multistart, "widened", lambda _task, found, _plan: found)
+    monkeypatch.setattr(multistart, "widen", lambda _task, found, _plan: found)
     monkeypatch.setattr(multistart, "audited", lambda _variables, _found: None)
     monkeypatch.setattr(multistart, "searched_far", searched_far)
     monkeypatch.setattr(multistart, "nearer", nearer)
     task = replace(lan("range"), orders=(1, 3))
-    ended = explored(task, StartBudget(), (5, 5), "x", Run())
+    ended = explore(task, StartBudget(), (5, 5), "x", Run())
     assert {index: one.start for index, one in ended.found.items()} == {0: 4e-3, 1: 3.8e-3, 2: 4e-3, 3: 3.9e-3, 4: 4e-3}
 
 
@@ -429,21 +431,21 @@ def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(mo
     good = Found(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
     wide = replace(good, start=3.4e-3, objective=task.half_band)
     monkeypatch.setattr(search, "_widest", lambda _task, _found, _plan: wide)
-    monkeypatch.setattr(search, "_repaired", lambda _task, _wide, kept, _plan: kept)
-    monkeypatch.setattr(search, "rounded", lambda _task, found: found)
+    monkeypatch.setattr(search, "_repair", lambda _task, _wide, kept, _plan: kept)
+    monkeypatch.setattr(search, "round_design", lambda _task, found: found)
     monkeypatch.setattr(search, "looked_at", lambda _task, _network: object())
     monkeypatch.setattr(search, "_shows_all", lambda _task, found, _view: found.start == good.start)
     monkeypatch.setattr(
         search, "_as_seen", lambda _task, found, _view: replace(found, start=3.6e-3) if found.start < 4e-3 else found
     )
-    ended = search.widened(task, good, StartBudget())
+    ended = search.widen(task, good, StartBudget())
     assert (ended.start, ended.feasible) == (3.6e-3, True)
 
 
 def test_no_time_means_no_start_and_nothing_noted() -> None:
     notes = Recorder()
     late = StartBudget(clock=Clock(0.0))
-    result = explored(lan(), late, (2, 1), "x", Run(notes=notes))
+    result = explore(lan(), late, (2, 1), "x", Run(notes=notes))
     assert (result.found, result.missing, notes.keys) == ({}, 2, {})
     assert searched(lan(), 0, 0, late) is None
 

@@ -12,7 +12,7 @@ from cam_support import MM, cam, fixed
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, TrackRows
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
@@ -52,7 +52,7 @@ def test_the_corner_is_where_the_cam_of_points_begins(law, stroke, radius):
     path, end = reach(law, stroke * law.brace_length)
     radius *= law.brace_length
     try:
-        profile = cut(path, radius, end)
+        profile = cut_cam(path, radius, end)
     except WholeCamUndercut:
         assume(False)
     assume(end - profile.start > 0.2 * (end - law.rest_half_width) and law.slope(end) < 50)
@@ -209,24 +209,24 @@ def test_slope_derivative_and_curvature_are_derivatives_of_the_slope(law, share)
 def test_a_roller_larger_than_every_radius_of_the_path_leaves_no_cam():
     path, end = reach(SlopeLaw(9.058 * MM, 68 * MM, 200 * MM), 1.0 * MM)
     with pytest.raises(WholeCamUndercut):
-        cut(path, 16 * MM, end)
+        cut_cam(path, 16 * MM, end)
 
 
 def test_a_track_that_starts_beyond_the_brace_does_not_exist():
     path, end = reach(SlopeLaw(15 * MM, 68 * MM, 200 * MM), 0.2)
     with pytest.raises(NoTrack, match="brace"):
-        Track(cut(path, 10 * MM, end), 60 * MM, 70 * MM)
+        Track(cut_cam(path, 10 * MM, end), 60 * MM, 70 * MM)
 
 
 def test_a_track_on_which_the_slider_never_rises_does_not_exist():
     path, end = reach(SlopeLaw(9.058 * MM, 68 * MM, 200 * MM), 0.1 * MM)
     with pytest.raises(NoTrack, match="dead"):
-        Track(cut(path, 5 * MM, end), 5 * MM, 100 * MM)
+        Track(cut_cam(path, 5 * MM, end), 5 * MM, 100 * MM)
 
 
 def test_the_track_ends_where_the_slider_would_turn_back():
     path, end = reach(SlopeLaw(9.058 * MM, 68 * MM, 200 * MM), 0.7)
-    track = Track(cut(path, 10 * MM, end), 10 * MM, 170 * MM)
+    track = Track(cut_cam(path, 10 * MM, end), 10 * MM, 170 * MM)
     assert track.turns_back
     last = track.states(np.array([track.end])).x[0]
     assert last < end - 1 * MM

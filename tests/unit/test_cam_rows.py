@@ -13,9 +13,9 @@ from cfmkit.results import Status
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.plan import Draw, sampled
+from cfmkit.studies.plan import Draw, sample_axes
 from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.row_blocks_for_journal import joined
+from cfmkit.studies.row_blocks_for_journal import join_rows
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
 from cfmkit.studies.varied_axes import axes, collect_variations
@@ -47,7 +47,7 @@ def config(stem):
 
 def work(spec=SPEC, ranges=RANGES, count=60, names=()):
     """Return a study of points drawn in ranges, by default with every metric that a sweep notes."""
-    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", count))
+    plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", count))
     return Work(Study(spec, plan.paths, metrics_of(spec, names, cfmkit.analyze(spec).curve)), plan)
 
 
@@ -257,7 +257,7 @@ def test_designing_is_done_point_by_point():
 def test_rows_do_not_depend_on_how_a_study_is_cut_into_blocks():
     many = work(count=41)
     whole = evaluate_rows(many.study, many.plan, 0, 41)
-    parts = joined([evaluate_rows(many.study, many.plan, k, min(k + 13, 41)) for k in range(0, 41, 13)])
+    parts = join_rows([evaluate_rows(many.study, many.plan, k, min(k + 13, 41)) for k in range(0, 41, 13)])
     np.testing.assert_allclose(whole.values, parts.values, rtol=1e-9, atol=1e-12)
     assert (whole.met.tolist(), whole.odd) == (parts.met.tolist(), parts.odd)
 
@@ -318,7 +318,7 @@ def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_
         {"analysis.travel": None, "analysis.window": ("240 mm", "100 %"), "requirements": []}
     )
     ranges = {"mechanism.springs.stiffness.0": "0.65 N/mm:0.73 N/mm"}
-    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 4))
+    plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 4))
     many = Work(Study(spec, plan.paths, metrics_of(spec, ("force_mean",))), plan)
     assert {run(many).row(k).status(0) for k in range(4)} == {
         (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))

@@ -14,7 +14,7 @@ from cfmkit.families.beam.shaping import multistart
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import strip_thickness_search
 from cfmkit.results import Status
-from cfmkit.runs.run import designed as compute
+from cfmkit.runs.run import run_design as compute
 from cfmkit.studies.serial_and_cluster_executors import Lost, serial
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from cfmkit.designing import objective_and_constraints
-from cfmkit.designing.bounds_and_rounding import at_bounds, rounded
+from cfmkit.designing.bounds_and_rounding import find_active_bounds, round_within_bounds
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
-from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
+from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, from_record, run_stage
 from cfmkit.families.run_control import Run
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Status
@@ -86,7 +86,10 @@ def test_missed_limits_are_told_the_worst_first_each_with_its_worst_row() -> Non
         LimitRows("c", np.array([-1e-6])),
         LimitRows("d", np.zeros(0)),
     ]
-    assert [(one.name, one.about) for one in objective_and_constraints.missed(rows, 1e-4)] == [("b", "b0"), ("a", "a2")]
+    assert [(one.name, one.about) for one in objective_and_constraints.list_missed_limits(rows, 1e-4)] == [
+        ("b", "b0"),
+        ("a", "a2"),
+    ]
     assert objective_and_constraints.worst(rows) == 0.5
     assert objective_and_constraints.worst([]) == 0.0
 
@@ -95,14 +98,16 @@ def test_rows_near_zero_hold_a_design_unless_nothing_moves_them() -> None:
     rows = [
         LimitRows("a", np.array([1e-4, 1e-4, 0.5]), np.array([[1.0], [0.0], [1.0]]), lambda: ["moved", "fixed", "far"])
     ]
-    assert list(objective_and_constraints.held(rows, 1e-3)) == ["a: moved"]
+    assert list(objective_and_constraints.list_active_rows(rows, 1e-3)) == ["a: moved"]
 
 
 def test_rounded_numbers_stay_within_their_bounds() -> None:
     bounds = np.array([[0.0, 0.00125]] * 2)
-    np.testing.assert_array_equal(rounded(np.array([0.00125, 0.00034]), bounds, 3), [0.001, 0.0])
-    np.testing.assert_allclose(rounded(np.array([0.51, 0.3]), np.array([[0.0, 1.0]] * 2), 0, 10.0), [0.5, 0.3])
-    np.testing.assert_array_equal(at_bounds(np.array([1e-3, 5e-4]), bounds, 0.0, 0.25), [1, 0])
+    np.testing.assert_array_equal(round_within_bounds(np.array([0.00125, 0.00034]), bounds, 3), [0.001, 0.0])
+    np.testing.assert_allclose(
+        round_within_bounds(np.array([0.51, 0.3]), np.array([[0.0, 1.0]] * 2), 0, 10.0), [0.5, 0.3]
+    )
+    np.testing.assert_array_equal(find_active_bounds(np.array([1e-3, 5e-4]), bounds, 0.0, 0.25), [1, 0])
 
 
 # --- starts ---------------------------------------------------------------------------------------------------
@@ -125,7 +130,7 @@ def test_what_a_start_found_is_the_same_read_from_its_record() -> None:
     found = Optimum(np.array([0.1, 1 / 3]), np.inf, np.zeros(0), SearchEnding.STUCK, 7, 1e-5)
     record = json.loads(json.dumps(OneStart(lambda _: found, NEVER)(3)))
     assert not record["late"]
-    again = restored(Optimum, record["found"])
+    again = from_record(Optimum, record["found"])
     assert again.z.tolist() == found.z.tolist()
     assert (again.objective, again.ending, again.evaluations) == (np.inf, "STUCK", 7)
     assert again.constraints.shape == (0,)
@@ -139,9 +144,9 @@ def squared(number: int) -> dict[str, Any]:
 def test_finished_starts_are_noted_and_not_done_again() -> None:
     notes, reported = Recorder(), []
     means = Run(notes=notes)
-    first = done(Stage(squared, (0, 1), "x"), means, NEVER, lambda records: reported.append(len(records)))
-    again = done(Stage(squared, (0, 1, 2), "x"), means, NEVER, lambda _: None)
-    other = done(Stage(squared, (0, 1), "y"), means, NEVER, lambda _: None)
+    first = run_stage(Stage(squared, (0, 1), "x"), means, NEVER, lambda records: reported.append(len(records)))
+    again = run_stage(Stage(squared, (0, 1, 2), "x"), means, NEVER, lambda _: None)
+    other = run_stage(Stage(squared, (0, 1), "y"), means, NEVER, lambda _: None)
     assert (first.reused, again.reused, other.reused) == (0, 2, 0)
     assert {job: record["found"] for job, record in again.records.items()} == {0: 0, 1: 1, 2: 4}
     assert reported == [0, 1, 2]
@@ -150,8 +155,8 @@ def test_finished_starts_are_noted_and_not_done_again() -> None:
 def test_late_no_start_is_begun_and_one_that_ran_out_of_time_is_not_noted() -> None:
     notes = Recorder()
     means = Run(notes=notes)
-    assert done(Stage(squared, (0, 1), "x"), means, Clock(0.0), lambda _: None).records == {}
-    late = done(Stage(lambda _: {"found": {}, "late": True}, (0,), "x"), means, NEVER, lambda _: None)
+    assert run_stage(Stage(squared, (0, 1), "x"), means, Clock(0.0), lambda _: None).records == {}
+    late = run_stage(Stage(lambda _: {"found": {}, "late": True}, (0,), "x"), means, NEVER, lambda _: None)
     assert list(late.records) == [0]
     assert notes.keys == {}
 
@@ -160,7 +165,7 @@ def test_processes_that_die_are_told_once_a_reason() -> None:
     def dying(_work: Any, jobs: Any, _stopping: Any) -> Any:
         yield from ((job, Lost(Status.CRASHED, "out of memory")) for job in jobs)
 
-    outcome = done(Stage(squared, (0, 1), "x"), Run(executor=dying), NEVER, lambda _: None)
+    outcome = run_stage(Stage(squared, (0, 1), "x"), Run(executor=dying), NEVER, lambda _: None)
     assert (dict(outcome.records), outcome.lost) == ({}, ("out of memory",))
 
 

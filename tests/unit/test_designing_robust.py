@@ -8,7 +8,15 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from cfmkit.designing.robust_design import NoPart, PartSlopes, RobustProblem, costliest, drawn, linear, with_margins
+from cfmkit.designing.robust_design import (
+    NoPart,
+    PartSlopes,
+    RobustProblem,
+    costliest,
+    linear,
+    optimise_on_samples,
+    with_margins,
+)
 
 PHI = NormalDist().cdf
 
@@ -60,7 +68,7 @@ def test_drawn_parts_see_what_first_order_does_not():
 
     one = problem(seen, normal(2000, 1), np.eye(2), [0.0, 5.0], [[0.0, 6.0]], share=0.9)
     first = with_margins(one, np.array([0.1]))
-    found = drawn(one, replace(first, x=np.array([0.1])), 24)
+    found = optimise_on_samples(one, replace(first, x=np.array([0.1])), 24)
     assert first.x[0] < found.x[0] <= 5.0
     good = (one.errors[:, 0] ** 2 <= found.x[0]).mean()
     assert good > (one.errors[:, 0] ** 2 <= first.x[0]).mean()

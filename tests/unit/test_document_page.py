@@ -22,12 +22,12 @@ from cfmkit.documents.document import (
     Written,
     command_line,
     field,
-    listed,
+    record_table,
     shortened_to_clause,
     whole_line,
 )
 from cfmkit.documents.terminal import page
-from cfmkit.documents.terminal import printed as printed_blocks
+from cfmkit.documents.terminal import print_blocks as printed_blocks
 from cfmkit.errors import ExitCode
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -70,8 +70,8 @@ def test_cells_are_folded_and_never_cut(printed):
 
 
 def test_records_are_listed_below_their_heading_and_not_at_all_where_there_are_none(printed):
-    assert printed(*listed("units", [{"name": "mm"}], (field("name", ""),))) == "\nunits\n  mm\n"
-    assert list(listed("units", [], (field("name"),))) == []
+    assert printed(*record_table("units", [{"name": "mm"}], (field("name", ""),))) == "\nunits\n  mm\n"
+    assert list(record_table("units", [], (field("name"),))) == []
 
 
 def test_text_and_data_are_printed_as_they_are(printed):

@@ -13,7 +13,7 @@ from shapely import LineString, Point, Polygon, union_all
 import cfmkit
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
-from cfmkit.export.union import OutlinePiece, merged
+from cfmkit.export.union import OutlinePiece, merge_pieces
 from cfmkit.numerics.arc_chain import ArcChain
 
 
@@ -213,7 +213,7 @@ def test_a_beam_that_fillets_fill_is_refused_with_the_place_and_a_remedy_that_he
 def test_a_cutter_leaves_arcs_between_all_that_it_touches(size):
     """A slot narrower than the cutter is filled; beside an edge too short for an arc it rests on the next corner."""
     comb = np.array([[0, 0], [20, 0], [20, 5], [12, 5], [12, 2], [11.6, 2], [11.6, 5], [6, 5], [6, 4.7], [0, 4.7]])
-    (one,) = merged([OutlinePiece.polygon(size * comb)], size, 0.5 * size)
+    (one,) = merge_pieces([OutlinePiece.polygon(size * comb)], size, 0.5 * size)
     radii = [edge.radius / size for edge in one.edges if type(edge).__name__ == "Arc"]
     assert radii == pytest.approx([0.5, 0.5], rel=1e-9)
     low = [edge for edge in one.edges if type(edge).__name__ == "Arc"][1]

@@ -16,7 +16,18 @@ import numpy as np
 from corotational import recheck
 from lan_2010 import half
 
-from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Polynomial, Section, guided, trace
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Network,
+    Node,
+    Polynomial,
+    Section,
+    slider_support,
+    trace,
+)
 from cfmkit.elastica.model.beam_fits import BeamFits
 
 
@@ -138,7 +149,10 @@ def test_lan_s_network_agrees_with_corotational_elements() -> None:
 
 def test_a_v_beam_on_its_stable_branch_agrees_with_corotational_elements() -> None:
     length, angle = 35e-3, np.radians(7)
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+    }
     # a slightly bent beam has no bifurcation: both programs follow the same branch
     network = Network(nodes, {"v": Beam("wall", "d", Section(E, WIDTH, THICK), Polynomial((0.0, 0.02, 0.0)))})
     travel = np.arange(1, 21) * 0.25e-3
@@ -153,7 +167,10 @@ def test_a_v_beam_on_its_stable_branch_agrees_with_corotational_elements() -> No
 def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elements() -> None:
     """Forces and stability there, and on the symmetric branch that is left."""
     length, angle = 35e-3, np.radians(7)
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+    }
     network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, THICK))})
     drive = Displacement("d", -np.pi / 2, np.array([0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3]))
     stable = trace(network, drive, Control(tolerance=1e-9))

@@ -17,7 +17,7 @@ from cfmkit.elastica import (
     Path,
     PathStatus,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.errors import InputError
@@ -37,7 +37,7 @@ def pressed(points: Any, tolerance: float, branch: Any = "stable", section: Sect
 
 def turned(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
     """Return the path of the same half, pressed and released."""
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
     leaf = Network(nodes, {"v": Beam("wall", "d", section)})
     return trace(leaf, Displacement("d", -np.pi / 2, points), Control(tolerance=tolerance, branch=branch))
 
@@ -144,7 +144,7 @@ def whole(points: Any, sections: Any = (LEAF, LEAF), **control: Any) -> Path:
     across = LENGTH * np.cos(ANGLE)
     nodes = {
         "left": Node(-across, 0, CLAMPED),
-        "d": Node(0, RISE, guided(np.pi / 2)),
+        "d": Node(0, RISE, slider_support(np.pi / 2)),
         "right": Node(across, 0, CLAMPED),
     }
     beams = {"one": Beam("left", "d", sections[0]), "two": Beam("right", "d", sections[1])}
@@ -194,7 +194,7 @@ def test_leaves_that_are_nearly_equal_buckle_one_after_the_other(factor: float, 
 
 
 def test_a_given_first_step_does_not_keep_a_bifurcation_from_being_found() -> None:
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
     leaf = Network(nodes, {"v": Beam("wall", "d", LEAF)})
     for step in (0.3, 0.1, 0.01):
         path = trace(leaf, Displacement("d", -np.pi / 2, REGULAR), Control(tolerance=1e-6, first_step=step))

@@ -20,11 +20,11 @@ from cfmkit.elastica import (
     PathStatus,
     PointLoad,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 
-LENGTH, SHUTTLE = 35e-3, guided(np.pi / 2)
+LENGTH, SHUTTLE = 35e-3, slider_support(np.pi / 2)
 
 
 def leaves(many: Any, count: int, thickness: float = 7e-4, angle: float = 8.0, support: Any = SHUTTLE) -> Any:
@@ -131,7 +131,7 @@ def test_steps_do_not_shrink_until_they_follow_a_rounded_corner() -> None:
 def test_leaves_on_a_shuttle_that_may_turn_fare_alike_with_any_points(sign: Any, tolerance: float) -> None:
     """One mode turns the shuttle, three do not: the branch that they lead to has a limit point, which ends the path."""
     paths = [
-        trace(*leaves(4, count, support=guided(np.pi / 2, True)), Control(tolerance=tolerance, sign=sign))
+        trace(*leaves(4, count, support=slider_support(np.pi / 2, True)), Control(tolerance=tolerance, sign=sign))
         for count in (5, 43)
     ]
     for path, middle in zip(paths, (2, 21), strict=True):

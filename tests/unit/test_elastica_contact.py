@@ -24,14 +24,14 @@ from cfmkit.elastica import (
     Section,
     Support,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop, circle, line, polyline
 from cfmkit.elastica.model.contact import arc as arc_line
-from cfmkit.elastica.results.between_points import between_points
+from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 DOWN = -np.pi / 2
@@ -102,7 +102,9 @@ def test_a_rotational_stop_has_the_moment_of_the_closed_form(stiffness, moment, 
 
 
 def test_a_stop_with_two_sides_is_met_there_and_back():
-    net = cantilever(Stop("up", "tip", 0.05, np.pi / 2), Stop("down", "tip", 0.08, DOWN), support=guided(np.pi / 2))
+    net = cantilever(
+        Stop("up", "tip", 0.05, np.pi / 2), Stop("down", "tip", 0.08, DOWN), support=slider_support(np.pi / 2)
+    )
     drive = Displacement("root", np.pi / 2, np.array([0.1, 0.3, 0.1, -0.1, -0.3, -0.1, 0.1, 0.3]))
     path = trace(net, drive, EXACT)
     known = [0.150386839128421, 0.802004737723027, 0.150386839128421, -0.060024697203493, -0.694820851406546]
@@ -115,7 +117,7 @@ def test_a_stop_with_two_sides_is_met_there_and_back():
 
 def test_a_tip_that_meets_the_floor_has_the_forces_of_shooting_both_ways():
     net = cantilever(
-        NodeOnObstacle("floor", "tip", line((0, 0), 0.0)), support=guided(np.pi / 2), y=0.4, angle=-np.pi / 9
+        NodeOnObstacle("floor", "tip", line((0, 0), 0.0)), support=slider_support(np.pi / 2), y=0.4, angle=-np.pi / 9
     )
     path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.15, 0.2, 0.25, 0.2, 0.15, 0.1, 0.05])), EXACT)
     known = [0.13898439286123, 0.296609798575910, 0.448837794092424, 0.598397552260931]
@@ -207,10 +209,10 @@ def test_a_random_layout_returns_to_its_own_points_and_keeps_every_condition(see
 def test_the_work_of_the_drive_is_the_energy_of_beams_and_of_an_elastic_stop():
     net = cantilever(
         Stop("bumper", "tip", 0.05, np.pi / 2, stiffness=20.0), NodeOnObstacle("disc", "mid", circle((0.5, 0.2), 0.15)),
-        nodes=3, support=guided(np.pi / 2),
+        nodes=3, support=slider_support(np.pi / 2),
     )  # fmt: skip
     path = trace(net, Displacement("root", np.pi / 2, np.linspace(0, 0.3, 13)), EXACT)
-    law = between_points(path)
+    law = interpolate_path(path)
     assert {event.number for event in path.contact_events} == {0, 1}
     marks, work = [0.0, *law.corners.tolist(), 0.3], 0.0
     shares = 0.5 * (1 - np.cos(np.pi * np.arange(17) / 16))
@@ -220,8 +222,8 @@ def test_the_work_of_the_drive_is_the_energy_of_beams_and_of_an_elastic_stop():
 
 
 def test_the_curve_between_points_has_a_corner_where_a_contact_begins():
-    net = cantilever(NodeOnObstacle("floor", "tip", line((0, -0.06), 0.0)), support=guided(np.pi / 2))
-    law = between_points(trace(net, Displacement("root", DOWN, np.linspace(0, 0.25, 11)), EXACT))
+    net = cantilever(NodeOnObstacle("floor", "tip", line((0, -0.06), 0.0)), support=slider_support(np.pi / 2))
+    law = interpolate_path(trace(net, Displacement("root", DOWN, np.linspace(0, 0.25, 11)), EXACT))
     assert law.corners == pytest.approx([0.06], rel=1e-11)
     for place in (0.02, 0.0599, 0.0601, 0.1):
         alone = trace(net, Displacement("root", DOWN, np.array([place])), EXACT)

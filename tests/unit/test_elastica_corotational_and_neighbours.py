@@ -22,7 +22,7 @@ from cfmkit.elastica import (
     Section,
     Taper,
     TorsionSpring,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
@@ -39,7 +39,7 @@ def frame(thickness: float = 1.2e-3, bend: float = 0.7, springs: tuple[TorsionSp
         "b": Node(0.05, 0.02),
         "bb": Node(0.055, 0.025),
         "c": Node(0.1, 0.0, CLAMPED),
-        "d": Node(0.06, 0.08, guided(np.pi / 2)),
+        "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
     }
     beams = {
         "ab": Beam("a", "b", section, Polynomial((0.0, bend)), end_offset=(0.003, 0.001)),
@@ -88,7 +88,7 @@ def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: Pa
 
 def test_elements_find_an_unstable_equilibrium_unstable() -> None:
     straight = Network(
-        {"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0.0, guided(0.0))},
+        {"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0.0, slider_support(0.0))},
         {"x": Beam("a", "d", Section(2e9, 8e-3, Taper(np.array([0, 1.0]), np.array([1e-3, 1.05e-3]))))},
     )
     pressed = Displacement("d", np.pi, np.array([1e-6, 2e-3]))

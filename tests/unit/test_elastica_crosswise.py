@@ -23,7 +23,7 @@ from cfmkit.elastica import (
     SlideSpring,
     Support,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.results.cross_stiffness import cross_stiffness
@@ -37,7 +37,7 @@ def straight(end: Support = FREE, axial: bool = True) -> Network:
     return Network({"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, end)}, {"x": beam})
 
 
-@pytest.mark.parametrize(("end", "factor"), [(FREE, 3.0), (guided(0.0), 12.0)], ids=["free", "guided"])
+@pytest.mark.parametrize(("end", "factor"), [(FREE, 3.0), (slider_support(0.0), 12.0)], ids=["free", "guided"])
 @pytest.mark.parametrize("axial", [True, False])
 def test_a_straight_beam_resists_across_as_the_closed_form_says(end: Support, factor: float, axial: bool) -> None:
     """3 or 12 EI/L^3, as the support leaves the rotation; what guides the node across is taken away."""
@@ -49,7 +49,7 @@ def test_thrust_takes_it_away_and_a_pull_adds_to_it() -> None:
     """EI q^3 / (2 tan(qL/2) - qL) of a beam between clamp and guide under a thrust P, with q^2 = P/EI."""
     euler = np.pi**2 * RIGIDITY / LENGTH**2
     thrust = np.array([0.5, 0.9]) * euler
-    path = trace(straight(guided(0.0), axial=False), Loading((PointLoad("tip", fx=-1.0),), thrust))
+    path = trace(straight(slider_support(0.0), axial=False), Loading((PointLoad("tip", fx=-1.0),), thrust))
     q = np.sqrt(thrust / RIGIDITY)
     wanted = RIGIDITY * q**3 / (2 * np.tan(q * LENGTH / 2) - q * LENGTH)
     assert cross_stiffness(path, "tip", 0.0)[path.at_requested] == pytest.approx(wanted, rel=1e-6)

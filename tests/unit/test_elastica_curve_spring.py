@@ -17,7 +17,7 @@ from cfmkit.elastica import (
     PointLoad,
     Section,
     SlideSpring,
-    guided,
+    slider_support,
 )
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.curve_spring import CurveSpring
@@ -32,7 +32,11 @@ CURVE = CurveSpring("tip", np.pi / 2, (-5e-3, 0.0, 5e-3, 1e-2, 2e-2), (-2.0, 0.0
 
 def leaf(*springs: object, arm: bool = False) -> Network:
     """Return a guided leaf; with an arm the spring acts at the arm's end."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, guided(np.pi / 2)), "tip": Node(0.11 if arm else 0.1, 0)}
+    nodes = {
+        "a": Node(0, 0, CLAMPED),
+        "b": Node(0.1, 0, slider_support(np.pi / 2)),
+        "tip": Node(0.11 if arm else 0.1, 0),
+    }
     return Network(nodes, {"x": Beam("a", "b", STRIP)}, (Link("b", "tip"),), springs)  # type: ignore[arg-type]
 
 

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, PathStatus, Section, guided, trace
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Network,
+    Node,
+    PathStatus,
+    Section,
+    slider_support,
+    trace,
+)
 
 MM = 1e-3
 
@@ -14,7 +25,7 @@ def pressed(points, sign=1):
     section = Section(1477e6, 6 * MM, 1 * MM, shear=True, poisson_ratio=0.3)
     nodes = {
         "wall": Node(0, 0, CLAMPED),
-        "shuttle": Node(35 * MM * np.cos(np.radians(7)), 35 * MM * np.sin(np.radians(7)), guided(np.pi / 2)),
+        "shuttle": Node(35 * MM * np.cos(np.radians(7)), 35 * MM * np.sin(np.radians(7)), slider_support(np.pi / 2)),
     }
     return trace(
         Network(nodes, {"v": Beam("wall", "shuttle", section)}),
@@ -51,7 +62,7 @@ def test_leaves_that_lie_almost_flat_or_hardly_buckle_keep_their_stable_branch(l
     rise = 4.265 * MM
     nodes = {
         "wall": Node(0, 0, CLAMPED),
-        "shuttle": Node(np.sqrt((length * MM) ** 2 - rise**2), rise, guided(np.pi / 2)),
+        "shuttle": Node(np.sqrt((length * MM) ** 2 - rise**2), rise, slider_support(np.pi / 2)),
     }
     leaf = Beam("wall", "shuttle", Section(1477e6, 6 * MM, rise / slenderness))
     path = trace(Network(nodes, {"v": leaf}), Displacement("shuttle", -np.pi / 2, np.linspace(0.02, 1.4, 70) * rise))

@@ -21,7 +21,7 @@ from cfmkit.elastica import (
     Polynomial,
     Section,
     gradient,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics import energy
@@ -89,7 +89,7 @@ def hooked(x: Any) -> Any:
     nodes = {
         "arm": Node(5e-3, 0.0),
         "a": Node(0.0, 0.0, CLAMPED),
-        "b": Node(30e-3, 20e-3 * x[3], guided(-np.pi / 2)),
+        "b": Node(30e-3, 20e-3 * x[3], slider_support(-np.pi / 2)),
         "c": Node(60e-3, 0.0, CLAMPED),
     }
     beams = {

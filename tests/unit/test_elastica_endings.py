@@ -22,7 +22,7 @@ from cfmkit.elastica import (
     Rotation,
     Section,
     arc,
-    guided,
+    slider_support,
     trace,
     trace_many,
 )
@@ -88,7 +88,7 @@ def test_a_turn_beyond_its_limit_point_ends_there() -> None:
 
 def test_a_path_that_goes_far_behind_its_start_has_left_its_range() -> None:
     """Half an arch in its symmetric mode pulls back, after its limit point, nearly as hard as it pushed before."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 2e-3, guided(UP))}
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 2e-3, slider_support(UP))}
     half = Network(nodes, {"x": Beam("a", "t", Section(1e9, 1e-2, 2e-4), CosineArch(2e-3, 0.5))})
     load = Loading((PointLoad("t", fy=-1.0),), np.array([3e-4, 1e-3]))
     path = trace(half, load, Control(branch="primary", through_folds=True))
@@ -129,7 +129,7 @@ def test_an_inextensible_arc_is_pulled_until_it_is_taut() -> None:
 def test_a_path_does_not_end_where_its_mesh_is_too_coarse_for_a_beam_drawn_taut(tolerance: float) -> None:
     """A leaf pulled off its wall, and a clamped beam pushed sideways: forces only grow, there is no limit point."""
     leaf = Network(
-        {"w": Node(0, 0, CLAMPED), "d": Node(0.0347, 4.87e-3, guided(UP))},
+        {"w": Node(0, 0, CLAMPED), "d": Node(0.0347, 4.87e-3, slider_support(UP))},
         {"x": Beam("w", "d", Section(1477e6, 6e-3, 7e-4))},
     )
     section = Section(2e11, 8e-3, 3.46e-3)
@@ -161,7 +161,7 @@ def test_a_batch_keeps_what_each_path_reached_and_why_it_ended(workers: int) -> 
 
 def test_constant_loads_beyond_a_limit_point_say_at_which_share() -> None:
     """The limit load itself is that of the same load as a drive."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 4e-3, guided(UP))}
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 4e-3, slider_support(UP))}
     half = Network(nodes, {"x": Beam("a", "t", Section(1e9, 1e-2, 1.6e-3), CosineArch(4e-3, 0.5))})
     found = trace(half, Loading((PointLoad("t", fy=-1.0),), np.array([10.0])), Control(branch="primary"))
     assert found.status is PathStatus.LIMIT_POINT

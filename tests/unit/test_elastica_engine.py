@@ -34,7 +34,7 @@ from cfmkit.elastica import (
     Taper,
     TorsionSpring,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.model.beam_fits import BeamFits
@@ -66,7 +66,7 @@ def frame(section: Section | None = None, turn: float = 0.0, size: float = 1.0, 
         "b": at(0.05, 0.03),
         "bb": at(0.055, 0.03),
         "c": at(0.09, 0.0, PINNED),
-        "d": at(0.06, 0.07, guided(UP)),
+        "d": at(0.06, 0.07, slider_support(UP)),
     }
     beams = {
         "ab": Beam("a", "b", section, Polynomial((0.0, sign * 0.8, -sign * 0.5))),
@@ -209,7 +209,7 @@ def test_shapes_by_points_approach_the_exact_arc() -> None:
     section = Section(2e9, 8e-3, 1e-3)
 
     def force(shape: object) -> float:
-        nodes = {"a": Node(*circle[0], CLAMPED), "d": Node(*circle[-1], guided(0.0))}
+        nodes = {"a": Node(*circle[0], CLAMPED), "d": Node(*circle[-1], slider_support(0.0))}
         network = Network(nodes, {"x": Beam("a", "d", section, shape)})  # type: ignore[arg-type]
         return float(trace(network, Displacement("d", np.pi, [5e-3]), TIGHT).effort[-1])
 

@@ -26,7 +26,7 @@ from cfmkit.elastica import (
     Section,
     Support,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
@@ -104,7 +104,7 @@ def test_a_column_swings_ever_slower_up_to_eulers_load_and_not_beyond() -> None:
 
 
 def test_what_nothing_holds_has_a_frequency_of_zero_while_the_drive_is_free() -> None:
-    slides = {"root": Node(0, 0, guided(np.pi / 2)), "tip": Node(LENGTH, 0, guided(np.pi / 2))}
+    slides = {"root": Node(0, 0, slider_support(np.pi / 2)), "tip": Node(LENGTH, 0, slider_support(np.pi / 2))}
     section = Section(MODULUS, WIDTH, THICKNESS, axial=True)
     net = Network(slides, {"x": Beam("root", "tip", section)})
     found = frequencies(functional_path(net, Displacement("root", np.pi / 2, np.array([1e-3])), 8), WHOLE, 3)

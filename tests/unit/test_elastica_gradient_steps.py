@@ -21,7 +21,7 @@ from cfmkit.elastica import (
     Spline,
     Taper,
     gradient,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.model.beam_fits import BeamFits
@@ -76,7 +76,7 @@ def one_beam(shape: Callable[[Any], Any], thickness: Any, closure: Any = "rotsca
             given = Taper(stations, given.values * x[2])
         else:
             given = given * x[2]
-        nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1 * x[1], 0.02, guided(np.pi / 2))}
+        nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1 * x[1], 0.02, slider_support(np.pi / 2))}
         return Network(nodes, {"ad": Beam("a", "d", Section(2e9, 8e-3, given, shear=True), shape(x[0]), closure)})
 
     return build

@@ -33,7 +33,7 @@ from cfmkit.elastica import (
     SlideSpring,
     Taper,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics import energy
@@ -43,9 +43,9 @@ from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPl
 from cfmkit.elastica.mechanics.march import (
     SWITCH,
     CompiledEquations,
-    compiled,
     engine,
     equations,
+    load_compiled,
     march_many,
     solve_designs,
 )
@@ -54,7 +54,7 @@ from cfmkit.families.beam.network_from_spec import assemble
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted(path.name for path in (ROOT / "configs").glob("beam_*.yaml") if "design" not in path.name)
-needs_c = pytest.mark.skipif(compiled() is None, reason="the compiled module was not built")
+needs_c = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
 
 
 def random_state(network: Discretisation, seed: int) -> Any:
@@ -151,7 +151,7 @@ def test_a_coil_of_twenty_turns_is_factored_with_its_inertia() -> None:
 def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> None:
     """At the load at which the element alone is singular its unknowns cannot be eliminated first."""
     stiff = Section(2e9, 1e-2, 1e-3, axial=False)
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0, guided(0.0))}, {"x": Beam("a", "b", stiff)})
+    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)})
     rigidity = 2e9 * 1e-2 * 1e-9 / 12
     network = discretise(net, Loading((PointLoad("b", fx=-1.0),), np.array([1.0])), 8, pieces=4)
     alone = 4 * np.pi**2 * rigidity / 0.025**2
@@ -240,7 +240,8 @@ def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
     net = Network(
-        {"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, guided(0.0))}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+        {"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, slider_support(0.0))},
+        {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))},
     )
     critical = 4 * np.pi**2 * 1e-6 / 12 / 0.1  # shortening of a column, both ends clamped, axial strain (t/L)^2 pi^2/3
     own = kind(discretise(net, Displacement("b", np.pi, np.array([1.2 * critical])), 8))
@@ -254,7 +255,7 @@ TARGETS = np.linspace(0, 5e-3, 11)[1:]
 
 def leaf(thickness: float, taper: bool = False) -> tuple[Network, Displacement]:
     thick = Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.08, 0.03, guided(0.0, rotates=False))}
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.08, 0.03, slider_support(0.0, rotates=False))}
     net = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, thick), Polynomial((0.0, 1.0, -0.8)))})
     return net, Displacement("b", np.pi, TARGETS)
 

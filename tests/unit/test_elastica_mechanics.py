@@ -19,7 +19,7 @@ from cfmkit.elastica import (
     Node,
     PointLoad,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics import energy
@@ -59,7 +59,7 @@ def effort(network: Discretisation, free: Any, drive: float) -> float:
 
 
 def column(clamped: bool = True) -> tuple[Network, Displacement]:
-    support = guided(0.0, rotates=not clamped)
+    support = slider_support(0.0, rotates=not clamped)
     net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, support)}, {"x": Beam("a", "b", STRIP)})
     return net, Displacement("b", np.pi, np.linspace(1e-4, 1.3e-3, 5) * LENGTH)
 
@@ -119,7 +119,7 @@ def test_negative_pivots_count_unstable_directions_beyond_buckling() -> None:
 
 def test_a_column_that_does_not_stretch_is_stable_below_its_critical_load() -> None:
     stiff = Section(2e9, 1e-2, 1e-3, axial=False)
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, guided(0.0))}, {"x": Beam("a", "b", stiff)})
+    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)})
     critical = 4 * np.pi**2 * 2e9 * 1e-2 * 1e-9 / 12 / LENGTH**2  # both ends clamped
     network = discretise(net, Loading((PointLoad("b", fx=-critical),), np.array([1.0])), 10)
     counts = []

@@ -19,7 +19,7 @@ from cfmkit.elastica import (
     Section,
     TorsionSpring,
     gradient,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.errors import InputError
@@ -31,7 +31,7 @@ NODES = {
     "a": Node(0.0, 0.0, CLAMPED),
     "b": Node(0.05, 0.03),
     "p": Node(0.05, 0.03),
-    "c": Node(0.1, 0.05, guided(np.pi / 2)),
+    "c": Node(0.1, 0.05, slider_support(np.pi / 2)),
 }
 
 

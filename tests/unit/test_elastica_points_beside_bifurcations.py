@@ -22,10 +22,10 @@ from cfmkit.elastica import (
     PathStatus,
     PointLoad,
     Section,
-    guided,
+    slider_support,
     trace,
 )
-from cfmkit.elastica.results.between_points import between_points
+from cfmkit.elastica.results.between_points import interpolate_path
 
 LENGTH = 35e-3
 
@@ -33,7 +33,7 @@ LENGTH = 35e-3
 def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path:
     nodes = {
         "wall": Node(0, 0, CLAMPED),
-        "d": Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), guided(np.pi / 2)),
+        "d": Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), slider_support(np.pi / 2)),
     }
     leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
     return trace(leaf, Displacement("d", -np.pi / 2, np.asarray(points)), Control(**control))
@@ -101,14 +101,14 @@ def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
     """There is no point beyond it: the index of one was an internal error, or wrapped around to the other end."""
     angle = np.radians(7)
     path = pressed(angle, 1e-3, np.linspace(0, 1.9 * LENGTH * np.sin(angle), 21)[1:])
-    whole = between_points(path)
+    whole = interpolate_path(path)
     assert whole is not None
     place = float(whole.corners[0])
     there, left = whole.at(np.array([place])), int(np.searchsorted(path.drive, place))
     kept = slice(0, left) if last else slice(left, None)
     part = path.take(kept)
     corner = replace(there, branch=path.branch[left : left + 1] if last else path.branch[left - 1 : left])
-    law = between_points(part.joined(corner) if last else corner.joined(part))
+    law = interpolate_path(part.joined(corner) if last else corner.joined(part))
     assert law is not None
     assert law.corners[-1 if last else 0] == pytest.approx(place)
     near = place + (-1e-4 if last else 1e-4) * np.arange(6.0)

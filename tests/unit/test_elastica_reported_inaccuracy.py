@@ -18,7 +18,7 @@ from cfmkit.elastica import (
     PathStatus,
     Rotation,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -28,7 +28,10 @@ BENDING = Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
 
 def v_beam() -> Network:
     length, angle = 35e-3, np.radians(7)
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+    }
     return Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 1e-3))})
 
 

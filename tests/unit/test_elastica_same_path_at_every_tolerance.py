@@ -23,7 +23,7 @@ from cfmkit.elastica import (
     Polynomial,
     Section,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -42,7 +42,7 @@ def arch(rng: Any) -> tuple[Network, Any]:
     ends = [CLAMPED if rng.integers(2) else PINNED for _ in range(2)]
     nodes = {
         "a": Node(0, 0, ends[0]),
-        "t": Node(HALF, rise, FREE if rng.integers(2) else guided(np.pi / 2)),
+        "t": Node(HALF, rise, FREE if rng.integers(2) else slider_support(np.pi / 2)),
         "b": Node(2 * HALF, 0, ends[1]),
     }
     one, two = forms[int(rng.integers(3))]
@@ -86,7 +86,7 @@ def leaf(rng: Any) -> tuple[Network, Displacement]:
     """Return half a V-beam, slender enough to buckle, and a drive that presses it through."""
     angle = np.radians(rng.uniform(2, 20))
     rise = 35e-3 * np.sin(angle)
-    nodes = {"w": Node(0, 0, CLAMPED), "d": Node(35e-3 * np.cos(angle), rise, guided(np.pi / 2))}
+    nodes = {"w": Node(0, 0, CLAMPED), "d": Node(35e-3 * np.cos(angle), rise, slider_support(np.pi / 2))}
     beams = {"v": Beam("w", "d", Section(1477e6, 6e-3, rise / rng.uniform(3, 15)))}
     points = np.linspace(0, rng.uniform(0.5, 2.3), int(rng.integers(4, 40)))[1:] * rise
     return Network(nodes, beams), Displacement("d", -np.pi / 2, points)

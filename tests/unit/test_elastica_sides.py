@@ -23,7 +23,7 @@ from cfmkit.elastica import (
     Section,
     Support,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
@@ -95,7 +95,7 @@ def test_a_pin_under_a_leaf_has_the_force_and_the_place_of_shooting_both_ways(pi
 def test_a_tip_on_a_floor_becomes_tangent_and_lies_flank_on_and_goes_back():
     floor = line((0, -HALF), 0.0)
     net = leaf(NodeOnObstacle("floor", "tip", floor, HALF), side("floor", floor),
-               support=guided(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9)  # fmt: skip
+               support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9)  # fmt: skip
     path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.2, 0.25, 0.3, 0.25, 0.1, 0.05])), EXACT)
     known = [0.13898439286123, 0.448837794092424, 0.598397552260931, 0.936966252247794, 0.598397552260931]
     assert path.effort[path.at_requested] == pytest.approx([*known, known[0], 0.0], rel=1e-10, abs=1e-12)
@@ -111,7 +111,7 @@ def test_a_tip_on_a_floor_that_stretches_has_the_forces_of_shooting():
     floor = line((0, -0.025), 0.0)
     section = Section(12 / 0.05**3, 1.0, 0.05, axial=True, shear=False)
     net = leaf(NodeOnObstacle("floor", "tip", floor, 0.025), side("floor", floor),
-               support=guided(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9, section=section)  # fmt: skip
+               support=slider_support(np.pi / 2), at=(0.0, 0.4), angle=-np.pi / 9, section=section)  # fmt: skip
     path = trace(net, Displacement("root", DOWN, np.array([0.1, 0.3])), EXACT)
     assert path.effort[path.at_requested] == pytest.approx([0.13897712353818, 0.936909515319372], rel=1e-9)
     assert path.contact_places(1)[-1, 0] == pytest.approx(0.864983588188324, rel=1e-9)
@@ -279,7 +279,7 @@ def test_the_tangent_of_a_side_that_lies_and_one_that_touches_is_the_derivative_
 def test_a_leaf_parallel_to_a_floor_ends_with_the_reason(with_pad):
     floor = line((0, -HALF), 0.0)
     pads = (NodeOnObstacle("floor", "tip", floor, HALF),) if with_pad else ()
-    net = leaf(*pads, side("floor", floor), support=guided(np.pi / 2), at=(0.0, 0.1))
+    net = leaf(*pads, side("floor", floor), support=slider_support(np.pi / 2), at=(0.0, 0.1))
     path = trace(net, Displacement("root", DOWN, np.array([0.05, 0.2])), EXACT)
     assert path.status is PathStatus.LOST
     assert path.message == "beam 'leaf' on 'floor' is met along the whole length at 0.1: no place touches first"

@@ -29,7 +29,7 @@ from cfmkit.elastica import (
     PointLoad,
     Section,
     Support,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -39,7 +39,7 @@ RNG = np.random.default_rng(0)
 def strip(slenderness: float, ends: str, axial: bool = True) -> tuple[Network, float]:
     """A straight strip of 100 mm, and its bending rigidity; pinned, or clamped and guided."""
     thickness = 0.1 * math.sqrt(12) / slenderness
-    start, end = (PINNED, Support(False, True, False)) if ends == "pinned" else (CLAMPED, guided(0.0))
+    start, end = (PINNED, Support(False, True, False)) if ends == "pinned" else (CLAMPED, slider_support(0.0))
     section = Section(2e9, 10e-3, thickness, axial=axial)
     nodes = {"a": Node(0, 0, start), "b": Node(0.1, 0, end)}
     return Network(nodes, {"strip": Beam("a", "b", section)}), 2e9 * 10e-3 * thickness**3 / 12
@@ -143,7 +143,7 @@ def test_a_straight_column_that_does_not_stretch_is_rigid_until_it_buckles_which
     """The sine of its angle is not exact: that is no imperfection."""
     network, _ = strip(100, ends, axial=False)
     x, y = 0.1 * math.cos(0.3), 0.1 * math.sin(0.3)
-    free = guided(0.3, rotates=ends == "pinned")
+    free = slider_support(0.3, rotates=ends == "pinned")
     askew = Network({"a": network.nodes["a"], "b": Node(x, y, free)}, network.beams)
     forces = []
     for column, angle in ((network, math.pi), (askew, math.pi + 0.3)):

@@ -25,7 +25,7 @@ from cfmkit.elastica import (
     Taper,
     TorsionSpring,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.model.beam import GAUSS
@@ -43,7 +43,7 @@ def whole() -> Network:
         "b": Node(0.05, 0.03),
         "bb": Node(0.055, 0.03),
         "c": Node(0.09, 0.0, PINNED),
-        "d": Node(0.06, 0.07, guided(np.pi / 2)),
+        "d": Node(0.06, 0.07, slider_support(np.pi / 2)),
     }
     beams = {
         "ab": Beam("a", "b", section, Polynomial((0.0, 0.8, -0.5))),

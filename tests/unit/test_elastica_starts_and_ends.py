@@ -23,7 +23,7 @@ from cfmkit.elastica import (
     Section,
     Support,
     TorsionSpring,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -34,7 +34,7 @@ SECTION = Section(2e9, 8e-3, 1e-3)
 def half_arch(ratio: float) -> tuple[Network, float]:
     """Return half a clamped cosine arch whose rise is `ratio` times its thickness, and the rise [m]."""
     rise = 2e-3
-    nodes = {"wall": Node(0, 0, CLAMPED), "middle": Node(0.1, rise, guided(UP))}
+    nodes = {"wall": Node(0, 0, CLAMPED), "middle": Node(0.1, rise, slider_support(UP))}
     return Network(
         nodes, {"half": Beam("wall", "middle", Section(1e9, 1e-2, rise / ratio), CosineArch(rise, 0.5))}
     ), rise

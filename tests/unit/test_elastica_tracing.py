@@ -23,7 +23,7 @@ from cfmkit.elastica import (
     PointLoad,
     Rotation,
     Section,
-    guided,
+    slider_support,
 )
 from cfmkit.elastica.tracing.trace import DegreeAndPieces, raise_attempt, trace, trace_on
 from cfmkit.elastica.vibration import frequencies
@@ -70,7 +70,7 @@ EULER = 4 * np.pi**2 * 2e9 * 1e-2 * 1e-9 / 12 / 0.1**2  # clamped at both ends
 
 def test_a_straight_column_that_does_not_stretch_is_pressed_beyond_its_critical_load() -> None:
     """Its force is that of a column under a load, which may stretch a little or not at all."""
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, guided(0.0))}, {"x": Beam("a", "b", STIFF)})
+    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, slider_support(0.0))}, {"x": Beam("a", "b", STIFF)})
     path = trace(net, Displacement("b", np.pi, np.array([1e-3, 1e-2, 3e-2])))
     assert path.status is PathStatus.COMPLETE
     assert path.stable.all()
@@ -99,7 +99,7 @@ def test_a_network_that_nothing_bears_has_no_start() -> None:
 
 def test_a_step_along_the_arc_does_not_lead_to_the_mirror_image() -> None:
     """Bent by 3.5e-5 of its length a column that does not stretch buckles to that side, whatever the steps."""
-    net = Network({"a": Node(0, 0, PINNED), "b": Node(0.1, 0, guided(0.0, True))}, {"x": Beam("a", "b", STIFF)})
+    net = Network({"a": Node(0, 0, PINNED), "b": Node(0.1, 0, slider_support(0.0, True))}, {"x": Beam("a", "b", STIFF)})
     drive = Displacement("b", np.pi, np.array([1e-3, 0.015, 0.03]))
     sides = [trace(net, drive, Control(imperfection=size)).motion("a")[-1, 2] for size in (3.5e-6, 3.5e-5, -3.5e-6)]
     assert sides[0] == pytest.approx(sides[1], rel=1e-2)
@@ -130,7 +130,7 @@ def test_leaves_on_a_shuttle_that_may_turn_end_at_a_limit_point() -> None:
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-7])
 def test_an_arch_of_two_straight_beams_that_do_not_stretch_buckles_to_the_same_side(tolerance: float) -> None:
     """It is rigid at rest, so that it reaches many critical loads at once; both beams buckle in their first modes."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.05, 0.0173, guided(np.pi / 2)), "b": Node(0.1, 0, PINNED)}
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.05, 0.0173, slider_support(np.pi / 2)), "b": Node(0.1, 0, PINNED)}
     net = Network(nodes, {"x": Beam("a", "t", STIFF), "y": Beam("t", "b", STIFF)})
     path = trace(net, Displacement("t", -np.pi / 2, np.linspace(1e-3, 8e-3, 4)), Control(tolerance))
     assert path.status is PathStatus.COMPLETE, path.message

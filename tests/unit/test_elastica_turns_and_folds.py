@@ -19,7 +19,7 @@ from cfmkit.elastica import (
     PathStatus,
     PointLoad,
     Section,
-    guided,
+    slider_support,
     trace,
 )
 
@@ -32,7 +32,7 @@ TOLERANCES = (1e-3, 1e-5, 1e-7)
 def leaves(count: int) -> Network:
     """Return equal inclined leaves on a guided shuttle: pressed down they buckle, and straighten out beyond."""
     across = 35e-3 * np.cos(np.radians(8.0))
-    nodes, beams = {"d": Node(0, RISE, guided(np.pi / 2))}, {}
+    nodes, beams = {"d": Node(0, RISE, slider_support(np.pi / 2))}, {}
     for k in range(count):
         nodes[f"w{k}"] = Node(across * (-1) ** k, 0, CLAMPED)
         beams[f"b{k}"] = Beam(f"w{k}", "d", Section(1477e6, 6e-3, 7e-4))

@@ -30,7 +30,7 @@ from cfmkit.elastica import (
     SlideSpring,
     Support,
     arc,
-    guided,
+    slider_support,
     trace,
 )
 from cfmkit.elastica.vibration import NetworkMasses, frequencies
@@ -172,7 +172,7 @@ def test_no_frequency_is_told_of_a_column_beyond_eulers_load() -> None:
 
 def test_what_nothing_holds_has_a_frequency_of_zero_while_the_drive_is_free() -> None:
     """A beam between two slides, moved as one: held it is clamped at both ends; free it is rigid at first."""
-    slides = {"root": Node(0, 0, guided(np.pi / 2)), "tip": Node(LENGTH, 0, guided(np.pi / 2))}
+    slides = {"root": Node(0, 0, slider_support(np.pi / 2)), "tip": Node(LENGTH, 0, slider_support(np.pi / 2))}
     section = Section(MODULUS, WIDTH, THICKNESS, axial=True)
     path = trace(
         Network(slides, {"x": Beam("root", "tip", section)}), Displacement("root", np.pi / 2, np.array([1e-3]))
@@ -257,7 +257,7 @@ def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(sh
 def test_a_strip_pulled_taut_swings_as_a_stiff_string(slenderness: float) -> None:
     """n/2l sqrt(T/m) (1 + 2 e + (4 + n^2 pi^2/2) e^2) with e = sqrt(EI/T)/l, of its stretched length [Morse 1948]."""
     thick, strain = LENGTH / slenderness, 1e-3
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, guided(0.0))}
+    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, slider_support(0.0))}
     net = Network(nodes, {"x": Beam("root", "tip", Section(MODULUS, WIDTH, thick))})
     path = trace(net, Displacement("tip", 0.0, np.array([strain * LENGTH])))
     found = frequencies(path, WHOLE, 3, [len(path) - 1]).held[0]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import split, turning_points
-from cfmkit.experiment.curves_and_metrics_of_recording import measured, numbers_of, require_loop
+from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording, numbers_of, require_loop
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
 from cfmkit.experiment.low_pass import LowPass, low_passed, read_filter
 from cfmkit.experiment.reading import Recording
@@ -70,13 +70,13 @@ def test_successive_reversals_are_farther_apart_than_the_threshold(values, thres
 )
 def test_an_unknown_word_is_not_taken_for_the_default(arguments, words):
     with pytest.raises(UsageError, match=words):
-        measured(recording(triangle(1)), *arguments)
+        measure_recording(recording(triangle(1)), *arguments)
 
 
 def test_points_at_which_the_machine_stood_are_left_out_and_counted():
     up = np.linspace(0, 100, 401)
     motion = np.concatenate([np.zeros(100), up, np.full(150, 100.0), up[::-1], np.zeros(80)])
-    source = measured(recording(motion), None)
+    source = measure_recording(recording(motion), None)
     assert [item.name for item in source.warnings] == ["pauses"]
     assert 300 <= source.strokes.pauses <= 330
     assert all(399 <= len(part.points) <= 406 for part in source.strokes.strokes)
@@ -87,14 +87,16 @@ def test_a_pause_does_not_shift_the_mean():
     moving = np.concatenate([up, up[::-1]])
     standing = np.concatenate([np.zeros(500), moving])
     means = [
-        numbers_of(measured(recording(motion, 50 + motion / 10), None), window=Window(0.0, 0.1)).raw["force_mean[load]"]
+        numbers_of(measure_recording(recording(motion, 50 + motion / 10), None), window=Window(0.0, 0.1)).raw[
+            "force_mean[load]"
+        ]
         for motion in (moving, standing)
     ]
     assert means[1].value == pytest.approx(means[0].value, abs=0.03)
 
 
 def test_one_way_only_is_measured_with_a_warning_and_without_hysteresis():
-    source = measured(recording(np.linspace(0, 100, 200)), None)
+    source = measure_recording(recording(np.linspace(0, 100, 200)), None)
     assert [item.name for item in source.warnings] == ["one_branch"]
     numbers = numbers_of(source)
     assert numbers.raw["force_mean"].value is not None
@@ -103,7 +105,7 @@ def test_one_way_only_is_measured_with_a_warning_and_without_hysteresis():
 
 def test_what_completes_no_cycle_is_left_out_with_a_warning():
     motion = np.concatenate([triangle(2), np.linspace(0, 100, 201)[1:]])
-    source = measured(recording(motion), None)
+    source = measure_recording(recording(motion), None)
     assert len(source.raw) == 2
     assert "unfinished_cycle" in [item.name for item in source.warnings]
 
@@ -111,7 +113,7 @@ def test_what_completes_no_cycle_is_left_out_with_a_warning():
 def test_the_value_of_a_metric_is_its_mean_over_the_cycles_and_repeatability_is_their_spread():
     motion = triangle(3, 200)
     level = np.repeat([50.0, 51.0, 52.0], [401, 400, 400])
-    numbers = numbers_of(measured(recording(motion, level + motion / 1e3), None), window=Window(0.01, 0.09))
+    numbers = numbers_of(measure_recording(recording(motion, level + motion / 1e3), None), window=Window(0.01, 0.09))
     assert numbers.raw["force_mean[load]"].value == pytest.approx(51.05, abs=1e-6)
     assert numbers.raw["force_repeatability[load]"].value == pytest.approx(1.0, abs=1e-9)
     assert len(numbers.each) == 3
@@ -120,12 +122,12 @@ def test_the_value_of_a_metric_is_its_mean_over_the_cycles_and_repeatability_is_
 def test_jitter_leaves_every_metric_defined():
     """Within a branch samples stand in the order of the motion: a flickering encoder makes no folds."""
     motion = triangle(1, 2000) + np.random.default_rng(0).normal(0, 0.2, 4001)
-    numbers = numbers_of(measured(recording(motion, 50 + 0.01 * motion), None), window=Window(0.01, 0.09))
+    numbers = numbers_of(measure_recording(recording(motion, 50 + 0.01 * motion), None), window=Window(0.01, 0.09))
     assert numbers.raw["band_range_1pct[load]"].value is not None
 
 
 def test_a_window_that_was_not_measured_is_refused_with_what_was():
-    source = measured(recording(triangle(1)), None)
+    source = measure_recording(recording(triangle(1)), None)
     with pytest.raises(DataError, match=r"the window 10 ... 300 mm is not measured on every branch: 0 ... 99.5 mm is"):
         numbers_of(source, window=Window(0.01, 0.3))
 
@@ -175,12 +177,12 @@ def test_malformed_filters_are_usage_errors(text):
 def test_a_named_filter_that_cannot_be_used_is_refused_and_the_default_one_left_out():
     few = recording(triangle(1, 12))
     with pytest.raises(DataError, match="needs more than"):
-        measured(few, LowPass(20.0, "length", 6))
+        measure_recording(few, LowPass(20.0, "length", 6))
     with pytest.raises(DataError, match="not below half the sampling rate"):
-        measured(few, LowPass(1e5, "length", 1))
+        measure_recording(few, LowPass(1e5, "length", 1))
     with pytest.raises(DataError, match="needs a column with the time"):
-        measured(few, LowPass(1.0, "time", 1))
-    assert [item.name for item in measured(few).warnings] == ["not_filtered"]
+        measure_recording(few, LowPass(1.0, "time", 1))
+    assert [item.name for item in measure_recording(few).warnings] == ["not_filtered"]
 
 
 def looped(motion, gap=1.0):
@@ -191,7 +193,7 @@ def looped(motion, gap=1.0):
 
 def test_a_last_cycle_that_was_broken_off_is_left_out_and_does_not_narrow_the_window():
     motion = triangle(3)
-    source = measured(looped(motion[: len(motion) - 100]), None)
+    source = measure_recording(looped(motion[: len(motion) - 100]), None)
     assert len(source.raw) == 2
     assert [(item.name, item.message) for item in source.warnings] == [
         ("unfinished_cycle", "2 of 6 strokes complete no cycle: left out")
@@ -201,7 +203,7 @@ def test_a_last_cycle_that_was_broken_off_is_left_out_and_does_not_narrow_the_wi
 
 def test_a_single_cycle_that_was_broken_off_is_measured_with_a_warning():
     motion = triangle(1)
-    source = measured(looped(motion[:300]), None)
+    source = measure_recording(looped(motion[:300]), None)
     assert len(source.raw) == 1
     assert source.warnings[0].name == "unfinished_cycle"
     assert "covers only 49 % of the longer one" in source.warnings[0].message
@@ -226,7 +228,7 @@ def to_and_fro(*ends, step=0.5):
 )
 def test_a_short_first_stroke_is_no_part_of_a_cycle(ends, cycles, left):
     """A machine that retracts 3 mm first had been measured over these 3 mm alone."""
-    source = measured(looped(to_and_fro(*ends)), None)
+    source = measure_recording(looped(to_and_fro(*ends)), None)
     assert [(first.branch, first.cycle) for first, _ in source.strokes.cycles] == cycles
     assert f"{left} strokes complete no cycle: left out" in [item.message for item in source.warnings]
     numbers = numbers_of(source)
@@ -237,7 +239,7 @@ def test_a_short_first_stroke_is_no_part_of_a_cycle(ends, cycles, left):
 @pytest.mark.parametrize("ends", [(0, -3, 100), (0, 100, 95), (100, 103, 0)])
 def test_one_stroke_and_a_few_millimetres_are_no_loop(ends):
     """The area over 3 mm had been given as the hysteresis of a recording without a way back."""
-    source = measured(looped(to_and_fro(*ends)), None)
+    source = measure_recording(looped(to_and_fro(*ends)), None)
     branch = "load" if ends[0] == 0 else "unload"
     assert source.raw[0].branches == (branch,)
     assert [item.name for item in source.warnings] == ["one_branch", "unfinished_cycle"]
@@ -250,4 +252,4 @@ def test_one_stroke_and_a_few_millimetres_are_no_loop(ends):
 
 @pytest.mark.parametrize(("gap", "found"), [(1.0, []), (-1.0, ["negative_loop"]), (0.01, []), (-0.01, [])])
 def test_a_loop_that_runs_the_wrong_way_round_is_reported_where_noise_cannot_explain_it(gap, found):
-    assert [item.name for item in measured(looped(triangle(2), gap), None).warnings] == found
+    assert [item.name for item in measure_recording(looped(triangle(2), gap), None).warnings] == found

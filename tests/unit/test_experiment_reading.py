@@ -156,10 +156,10 @@ BAD = {
 
 @pytest.mark.parametrize(("data", "complaint"), BAD.values(), ids=BAD)
 def test_bad_data_is_refused_in_one_clear_line(tmp_path, data, complaint):
-    from cfmkit.experiment.curves_and_metrics_of_recording import measured
+    from cfmkit.experiment.curves_and_metrics_of_recording import measure_recording
 
     with pytest.raises(DataError) as caught:
-        measured(read(tmp_path, data))
+        measure_recording(read(tmp_path, data))
     assert complaint in str(caught.value)
     assert str(caught.value).startswith("data.csv: ")
     assert "\n" not in str(caught.value)

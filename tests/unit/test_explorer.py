@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.cli.failures import told
+from cfmkit.cli.failures import report_failure
 from cfmkit.cli.output import Terminal
 from cfmkit.cli.verbs.explore import ExploreOptions, run
 from cfmkit.errors import OutputError, UsageError
@@ -159,7 +159,7 @@ def test_a_bug_is_one_line_for_the_page_and_its_traceback_is_not_lost(served, mo
 
     terminal = Terminal(verbose=verbose)
     monkeypatch.setattr(served.explorer.__class__, "answer", broken)
-    monkeypatch.setattr(served, "failed", lambda error: told(error, terminal))
+    monkeypatch.setattr(served, "failed", lambda error: report_failure(error, terminal))
     status, found = asked(served, data={"changes": []}, **{"X-Token": served.token})
     assert status == 500
     assert json.loads(found) == {"problem": ["a bug in cfmkit: KeyError: 'analysis.window'"]}

@@ -13,7 +13,7 @@ from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, polygon
-from cfmkit.export.fillets import filleted
+from cfmkit.export.fillets import round_inside_corners
 
 ELL = [(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.03), (0, 0.03)]
 
@@ -25,7 +25,7 @@ def area(contour):
 
 @pytest.mark.parametrize("turned", [1, -1])
 def test_only_the_inside_corner_is_rounded_whichever_way_the_contour_runs(turned):
-    contour, sharp = filleted(polygon(ELL[::turned], "cut"), 0.002)
+    contour, sharp = round_inside_corners(polygon(ELL[::turned], "cut"), 0.002)
     assert sharp == ()
     assert [edge.radius for edge in contour.edges if isinstance(edge, Arc)] == [0.002]
     assert area(contour) == pytest.approx(area(polygon(ELL, "cut")) + (1 - np.pi / 4) * 0.002**2, rel=1e-9)
@@ -34,7 +34,7 @@ def test_only_the_inside_corner_is_rounded_whichever_way_the_contour_runs(turned
 def test_arcs_may_use_up_the_lines_beside_them():
     """In a slot as wide as two radii two arcs leave nothing of its ends."""
     slot = polygon([(0, 0), (0.01, 0), (0.01, 0.002), (0, 0.002)], "cut", hole=True)
-    contour, sharp = filleted(slot, 0.001)
+    contour, sharp = round_inside_corners(slot, 0.001)
     assert sharp == ()
     assert [type(edge) for edge in contour.edges] == [Arc, Line, Arc, Arc, Line, Arc]
     assert area(contour) == pytest.approx(0.01 * 0.002 - (4 - np.pi) * 1e-6, rel=1e-9)
@@ -43,14 +43,14 @@ def test_arcs_may_use_up_the_lines_beside_them():
 def test_a_step_as_high_as_the_fillet_is_rounded():
     """Its inside corner takes the whole step; the outside corner at the other end is none for a cutter."""
     steps = [(0, 0), (0.03, 0), (0.03, 0.01), (0.02, 0.01), (0.02, 0.011), (0.01, 0.011), (0.01, 0.02), (0, 0.02)]
-    contour, sharp = filleted(polygon(steps, "cut"), 0.001)
+    contour, sharp = round_inside_corners(polygon(steps, "cut"), 0.001)
     assert sharp == ()
     assert sum(isinstance(edge, Arc) for edge in contour.edges) == 2
 
 
 def test_all_corners_of_a_square_hole_are_inside_corners():
     hole = polygon([(0, 0), (0.01, 0), (0.01, 0.01), (0, 0.01)], "cut", hole=True)
-    contour, _ = filleted(hole, 0.001)
+    contour, _ = round_inside_corners(hole, 0.001)
     assert sum(isinstance(edge, Arc) for edge in contour.edges) == 4
     assert area(contour) == pytest.approx(1e-4 - (4 - np.pi) * 1e-6, rel=1e-9)
 
@@ -65,7 +65,7 @@ def test_a_fillet_between_a_line_and_a_smooth_edge_is_tangent_to_both():
     low, far = (float(points[0, 0]), floor), (0.05, floor)
     corners = [far, (0.05, floor - 0.01), (0.0, floor - 0.01), (0.0, radius)]
     lines = [Line(low, far), *(Line(a, b) for a, b in pairwise(corners))]
-    contour, sharp = filleted(Contour((smooth, *lines), "cut", closed=True), fillet)
+    contour, sharp = round_inside_corners(Contour((smooth, *lines), "cut", closed=True), fillet)
     (arc,) = (edge for edge in contour.edges if isinstance(edge, Arc))
     assert sharp == ()
     assert arc.center[1] == pytest.approx(floor + fillet, abs=1e-9)
@@ -81,7 +81,7 @@ def test_curved_leaves_with_fillets_are_drawn_within_a_small_tolerance():
 
 
 def test_a_corner_that_no_fillet_fits_stays_and_its_place_is_told():
-    contour, sharp = filleted(polygon(ELL, "cut"), 0.025)
+    contour, sharp = round_inside_corners(polygon(ELL, "cut"), 0.025)
     assert contour.edges == polygon(ELL, "cut").edges
     assert sharp == (0.01 + 0.01j,)
     spec = cfmkit.load("configs/vcfm_hybrid.yaml", ["mechanism.part.fillet=3 mm"])

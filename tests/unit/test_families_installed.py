@@ -25,11 +25,11 @@ def site(tmp_path, monkeypatch):
     folder = tmp_path / "site"
     folder.mkdir()
     monkeypatch.syspath_prepend(str(folder))
-    entry_point_plugins._imported.cache_clear()
+    entry_point_plugins._import_record.cache_clear()
     entry_point_plugins._offers_on.cache_clear()
     yield folder
     packages.forget(folder)
-    entry_point_plugins._imported.cache_clear()
+    entry_point_plugins._import_record.cache_clear()
 
 
 def reason(name):
@@ -46,7 +46,7 @@ def test_a_family_of_another_package_is_one_like_the_others(site, kind):
     assert families.names()[-1] == "soft"
     assert families.family("soft").name == "soft"
     assert "soft" in [one.name for one in families.records()]
-    assert families.skipped() == ()
+    assert families.list_skipped() == ()
 
 
 def test_listing_imports_nothing(site):
@@ -92,7 +92,7 @@ def test_a_family_that_cannot_be_used_is_skipped_with_the_reason(site, source, r
     packages.install(site, "broken-one", source, "broken")
     assert reported in reason("broken")
     assert reason("broken").startswith("the family 'broken' of the package broken-one 1.0 cannot be used: ")
-    assert families.skipped() == (reason("broken"),)
+    assert families.list_skipped() == (reason("broken"),)
     assert {"cam", "beam"} <= {one.name for one in families.records()}
 
 
@@ -100,7 +100,7 @@ def test_a_name_that_cfmkit_has_stays_its_own(site):
     packages.install(site, "another-cam", packages.record("cam"), "cam")
     assert families.family("cam").spec_type.__module__ == "cfmkit.families.cam.spec"
     assert families.names().count("cam") == 1
-    assert "cfmkit itself has a family of this name" in families.skipped()[0]
+    assert "cfmkit itself has a family of this name" in families.list_skipped()[0]
 
 
 def test_of_two_packages_with_the_same_name_neither_is_used(site):
@@ -108,7 +108,7 @@ def test_of_two_packages_with_the_same_name_neither_is_used(site):
         packages.install(site, package, packages.record("twin"), "twin")
     assert "twin" not in families.names()
     assert "other-package offers one of this name, too" in reason("twin")
-    assert len(families.skipped()) == 2
+    assert len(families.list_skipped()) == 2
 
 
 def test_a_specification_of_a_family_that_cannot_be_used_says_why_at_its_place(site, tmp_path):

@@ -6,7 +6,7 @@ import pickle
 
 import pytest
 
-from cfmkit.families.findings import at_least, at_most, deg, finder, mm, mpa, newton, percent, rate
+from cfmkit.families.findings import deg, finder, format_at_least, format_at_most, mm, mpa, newton, percent, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, no_result, refusals_answered
 from cfmkit.results import Finding, Status
 from cfmkit.specs.spec import Spec
@@ -35,11 +35,13 @@ def test_numbers_are_told_in_the_units_of_the_user():
 
 def test_a_proposed_length_stays_on_its_side_of_the_exact_one():
     for length in (1e-7, 0.0144645, 0.1693794, 0.25, 3.0):
-        low, high = (float(text.removesuffix(" mm")) / 1e3 for text in (at_most(length), at_least(length)))
+        low, high = (
+            float(text.removesuffix(" mm")) / 1e3 for text in (format_at_most(length), format_at_least(length))
+        )
         assert low <= length * (1 + 1e-15)
         assert high >= length * (1 - 1e-15)
         assert high - low <= 1.0001e-3 * length
-    assert at_least(0.0) == at_most(0.0) == "0 mm"
+    assert format_at_least(0.0) == format_at_most(0.0) == "0 mm"
 
 
 def test_the_reason_why_nothing_can_be_built_survives_the_way_back_from_another_process():

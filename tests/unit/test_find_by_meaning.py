@@ -60,7 +60,7 @@ def test_a_term_is_explained_with_the_names_that_have_it():
     data = explain_by_meaning("hysteresis").data
     assert data["terms"][0]["meaning"].startswith("difference between loading and unloading")
     assert "hysteresis_area" in {one["name"] for one in data["names"]}
-    assert show_topics.found("envelope").data["terms"][0]["name"] == "envelope"
+    assert show_topics.find_page("envelope").data["terms"][0]["name"] == "envelope"
 
 
 def test_words_that_mean_nothing_here_are_refused():

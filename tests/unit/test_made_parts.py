@@ -13,7 +13,7 @@ from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.runs.run import analysed, designed
+from cfmkit.runs.run import run_analysis, run_design
 from cfmkit.specs.units import TravelShare
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.parts.drawn_yields import common_errors, yields_of
@@ -38,7 +38,7 @@ def with_yield(spec, least):
 
 
 def test_the_yield_is_that_of_the_tolerance_study_of_the_design():
-    found = designed(cam(samples=120), Run(3))
+    found = run_design(cam(samples=120), Run(3))
     design = found.design.spec
     study = cfmkit.sensitivity(design, method="tolerance", parameters=TOLERANCES, samples=120, seed=3)
     assert 0.05 < found.metrics["yield"].value < 0.95
@@ -47,10 +47,10 @@ def test_the_yield_is_that_of_the_tolerance_study_of_the_design():
 
 
 def test_a_requirement_on_the_yield_decides_the_exit_code_and_keeps_its_place():
-    missed = designed(with_yield(cam(samples=60), "99 %"), Run())
+    missed = run_design(with_yield(cam(samples=60), "99 %"), Run())
     assert [one.metric for one in missed.requirements][-1] == "yield"
     assert int(missed.exit_code) == 5
-    assert int(designed(with_yield(cam(samples=60), "5 %"), Run()).exit_code) == 0
+    assert int(run_design(with_yield(cam(samples=60), "5 %"), Run()).exit_code) == 0
 
 
 def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says_so():
@@ -72,7 +72,7 @@ def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says
 
 def test_an_analysis_does_not_judge_a_yield():
     spec = with_yield(cam(), "99 %")
-    found = analysed(spec, Run())
+    found = run_analysis(spec, Run())
     assert len(found.requirements) == len(spec.requirements) - 1
     assert int(found.exit_code) == 0
 
@@ -96,7 +96,7 @@ def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement
     built = {"mechanism.roller_radius": "8 mm", "analysis.window": None, "analysis.travel": "236 mm"}
     scatter = {"mechanism.roller_radius": {"normal": "0.1 mm"}}
     spec = cam(tolerances=scatter, samples=30).replace({**built, "analysis.points": 31, "requirements": (limits,)})
-    spec = designed(spec, Run()).design.spec
+    spec = run_design(spec, Run()).design.spec
     result = cfmkit.analyze(spec)
     made = Parts.of_design(spec, spec.design, 0)
     judged = analyze_parts(made, made.draw(), result, Run())
@@ -223,7 +223,7 @@ def test_a_yield_of_a_part_that_errs_nowhere_is_refused_and_never_met():
         with pytest.raises(SpecError) as error:
             cfmkit.loads(cfmkit.dumps(spec.replace(changes)))
         assert [(one.path, "err by its process" in one.message) for one in error.value.problems] == [(path, True)]
-    found = designed(spec.replace({**asked, "design.yield": "95 %"}), Run())
+    found = run_design(spec.replace({**asked, "design.yield": "95 %"}), Run())
     assert [(one.metric, one.ok, one.value) for one in found.requirements][1] == ("yield", False, None)
     assert "err by its process" in found.requirements[1].sentence
     assert int(found.exit_code) == 5

@@ -14,7 +14,7 @@ from cfmkit.cli.main import main
 from cfmkit.designing import run_many_starts
 from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families import family
-from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
+from cfmkit.families.beam.force_at_few_poses import sample_poses, sampled_slopes
 from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import model
 from cfmkit.families.vcfm.model import solve
@@ -116,12 +116,12 @@ def test_the_engines_derivatives_are_those_of_neighbouring_parts(changes):
     paths += ["mechanism.beams.b2.shape.coefficients.1", "mechanism.material.youngs_modulus", "mechanism.width"]
     found = sampled_slopes(spec, places, [*paths, "mechanism.safety_factor"])
     assert set(found.by) == set(paths)  # what no exact derivative is known by is left out
-    seen = sampled(spec, places)
+    seen = sample_poses(spec, places)
     assert found.sampled.effort["load"] == pytest.approx(seen.effort["load"], rel=1e-12)
     assert found.sampled.stress == pytest.approx(seen.stress, rel=1e-9)
     for path in paths:
         value = spec.at(path)
-        ends = [sampled(spec.replace({path: value * (1 + sign * 1e-5)}), places) for sign in (1, -1)]
+        ends = [sample_poses(spec.replace({path: value * (1 + sign * 1e-5)}), places) for sign in (1, -1)]
         force, stress = ((a - b) / (2e-5 * value) for a, b in (
             [one.effort["load"] for one in ends], [one.stress for one in ends]))  # fmt: skip
         assert found.by[path].effort["load"] == pytest.approx(force, rel=1e-5, abs=1e-6 * abs(force).max()), path
@@ -151,7 +151,7 @@ def test_loads_that_grow_with_the_drive_are_seen_quickly_too():
     grown = spec.replace(changes)
     curve = cfmkit.analyze(grown).curve
     places = curve.motion[[10, 20, -1]]
-    assert sampled(grown, places).effort["load"] == pytest.approx(curve.effort[[10, 20, -1]], rel=1e-4)
+    assert sample_poses(grown, places).effort["load"] == pytest.approx(curve.effort[[10, 20, -1]], rel=1e-4)
     assert abs(curve.effort[-1] / cfmkit.analyze(spec).curve.effort[-1] - 1) > 0.01  # the load is felt
 
 
@@ -266,7 +266,7 @@ def test_all_springs_that_are_tried_for_a_yield_share_one_time_budget(monkeypatc
         return len(left), replace(design, spec=None, message="no")
 
     monkeypatch.setattr(run_many_starts, "time", lambda: now[0])
-    monkeypatch.setattr(redesign, "_moved", moved)
+    monkeypatch.setattr(redesign, "_move_design", moved)
     spec = cfmkit.load("configs/cam.yaml")
     one = cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE)
     found = with_design_margins(spec, replace(one, next_best=(lambda: one,) * 4), Run(time_budget=10.0))

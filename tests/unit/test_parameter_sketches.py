@@ -12,7 +12,7 @@ import pytest
 from cfmkit import families
 from cfmkit.cli.main import main
 from cfmkit.errors import UsageError
-from cfmkit.families.base import packaged
+from cfmkit.families.base import read_packaged
 from cfmkit.runs.dimension_drawing import FORMATS, read_dimensions, read_drawing
 from cfmkit.specs.keys_and_schema import keys
 
@@ -24,7 +24,7 @@ own_drawings = pytest.mark.parametrize("name", OWN)
 
 def texts(name):
     """Return every text of a drawing, its table left out."""
-    root = ElementTree.fromstring(packaged(families.family(name).dimension_drawing))
+    root = ElementTree.fromstring(read_packaged(families.family(name).dimension_drawing))
     return ["".join(text.itertext()) for text in root.iterfind(".//{*}text") if text.get("class") != "row"]
 
 
@@ -137,6 +137,6 @@ def test_a_family_without_a_drawing_is_refused(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("text", ["no picture", '<svg><text class="row"><tspan>a</tspan></text></svg>'])
 def test_a_file_that_is_no_drawing_is_refused_with_its_name(monkeypatch, text):
-    monkeypatch.setattr("cfmkit.families.base.packaged", lambda _: text)
+    monkeypatch.setattr("cfmkit.families.base.read_packaged", lambda _: text)
     with pytest.raises(UsageError, match=r"^cfmkit/families/cam/dimensions\.svg has no rows of"):
         read_dimensions(families.family("cam"))

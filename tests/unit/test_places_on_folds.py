@@ -57,8 +57,10 @@ def test_the_mean_of_a_winding_branch_is_that_of_its_closed_form():
 
 
 def test_what_a_winding_branch_breaks_is_told_in_its_motion():
-    ((low, high),) = winding_branches.broken(Bow(), lambda ways: np.abs(ways - 0.5 * np.pi) - 0.2 * np.pi)[:1]
+    ((low, high),) = winding_branches.list_broken_intervals(
+        Bow(), lambda ways: np.abs(ways - 0.5 * np.pi) - 0.2 * np.pi
+    )[:1]
     assert (low, high) == pytest.approx((0.0, np.sin(0.3 * np.pi)), abs=1e-12)
-    assert winding_branches.broken(Bow(), lambda ways: ways - 7.0) == []
+    assert winding_branches.list_broken_intervals(Bow(), lambda ways: ways - 7.0) == []
     assert winding_branches.extremes(Bow(), 0.6, 2.0) == pytest.approx((np.pi - np.arcsin(0.6), np.arcsin(0.6)))
     assert winding_branches.stress_extremes(Bow(), -2.0, 2.0) == pytest.approx((4 * np.pi**2, 0.0))

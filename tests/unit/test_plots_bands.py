@@ -8,7 +8,7 @@ from plot_support import axes, band_boxes, flipped, loop_curve, result_of
 
 from cfmkit.curves import Curve
 from cfmkit.plots.bands_from_requirements import bands_of, limits_on
-from cfmkit.plots.curve_with_enlarged_band import enlarged, loop_figure
+from cfmkit.plots.curve_with_enlarged_band import choose_enlarged_range, loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.style import BAND, TROUBLE
 from cfmkit.results import Quantity
@@ -108,7 +108,7 @@ def test_a_curve_that_shows_well_on_its_own_has_one_panel():
     motion = np.linspace(0.0, 0.1, 50)
     curve = Curve(motion, 500 * motion, np.repeat("p", 50), np.ones(50, dtype=bool))
     result = result_of(curve=curve, target=None)
-    assert enlarged(result, CurveLook()) is None
+    assert choose_enlarged_range(result, CurveLook()) is None
     assert len(loop_figure(result).axes) == 1
 
 
@@ -116,6 +116,6 @@ def test_rounding_errors_are_not_enlarged():
     motion = np.linspace(0.0, 0.1, 50)
     effort = 50.0 * (1 + 1e-14 * np.sin(1000 * motion))
     curve = Curve(motion, effort, np.repeat("p", 50), np.ones(50, dtype=bool))
-    detail = enlarged(result_of(curve=curve), CurveLook())
+    detail = choose_enlarged_range(result_of(curve=curve), CurveLook())
     assert detail is not None
     assert detail[1] == (pytest.approx(49.9), pytest.approx(50.1))

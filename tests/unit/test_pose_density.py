@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.export.contours import polygon
-from cfmkit.solid.meshed_part import ALLOWED, HeldOrDriven, Part, _checked, refined, rings_of
+from cfmkit.solid.meshed_part import ALLOWED, HeldOrDriven, Part, _check_interval, refine_path, rings_of
 from cfmkit.solid.plane_stress_law import LAWS
 
 
@@ -48,7 +48,7 @@ def off(course, many):
 
 def test_poses_are_added_until_the_curve_is_that_of_many_poses(leaf, many):
     few = thinned(many)
-    course, between = refined(leaf.problem, few)
+    course, between = refine_path(leaf.problem, few)
     assert off(few, many) > 2 * ALLOWED  # so few poses do not do
     assert off(course, many) <= min(ALLOWED, between)
     assert len(few.poses) < len(course.poses) <= 2 * len(few.poses)
@@ -57,7 +57,7 @@ def test_poses_are_added_until_the_curve_is_that_of_many_poses(leaf, many):
 def test_what_is_reported_is_what_many_poses_find(leaf, many):
     # the first check alone: the interval that is expected to be the worst one is, within a factor of three
     few = thinned(many)
-    checked, difference = _checked(leaf.problem, few, set())
+    checked, difference = _check_interval(leaf.problem, few, set())
     largest = max(abs(pose.effort) for pose in few.poses)
     assert len(checked.poses) == len(few.poses) + 1
     assert off(few, many) / 3 < difference / largest < 3 * off(few, many)

@@ -6,7 +6,7 @@ import pytest
 
 from cfmkit.documents.document import CellGrid, Document, GridColumn, PageTable
 from cfmkit.documents.terminal import page as page_of
-from cfmkit.documents.terminal import printed
+from cfmkit.documents.terminal import print_blocks
 
 
 @pytest.mark.parametrize("width", [40, 60, 108])
@@ -15,8 +15,8 @@ def test_no_number_is_cut_on_a_narrow_page(width):
     heads = (GridColumn("name", True), *(GridColumn(one, False) for one in "abcd"))
     table = Document(title="t", tables=(PageTable("", heads, (("a row", *numbers),)),))
     for page in (
-        printed([CellGrid(heads, [["a row", *numbers]])], width),
-        printed(page_of(table, width), width),
+        print_blocks([CellGrid(heads, [["a row", *numbers]])], width),
+        print_blocks(page_of(table, width), width),
     ):
         assert max(map(len, page.split("\n"))) <= width
         kept = "".join(page.split())
@@ -25,5 +25,5 @@ def test_no_number_is_cut_on_a_narrow_page(width):
 
 def test_where_there_is_room_only_texts_take_several_lines():
     heads = (GridColumn("", True), GridColumn("", False))
-    page = printed([CellGrid(heads, [["a text of more than one line on this page", "71.3 x 39.5 mm"]])], 40)
+    page = print_blocks([CellGrid(heads, [["a text of more than one line on this page", "71.3 x 39.5 mm"]])], 40)
     assert "71.3 x 39.5 mm" in page

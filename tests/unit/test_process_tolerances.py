@@ -10,12 +10,12 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.runs.run import designed
+from cfmkit.runs.run import run_design
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES
 from cfmkit.studies.parts import requirement_rows
-from cfmkit.studies.parts.assumed_errors import assumed, tolerances
+from cfmkit.studies.parts.assumed_errors import assume_errors, tolerances
 from cfmkit.studies.parts.near_parts import expected_shares, expected_yield
 from cfmkit.studies.parts.outcomes import analyze_parts
 from cfmkit.studies.parts.parts import Parts
@@ -49,7 +49,7 @@ def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     asked = (Requirement(metric="force_mean", min="1 N", max="2 N"),)
     spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
-    found = assumed(spec)
+    found = assume_errors(spec)
     assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))
     reported = expected_yield(cfmkit.analyze(spec), Run())
     assert "assumed" in reported
@@ -68,7 +68,7 @@ def test_what_is_assumed_is_of_the_materials_that_beams_have():
         return spec.replace({"mechanism.material": {"name": top}, **changes})
 
     def reported(part):
-        made = assumed(part)
+        made = assume_errors(part)
         return made.process.name, made.modulus, made.as_stated
 
     assert reported(found("pla")) == ("fdm", bands["pla"], False)
@@ -82,13 +82,13 @@ def test_what_is_assumed_is_of_the_materials_that_beams_have():
 def test_a_cam_whose_parts_end_in_its_window_gets_no_number_one_with_shares_does_and_a_design_with_tolerances_no_line():
     cam = cfmkit.load("configs/cam.yaml")
     stated = (Requirement(metric="deviation_from_target", max="3 %", over=("5 mm", "240 mm")),)
-    made = dict(designed(cam.replace({"requirements": stated}), Run()).supplement.lines)["yield"]
+    made = dict(run_design(cam.replace({"requirements": stated}), Run()).supplement.lines)["yield"]
     assert made.startswith("no yield is estimated for the assumed tolerances of laser: ")
-    made = dict(designed(cam, Run()).supplement.lines)["yield"]
+    made = dict(run_design(cam, Run()).supplement.lines)["yield"]
     assert made.startswith("about 23 % (laser, assumed tolerances)")
     assert "rates of springs within 5 %" in made
     toleranced = cam.replace({"design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}})
-    found = designed(toleranced.replace({"design.samples": 20}), Run())
+    found = run_design(toleranced.replace({"design.samples": 20}), Run())
     assert "yield" not in dict(found.supplement.lines)
 
 
@@ -124,9 +124,9 @@ def test_the_process_of_a_part_is_what_it_is_assumed_to_be_made_by_and_its_own_v
     spec = cfmkit.load(STRIP)
     named = spec.replace({"mechanism.part": {"process": "mill"}})
     own = spec.replace({"mechanism.part": {"process": {"name": "mill", "thickness": "0.007 mm"}}})
-    assert assumed(named).deviations == {"mechanism.beam.offset": 2e-5}
-    assert assumed(own).deviations == {"mechanism.beam.offset": pytest.approx(7e-6)}
-    assert assumed(own).process.least_feature == assumed(named).process.least_feature
+    assert assume_errors(named).deviations == {"mechanism.beam.offset": 2e-5}
+    assert assume_errors(own).deviations == {"mechanism.beam.offset": pytest.approx(7e-6)}
+    assert assume_errors(own).process.least_feature == assume_errors(named).process.least_feature
     # it says how parts are made where their yield is asked for, and judges no parts otherwise
     assert Parts.of_design(own, own.design, 0) is None
     asked = own.replace({"design.yield": 0.9})

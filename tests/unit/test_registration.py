@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flanks import Errors, flanks, measured, parameters, profile
 
-from cfmkit.numerics.rigid_point_registration import feet, gaps_across, register, registered_where_it_is, turned
+from cfmkit.numerics.rigid_point_registration import feet, gaps_across, register, registered_where_it_is, turn_points
 from cfmkit.numerics.robust_statistics import neighbour_noise
 from cfmkit.numerics.smoothing_spline import smoothed
 
@@ -62,7 +62,7 @@ def test_the_shift_that_a_width_error_is_taken_for_is_told_beforehand():
     exact, wide = (register(measured(Errors(offset=size)), flanks(), robust=False) for size in (0.0, 0.01e-3))
     centre = np.concatenate(exact.points).mean(axis=0)
     turn = np.array([-centre[1], centre[0]]) * (wide.angle - exact.angle)
-    moved = turned(np.zeros((1, 2)), wide.angle - exact.angle, np.zeros(2))[0]
+    moved = turn_points(np.zeros((1, 2)), wide.angle - exact.angle, np.zeros(2))[0]
     assert wide.shift - exact.shift + turn - moved == pytest.approx(0.01e-3 * reported, rel=1e-3, abs=1e-9)
     assert reported[1] > 3
 
@@ -163,7 +163,7 @@ def test_tangent_speed_and_curvature_of_a_flank_are_its_derivatives():
 
 def test_turning_keeps_distances():
     points = np.random.default_rng(0).normal(size=(5, 2))
-    moved = turned(points, 0.7, np.array([1.0, 2.0]))
+    moved = turn_points(points, 0.7, np.array([1.0, 2.0]))
     assert np.linalg.norm(moved[1:] - moved[0], axis=1) == pytest.approx(np.linalg.norm(points[1:] - points[0], axis=1))
 
 

@@ -88,12 +88,12 @@ def test_what_proposals_draw_of_a_linkage_is_what_its_box_counts():
     from matplotlib.figure import Figure
 
     from cfmkit.families.slider_crank.springs.figures import draw_as_made, key, moving, scene
-    from cfmkit.plots.poses_in_one_svg import chosen
+    from cfmkit.plots.poses_in_one_svg import choose_poses
 
     spring = {"at": "pivot", "name": "wide", "wound": {"wire": "1 mm", "coil": "13 mm", "turns": 8.05}}
     room, result = room_of("slider_crank_bilancia2019", **{"mechanism.springs.bought": (spring,)})
     solution, bounds = result.state, []
-    for place in solution.motion[0, chosen(solution.motion.shape[1], 9)]:
+    for place in solution.motion[0, choose_poses(solution.motion.shape[1], 9)]:
         ax = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
         draw_as_made(result, key(solution, "", float(place)), ax, scene(result))
         bounds += [one.get_path().transformed(one.get_patch_transform()).get_extents() for one in ax.patches]

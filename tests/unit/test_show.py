@@ -8,7 +8,7 @@ from pathlib import Path
 from sources import calls_of
 
 from cfmkit.cli import show_topics
-from cfmkit.experiment.value_definitions import recorded
+from cfmkit.experiment.value_definitions import define_recorded_values
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,9 +33,9 @@ def test_every_warning_is_explained_those_of_recordings_and_studies_too():
 
 
 def test_every_number_of_a_recording_is_explained():
-    wanted = {*recorded("force"), *recorded("torque"), "data_by_friction"}
+    wanted = {*define_recorded_values("force"), *define_recorded_values("torque"), "data_by_friction"}
     assert wanted - explained() == set()
-    assert show_topics.found("coverage").data["values"][0]["family"] == "recordings"
+    assert show_topics.find_page("coverage").data["values"][0]["family"] == "recordings"
 
 
 def test_the_keys_that_pages_name_are_those_of_the_program():

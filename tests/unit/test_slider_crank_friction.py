@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, turned
+from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, turn_unloaded
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PINS = {"diameter": "3 mm", "friction": 0.1}
@@ -167,7 +167,7 @@ def test_the_unloaded_angle_trims_the_mean_force_by_what_is_stated():
     places = np.linspace(0.003, 0.030, 2001)
     means = []
     for turn in (0.002, -0.002):
-        other, less = turned(assembly, turn)
+        other, less = turn_unloaded(assembly, turn)
         # the same place of the slider is as far from the other position at rest
         at_rest = [one.linkage.slider_position(np.asarray(one.unloaded)) for one in (assembly, other)]
         assert less == pytest.approx(float(at_rest[0] - at_rest[1]) * assembly.linkage.branch, abs=1e-15)

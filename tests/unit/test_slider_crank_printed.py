@@ -30,13 +30,13 @@ from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
-from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, sized
+from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, size_flexure
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     Elasticity,
     Flexure,
     joints,
     kink,
-    mirrored,
+    mirror_points,
     spread,
 )
 from cfmkit.families.slider_crank.printed.solution import first_at
@@ -65,7 +65,7 @@ def names(result: Result) -> set[str]:
 
 
 def test_sized_flexures_have_the_rate_and_the_stress() -> None:
-    one = sized(0.0354, 10.8 * MM, 1.8e9, 42.5e6, 0.53)
+    one = size_flexure(0.0354, 10.8 * MM, 1.8e9, 42.5e6, 0.53)
     assert one.rate(1.8e9) == pytest.approx(0.0354)
     assert one.rotation(1.8e9, 42.5e6) == pytest.approx(0.53)
     volume = one.length * one.thickness * one.width  # the same for any length
@@ -78,20 +78,20 @@ def test_sized_flexures_have_the_rate_and_the_stress() -> None:
 def test_flexures_at_the_crank_pin_grow_wide_with_the_stroke(stroke: float, thickness: float, width: float) -> None:
     """Width with the third power of the rotation: small flexures cannot have a long stroke."""
     turn = float(abs(rotations(LINKAGE, UNLOADED, np.array([stroke * MM]))[1, 0]))
-    one = sized(float(RATES[1]), 10.8 * MM, 1.8e9, 42.5e6, turn)
+    one = size_flexure(float(RATES[1]), 10.8 * MM, 1.8e9, 42.5e6, turn)
     assert one.thickness / MM == pytest.approx(thickness, abs=6e-4)
     assert one.width / MM == pytest.approx(width, rel=2e-3)
 
 
 def test_a_short_flexure_is_the_spring_it_stands_for() -> None:
     """The correction goes to one with the length."""
-    from cfmkit.families.slider_crank.unit_springs import along_slider
+    from cfmkit.families.slider_crank.unit_springs import curves_along_slider
 
     parts = []
     for rate in RATES:
         thickness = (12 * rate * 0.3 * MM / (1.8e9 * 2.73)) ** 0.25
         parts.append(Flexure(0.3 * MM, thickness, 2.73 * thickness))
-    springs = RATES @ along_slider(LINKAGE, 0.56, 1, np.array([5 * MM])).effort[:3]
+    springs = RATES @ curves_along_slider(LINKAGE, 0.56, 1, np.array([5 * MM])).effort[:3]
     assert lumped_chain(0.56, parts).press(np.array([5 * MM])).force[0] == pytest.approx(springs[0], rel=4e-3)
 
 
@@ -100,7 +100,7 @@ def test_a_short_flexure_is_the_spring_it_stands_for() -> None:
 
 def test_mirroring_about_the_line_turns_the_kink_and_keeps_the_ends() -> None:
     pins = joints(LINKAGE, UNLOADED)
-    other = mirrored(pins, pins)
+    other = mirror_points(pins, pins)
     assert kink(other) == pytest.approx(-kink(pins))
     np.testing.assert_allclose(other[[0, 2]], pins[[0, 2]], atol=1e-15)
 

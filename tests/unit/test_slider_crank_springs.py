@@ -12,9 +12,9 @@ from slider_crank import DEG, LI, START, config
 import cfmkit
 from cfmkit import api
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, choose_preferred, minimax, ranges
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
-from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts
+from cfmkit.families.slider_crank.unit_springs import crank_efforts, curves_along_crank, curves_along_slider
 from cfmkit.numerics.box_search import BoxAxis, lowest
 from cfmkit.numerics.hermite_cubic_turning_points import monotone
 
@@ -40,7 +40,7 @@ def mechanisms(count):
 def test_effort_stiffness_and_bend_are_derivatives_of_the_energy(link, start, place):
     """Central differences over 1e-4 rad of q^2/2 of each joint."""
     step = 1e-4
-    before, here, after = (along_crank(link, start, np.array([place + k * step]), bend=True) for k in (-1, 0, 1))
+    before, here, after = (curves_along_crank(link, start, np.array([place + k * step]), bend=True) for k in (-1, 0, 1))
     scale = np.array([1.0, 1.0, 1.0, (link.crank + link.coupler) ** 2])[:, None]
     pairs = (
         ((after.turn**2 - before.turn**2) / (4 * step), here.effort),
@@ -54,8 +54,8 @@ def test_effort_stiffness_and_bend_are_derivatives_of_the_energy(link, start, pl
 
 @pytest.mark.parametrize(("link", "start", "place"), list(mechanisms(40)))
 def test_a_linkage_and_its_mirror_image_have_the_same_springs(link, start, place):
-    one = along_crank(link, start, np.array([place]))
-    other = along_crank(link.mirrored(), math.pi - start, np.array([math.pi - place]))
+    one = curves_along_crank(link, start, np.array([place]))
+    other = curves_along_crank(link.mirrored(), math.pi - start, np.array([math.pi - place]))
     np.testing.assert_allclose(other.effort, -one.effort, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(other.stiffness, one.stiffness, rtol=1e-8, atol=1e-8)
 
@@ -68,12 +68,12 @@ def test_the_force_is_the_torque_over_the_velocity_ratio(link, start, _place):
     reach = way - high, way - low
     travel = reach[0] + (reach[1] - reach[0]) * np.array([0.2, 0.5, 0.8])
     for side in (1, -1):
-        force = along_slider(link, start, side, travel)
-        torque = along_crank(link, start, force.angle)
+        force = curves_along_slider(link, start, side, travel)
+        torque = curves_along_crank(link, start, force.angle)
         # beyond a dead point of the coupler the same place belongs to the other branch
         same = np.abs(torque.position - force.position) < 1e-9 * (link.crank + link.coupler)
         step = 1e-6
-        ahead, behind = (along_crank(link, start, force.angle + sign * step).position for sign in (1, -1))
+        ahead, behind = (curves_along_crank(link, start, force.angle + sign * step).position for sign in (1, -1))
         speed = (ahead - behind) / (2 * step)
         wanted = -link.branch * torque.effort / speed
         for row in (0, 3):
@@ -87,7 +87,7 @@ def test_the_force_is_the_torque_over_the_velocity_ratio(link, start, _place):
 def test_stiffness_of_a_force_is_its_derivative(side, unloaded):
     link = Linkage(54.0, math.hypot(100, 60) - 54.0, 60.0)
     travel, step = np.array([0.5, 5.0, 30.0, 60.0]), 1e-4
-    before, here, after = (along_slider(link, unloaded, side, travel + k * step) for k in (-1, 0, 1))
+    before, here, after = (curves_along_slider(link, unloaded, side, travel + k * step) for k in (-1, 0, 1))
     np.testing.assert_allclose((after.effort - before.effort) / (2 * step), here.stiffness, rtol=1e-5, atol=1e-9)
     energy = (after.turn**2 - before.turn**2) / (4 * step)
     np.testing.assert_allclose(energy, here.effort, rtol=1e-6, atol=1e-9)
@@ -95,14 +95,14 @@ def test_stiffness_of_a_force_is_its_derivative(side, unloaded):
 
 def test_small_rotations_keep_their_digits():
     """One nanoradian from the unloaded position the torque still has 12 digits."""
-    torque = along_crank(LI, START, np.array([START + 1e-9])).effort[:, 0]
-    slope = along_crank(LI, START, np.array([START])).stiffness[:, 0]
+    torque = curves_along_crank(LI, START, np.array([START + 1e-9])).effort[:, 0]
+    slope = curves_along_crank(LI, START, np.array([START])).stiffness[:, 0]
     np.testing.assert_allclose(torque, slope * ((START + 1e-9) - START), rtol=1e-7)
 
 
 def test_the_force_at_the_stretched_start_is_continuous():
     link = Linkage(54.0, math.hypot(100, 60) - 54.0, 60.0)
-    force = along_slider(link, link.stretched_angle, 1, np.array([0.0, 1e-14, 1e-12, 1e-10])).effort[:3]
+    force = curves_along_slider(link, link.stretched_angle, 1, np.array([0.0, 1e-14, 1e-12, 1e-10])).effort[:3]
     np.testing.assert_allclose(force[:, 1:], np.repeat(force[:, :1], 3, axis=1), rtol=3e-5)
 
 
@@ -323,7 +323,7 @@ def test_the_widest_force_window_is_found():
 def test_no_rates_do_better_than_the_linear_programme():
     """Random rates around the optimum, none negative, deviate more; and its residual alternates five times."""
     angle = np.linspace(1.0, 5.0, 301) * DEG
-    goal = RateGoal(along_crank(LI, START, angle).effort.T, np.ones(301), np.full(4, np.inf))
+    goal = RateGoal(curves_along_crank(LI, START, angle).effort.T, np.ones(301), np.full(4, np.inf))
     best = minimax(goal)
     worst = goal.deviation(best)
     others = np.maximum(best * (1 + 0.05 * rng.normal(size=(2000, 4))) + 0.01 * rng.normal(size=(2000, 4)), 0.0)
@@ -335,7 +335,7 @@ def test_no_rates_do_better_than_the_linear_programme():
     spans = ranges(goal.at(range(0, 301, 5)), 1.1 * worst)
     assert (spans[:, 0] <= best + 1e-9).all()
     assert (spans[:, 1] >= best - 1e-9).all()
-    assert goal.deviation(preferred(goal, 1.2 * worst, "even-rates")) <= 1.2 * worst * (1 + 1e-9)
+    assert goal.deviation(choose_preferred(goal, 1.2 * worst, "even-rates")) <= 1.2 * worst * (1 + 1e-9)
 
 
 def test_a_box_is_searched_to_its_bounds():

@@ -89,7 +89,7 @@ def test_least_squares_holds_a_slope_too(caps, slope):
 @pytest.mark.parametrize("slope", [0.0, 3.0, -3.0])
 def test_springs_that_are_preferred_hold_the_slope_too(slope, prefer):
     """The most even ones had slopes of -0.36, 2.79 and -3.52."""
-    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import preferred, ranges
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import choose_preferred, ranges
     from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
 
     design = {
@@ -101,7 +101,7 @@ def test_springs_that_are_preferred_hold_the_slope_too(slope, prefer):
     found = cfmkit.design(spec).spec.mechanism.springs.rates
     assert goal.held[0] @ found == pytest.approx(slope, abs=1e-6)
     span = ranges(goal, goal.deviation(found) * (1 + 1e-9))
-    other = preferred(goal, goal.deviation(found), prefer)
+    other = choose_preferred(goal, goal.deviation(found), prefer)
     assert (np.stack([found, other]) >= span[:, 0] - 1e-9 * span[:, 1]).all()
     assert (np.stack([found, other]) <= span[:, 1] * (1 + 1e-6)).all()
 
@@ -129,12 +129,12 @@ def test_lengths_of_small_rotations_do_not_cost_the_tolerance(objective):
 
 
 def test_rates_that_are_preferred_are_not_below_the_smallest_allowed():
-    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, preferred
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, choose_preferred
 
     lower = np.array([0.3, 0.0, 0.0, 0.2])
     goal = RateGoal(np.eye(4), np.full(4, 0.5), np.full(4, np.inf), lower=lower, least=(np.full(4, 1e-3), 1.9e-3))
     for rule in ("even-rates", "soft-springs"):
-        found = preferred(goal, 0.5, rule)
+        found = choose_preferred(goal, 0.5, rule)
         assert (found >= lower).all()
         assert found.sum() >= 1.9 * (1.0 - 1e-9)
 
@@ -224,7 +224,7 @@ def test_a_window_may_end_exactly_where_a_joint_reaches_its_limit(force):
 @pytest.mark.parametrize("seed", range(6))
 def test_no_window_anywhere_is_wider_than_the_widest(seed):
     from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
-    from cfmkit.families.slider_crank.springs.rates_for_widest_window import judged, widest_of_all
+    from cfmkit.families.slider_crank.springs.rates_for_widest_window import evaluate_window, widest_of_all
 
     random = np.random.default_rng(seed)
     about = {
@@ -238,7 +238,9 @@ def test_no_window_anywhere_is_wider_than_the_widest(seed):
     assert found.deviation <= 0.01
     first, last = task.searched
     width = 1.01 * found.width
-    others = [judged(task, low, low + width) for low in np.linspace(first, last - width, 60) if width < last - first]
+    others = [
+        evaluate_window(task, low, low + width) for low in np.linspace(first, last - width, 60) if width < last - first
+    ]
     assert all(item is None or item.deviation > 0.01 for item in others)
 
 
@@ -246,11 +248,13 @@ def test_no_window_anywhere_is_wider_than_the_widest(seed):
 def test_the_smallest_deviation_follows_its_law_down_to_a_hundred_millionth_of_the_target(width):
     """Deviation ~ width^3 about the stretched position: finer than the tolerance of one linear programme."""
     from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
-    from cfmkit.families.slider_crank.springs.rates_for_widest_window import judged
+    from cfmkit.families.slider_crank.springs.rates_for_widest_window import evaluate_window
 
     task = task_of(config("li2019", analysis={}, design={"torque": "2 N*mm", "tolerance": "0.5 %"}))
     middle = task.assembly.stretched
-    wide, narrow = (judged(task, middle - 0.5 * span, middle + 0.5 * span) for span in np.deg2rad([0.5, width]))
+    wide, narrow = (
+        evaluate_window(task, middle - 0.5 * span, middle + 0.5 * span) for span in np.deg2rad([0.5, width])
+    )
     assert narrow.deviation == pytest.approx(wide.deviation * (width / 0.5) ** 3, rel=0.02)
 
 

@@ -15,7 +15,7 @@ from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.figures import figures
 from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
-from cfmkit.families.slider_crank.unit_springs import JOINTS, along_slider
+from cfmkit.families.slider_crank.unit_springs import JOINTS, curves_along_slider
 
 EQUAL = {
     "mechanism": {
@@ -104,7 +104,7 @@ def test_forces_have_those_of_the_energy_whatever_the_lengths_and_the_side_of_th
         past += place < 0.0
         travel = place - high + (high - low) * np.array([0.1, 0.35, 0.6, 0.9])
         rates = random.uniform(0.0, 1.0, 4)
-        found = rates @ along_slider(link, start, side, travel).effort
+        found = rates @ curves_along_slider(link, start, side, travel).effort
         wanted = force_of_energy(link, start, rates, side, travel)
         np.testing.assert_allclose(found, wanted, rtol=1e-5, atol=1e-6 * np.abs(wanted).max())
     assert past > 8

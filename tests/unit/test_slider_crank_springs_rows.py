@@ -14,7 +14,7 @@ from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.plan import zipped
+from cfmkit.studies.plan import zip_axes
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
 from cfmkit.studies.varied_axes import axes, collect_variations
@@ -237,12 +237,12 @@ def test_words_are_drawn_as_regions_and_as_steps():
 def test_lists_side_by_side_may_repeat_a_value_but_not_a_set():
     spec = config("li2019")
     lists = {PATHS[0]: ("0 N*mm/rad", "1 N*mm/rad", "1 N*mm/rad"), PATHS[1]: ("1 N*mm/rad", "0 N*mm/rad", "1 N*mm/rad")}
-    assert len(zipped(axes(spec, collect_variations(lists), joint=True))) == 3
+    assert len(zip_axes(axes(spec, collect_variations(lists), joint=True))) == 3
     with pytest.raises(cfmkit.SpecError, match="appears twice"):
         axes(spec, collect_variations(lists))
     twice = {path: (*values, values[0]) for path, values in lists.items()}
     with pytest.raises(cfmkit.UsageError, match="number 4 repeats number 1"):
-        zipped(axes(spec, collect_variations(twice), joint=True))
+        zip_axes(axes(spec, collect_variations(twice), joint=True))
 
 
 def test_a_sensitivity_of_a_word_is_refused():

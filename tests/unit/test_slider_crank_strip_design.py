@@ -161,7 +161,7 @@ def test_a_strip_of_several_thicknesses_is_held_to_its_band_by_its_analysis(monk
 
 def test_a_strip_without_force_all_the_way_is_no_design(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a limit of stress, and with the smallest ripple as its goal, there is nothing else to break."""
-    monkeypatch.setattr(printed, "measured", lambda *_: [None, None, None])
+    monkeypatch.setattr(printed, "measure_metrics", lambda *_: [None, None, None])
     free = "design.beam={shape: uniform, goal: ripple, width: 5 mm, stressed: false}"
     refused = cfmkit.design(spec("strip", free))
     assert refused.status is Status.INFEASIBLE
@@ -186,7 +186,9 @@ def test_a_strip_that_keeps_its_limits_is_not_lost_to_a_second_search(monkeypatc
     monkeypatch.setattr(
         printed, "search", lambda *given: search(*given) if answers else Design(None, Status.CRASHED, "")
     )
-    monkeypatch.setattr(printed, "_made", lambda *given: answers.clear() or Design(given[2].spec, Status.COMPLETE, ""))
+    monkeypatch.setattr(
+        printed, "_make_design", lambda *given: answers.clear() or Design(given[2].spec, Status.COMPLETE, "")
+    )
     assert cfmkit.design(spec("taper_design", "design.beam.nodes=2", "analysis.points=31")).status is Status.COMPLETE
 
 

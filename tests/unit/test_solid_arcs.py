@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.export.union import OutlinePiece, merged
+from cfmkit.export.union import OutlinePiece, merge_pieces
 from cfmkit.solid.boundary_and_element_sizes import GRADING, Ring, Sizes
 from cfmkit.solid.mesh import _lattice, mesh
 from cfmkit.solid.meshed_part import rings_of
@@ -14,7 +14,7 @@ from cfmkit.solid.meshed_part import rings_of
 def angle_piece(radius: float) -> Ring:
     """Return a thick L whose inside corner is rounded."""
     corners = [(0, 0), (20, 0), (20, 4), (4, 4), (4, 20), (0, 20)]
-    return rings_of(merged([OutlinePiece.polygon(1e-3 * np.array(corners))], 4e-3, radius), 4e-3)[0]
+    return rings_of(merge_pieces([OutlinePiece.polygon(1e-3 * np.array(corners))], 4e-3, radius), 4e-3)[0]
 
 
 def test_points_are_thrown_where_small_elements_are_wanted_and_nowhere_else():

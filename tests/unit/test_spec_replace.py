@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from cfmkit import SpecError
 from cfmkit.api import load
-from cfmkit.specs.spec import Spec, _with
+from cfmkit.specs.spec import Spec, _set_value
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FILES = sorted([*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")])
@@ -26,7 +26,7 @@ SWITCHES = [
 
 def replaced_whole(spec: Spec, path: str, value: Any) -> Spec | None:
     """Return the specification read from everything that was given, changed at a path; None if it is invalid."""
-    data = _with(spec.model_dump(exclude_unset=True) | {"family": spec.family}, path.split("."), value, path)
+    data = _set_value(spec.model_dump(exclude_unset=True) | {"family": spec.family}, path.split("."), value, path)
     try:
         return type(spec).model_validate(data, context={"as_made": False})
     except ValidationError:

@@ -273,7 +273,7 @@ def test_without_file_locks_two_runs_in_one_process_conflict(tmp_path, no_locks)
 
 
 def test_no_lock_locks_nothing(tmp_path, monkeypatch):
-    with RunFolder(tmp_path / "out"), lock.without_locks():
+    with RunFolder(tmp_path / "out"), lock.disable_locks():
         run(tmp_path / "out", a_csv=b"1")
         assert (tmp_path / "out" / lock.LOCK).exists()
     assert lock.NO_LOCK not in os.environ

@@ -11,7 +11,7 @@ from shoulder_fillets import handbook
 
 import cfmkit
 from cfmkit.arrays import read_only
-from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Path, Section, guided
+from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Path, Section, slider_support
 from cfmkit.families.fem_results import FilletRow, fillet_table, largest_concentration
 from cfmkit.families.nominal_stress_beside_fillets import SolvedBeams, both_images, nominal_stresses, with_steps
 from cfmkit.solid.stress_along_fillets import FilletArc
@@ -78,7 +78,7 @@ REACH, RISE, THICK = 24.6e-3, 3.3e-3, 0.5e-3
 
 def leaf(**shuttle: bool) -> Network:
     section = Section(2e9, 10e-3, THICK, shear=True)
-    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(REACH, RISE, guided(0.5 * np.pi, **shuttle))}
+    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(REACH, RISE, slider_support(0.5 * np.pi, **shuttle))}
     return Network(nodes, {"leaf": Beam("wall", "shuttle", section)})
 
 

@@ -19,7 +19,7 @@ from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.row_blocks_for_journal import ResultRows, squeezed, unsqueezed
+from cfmkit.studies.row_blocks_for_journal import ResultRows, squeeze, unsqueeze
 from cfmkit.studies.summary import Objective, Summary
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
 from cfmkit.studies.tables import results_csv
@@ -125,7 +125,7 @@ def test_a_point_is_designed_as_the_design_verb_does_it(monkeypatch):
         return dataclasses.replace(design, spec=design.spec.replace({"mechanism.offset": 0.0003}))
 
     monkeypatch.setattr("cfmkit.studies.parts.redesign.with_design_margins", margins)
-    monkeypatch.setattr("cfmkit.studies.verify_design_by_solid_model.verified", as_solid)
+    monkeypatch.setattr("cfmkit.studies.verify_design_by_solid_model.verify_by_solid", as_solid)
     spec = spec.replace({"design.verify": "solid"})
     made = cfmkit.design(spec).spec
     assert (made.mechanism.crank_length, made.mechanism.offset) == (0.0401, 0.0003)
@@ -258,13 +258,13 @@ def test_numbers_come_back_from_the_journal_bit_for_bit(shape):
     odd = np.array([np.nan, np.inf, -np.inf, -0.0, 5e-324, 1e308, 0.1])
     smooth = np.sin(np.linspace(0.0, 1.0, shape[0]))[:, None] * np.arange(1, shape[1] + 1)
     for table in (smooth, random.normal(size=shape), random.choice(odd, shape)):
-        back = unsqueezed(squeezed(table), *shape)
+        back = unsqueeze(squeeze(table), *shape)
         assert back.tobytes() == np.ascontiguousarray(table).tobytes()
 
 
 def test_numbers_of_neighbours_in_a_grid_take_little_room():
     grid = np.sin(np.linspace(0.0, 1.0, 4000))[:, None] * np.arange(1.0, 5.0)
-    assert len(squeezed(grid)) < grid.nbytes / 3
+    assert len(squeeze(grid)) < grid.nbytes / 3
 
 
 def test_the_journal_of_a_finished_study_holds_it_alone_and_serves_a_wider_one(tmp_path):

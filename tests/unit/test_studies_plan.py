@@ -6,7 +6,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, names
-from cfmkit.studies.plan import Draw, grid, sampled, zipped
+from cfmkit.studies.plan import Draw, grid, sample_axes, zip_axes
 from cfmkit.studies.variable_paths import leaf, paths
 from cfmkit.studies.varied_axes import axes, collect_variations, parse_variation
 
@@ -67,17 +67,17 @@ def test_blocks_of_a_plan_are_its_points():
 
 
 def test_side_by_side_needs_equal_numbers():
-    plan = zipped(read(f"{RADIUS}=[1mm,2mm]", "analysis.points=[11,21]"))
+    plan = zip_axes(read(f"{RADIUS}=[1mm,2mm]", "analysis.points=[11,21]"))
     assert [plan.point(k) for k in range(2)] == [(0.001, 11), (0.002, 21)]
     with pytest.raises(UsageError, match=r"mechanism\.roller_radius has 2, analysis\.points has 3"):
-        zipped(read(f"{RADIUS}=[1mm,2mm]", "analysis.points=[11,21,31]"))
+        zip_axes(read(f"{RADIUS}=[1mm,2mm]", "analysis.points=[11,21,31]"))
 
 
 @pytest.mark.parametrize("method", ["lhs", "sobol"])
 def test_samples_repeat_with_their_seed_and_fill_their_ranges_evenly(method):
     wanted = read(f"{RADIUS}=8mm:16mm", "analysis.path_method=[ode,quadrature]", "analysis.points=10:12", drawn=True)
-    plan = sampled(wanted, Draw(method, 64, 3))
-    again, other = sampled(wanted, Draw(method, 64, 3)), sampled(wanted, Draw(method, 64, 4))
+    plan = sample_axes(wanted, Draw(method, 64, 3))
+    again, other = sample_axes(wanted, Draw(method, 64, 3)), sample_axes(wanted, Draw(method, 64, 4))
     radius, words, points = plan.block(0, 64)
     assert all(np.array_equal(a, b) for a, b in zip(plan.block(0, 64), again.block(0, 64), strict=True))
     assert not np.array_equal(radius, other.block(0, 64)[0])
@@ -91,7 +91,7 @@ def test_an_absurd_grid_is_refused_before_anything_is_allocated():
     with pytest.raises(UsageError, match="1000000000000000000000000 points are more than 1000000"):
         grid(read(f"{RADIUS}=1mm:2mm:1000000000000", "mechanism.brace_length=1mm:2mm:1000000000000"))
     with pytest.raises(UsageError, match="--max-points 2000000"):
-        sampled(read(f"{RADIUS}=1mm:2mm", drawn=True), Draw("sobol", 2_000_000))
+        sample_axes(read(f"{RADIUS}=1mm:2mm", drawn=True), Draw("sobol", 2_000_000))
 
 
 def test_a_large_grid_holds_its_axes_only():

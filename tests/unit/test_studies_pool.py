@@ -68,7 +68,7 @@ def test_memory_that_finished_jobs_have_left_is_freed_while_a_study_runs(monkeyp
 
 
 def test_no_jobs_start_no_process(doer, monkeypatch):
-    monkeypatch.setattr(pools, "_started", lambda: pytest.fail("a process was started"))
+    monkeypatch.setattr(pools, "_start_worker", lambda: pytest.fail("a process was started"))
     assert list(Pool(2)(doer, iter(()))) == []
 
 

@@ -21,7 +21,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.proposals import PUSHED, _strip, largest_printed
-from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, wound
+from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, add_custom_springs
 from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.runs.read_suggest_file import read_request
@@ -32,9 +32,15 @@ from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import figures, proposal_making_and_judging, search, yield_of_proposal
-from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.proposal_making_and_judging import (
+    ENDED_EARLY,
+    OUT_OF_TIME,
+    Proposal,
+    ProposalJob,
+    make_proposal,
+)
 from cfmkit.studies.suggest.relaxed_requests import nearest
-from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
+from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, order_proposals, suggest
 
 REQUESTS = Path(__file__).parents[1] / "requests"
 
@@ -83,7 +89,7 @@ def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_know
     keys = {"force": "11.14 N", "travel": "3.23 mm", "envelope": "[110 mm, 80 mm, 20 mm]", "cycles": "10000"}
     asked, candidates = offered("vcfm", **keys, material=LASTING)
     coiled = next(one for one in candidates if one.variant == "2 Vs, catalogue springs")
-    one = made(ProposalJob("vcfm", coiled, asked, 0))
+    one = make_proposal(ProposalJob("vcfm", coiled, asked, 0))
     assert one.passes, one.missed or one.message
     (life,) = (requirement for requirement in one.spec.requirements if requirement.metric == "fatigue_life")
     assert list(life.over) == [TravelShare(0.0), TravelShare(1.0)]  # the whole press
@@ -167,7 +173,7 @@ def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
 def test_a_proposal_keeps_the_request_when_its_file_is_analysed():
     asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
-    found = [made(ProposalJob("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
+    found = [make_proposal(ProposalJob("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
     good = [one for one in found if one.good]
     assert good
     for one in good:
@@ -183,7 +189,7 @@ def test_what_misses_a_request_says_which():
     asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
     narrow = replace(asked, envelope=(0.010, 0.060, 0.012))
-    one = made(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
+    one = make_proposal(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
     assert not one.good
     assert any("across the travel" in reported for reported in one.missed)
 
@@ -200,7 +206,7 @@ def few_parts(monkeypatch):
 def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts):
     asked = request(**PRINTED_CAM, **{"yield": "30 %"})
     offer = function_named(family("cam").propose)(asked, Run())
-    one = made(ProposalJob("cam", offer.candidates[0], asked, 3))
+    one = make_proposal(ProposalJob("cam", offer.candidates[0], asked, 3))
     assert one.good, one.missed
     assert 0.3 <= one.numbers["yield"] < 0.95
     spec = cfmkit.loads(one.text)
@@ -212,7 +218,7 @@ def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts)
 def test_a_request_for_more_good_parts_than_there_are_is_missed(few_parts):
     asked = request(**PRINTED_CAM, **{"yield": "95 %"})
     offer = function_named(family("cam").propose)(asked, Run())
-    one = made(ProposalJob("cam", offer.candidates[0], asked, 3))
+    one = make_proposal(ProposalJob("cam", offer.candidates[0], asked, 3))
     assert one.near
     assert one.missed[0].startswith("yield")
     assert ", wanted at least 95 % (" in one.missed[0]  # what it would be after a trim follows
@@ -223,7 +229,7 @@ def test_a_part_of_which_nobody_knows_the_errors_misses_a_request_for_good_parts
     asked = read_request(str(REQUESTS / "crank-lumped.yaml"), {"yield": "50 %"}).request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     flexures = next(one for one in offer.candidates if one.variant == "flexures")
-    assert "its yield is not known" in " ".join(made(ProposalJob("slider-crank", flexures, asked, 0)).missed)
+    assert "its yield is not known" in " ".join(make_proposal(ProposalJob("slider-crank", flexures, asked, 0)).missed)
 
 
 def offered(name, **keys):
@@ -234,7 +240,7 @@ def offered(name, **keys):
 @pytest.mark.parametrize("variant", ["2 Vs, folded spring", "2 cosine arches"])
 def test_other_springs_and_leaves_do_what_is_required(variant):
     asked, candidates = offered("vcfm", envelope="[90 mm, 60 mm, 15 mm]")
-    one = made(ProposalJob("vcfm", next(each for each in candidates if each.variant == variant), asked, 0))
+    one = make_proposal(ProposalJob("vcfm", next(each for each in candidates if each.variant == variant), asked, 0))
     assert one.passes, one.missed or one.message
     kinds = one.spec.mechanism.kinds
     assert kinds == {"2 Vs, folded spring": ("folded", "v-beam"), "2 cosine arches": ("diamond", "cosine")}[variant]
@@ -248,7 +254,7 @@ def test_where_no_diamond_fits_leaves_stand_on_bought_springs(adjustable):
     more = {} if adjustable is None else {"adjustable": adjustable}
     asked, candidates = offered("vcfm", **keys, material=block, **more)
     assert candidates[0].variant == "2 Vs, catalogue springs"
-    one = next(one for each in candidates if (one := made(ProposalJob("vcfm", each, asked, 0))).passes)
+    one = next(one for each in candidates if (one := make_proposal(ProposalJob("vcfm", each, asked, 0))).passes)
     assert "spring_buckles" not in {item.name for item in cfmkit.analyze(one.spec).warnings}
     springs = one.spec.mechanism.springs
     assert springs.name.startswith("generic-")
@@ -260,7 +266,7 @@ def test_where_no_diamond_fits_leaves_stand_on_bought_springs(adjustable):
 def test_hybrid_leaves_are_offered_and_need_a_rougher_request():
     asked, candidates = offered("vcfm", envelope="[90 mm, 60 mm, 15 mm]", ripple="9 %")
     hybrid = next(each for each in candidates if each.variant == "2 hybrid Vs")
-    one = made(ProposalJob("vcfm", hybrid, asked, 0))
+    one = make_proposal(ProposalJob("vcfm", hybrid, asked, 0))
     assert one.passes, one.missed or one.message
     assert one.spec.mechanism.bistable.structure == "hybrid"
 
@@ -272,7 +278,7 @@ def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
     found = {}
     for variant in ("strip", "pair of strips"):
         first = next(each for each in candidates if each.variant == variant)
-        found[variant] = made(ProposalJob("slider-crank", first, asked, 0))
+        found[variant] = make_proposal(ProposalJob("slider-crank", first, asked, 0))
         assert found[variant].passes, found[variant].missed
     pair, single = (found[name].numbers for name in ("pair of strips", "strip"))
     assert pair["parts"] == 2
@@ -298,7 +304,9 @@ def test_a_small_strip_with_pads_in_proportion_is_found():
     asked, candidates = offered(
         "slider-crank", force="0.417 N", travel="14 mm", ripple="2.2 %", envelope=room, material="petg"
     )
-    one = made(ProposalJob("slider-crank", next(one for one in candidates if one.variant == "strip"), asked, 0))
+    one = make_proposal(
+        ProposalJob("slider-crank", next(one for one in candidates if one.variant == "strip"), asked, 0)
+    )
     assert one.passes, one.missed or one.message
 
 
@@ -307,7 +315,7 @@ def test_a_material_without_a_known_strength_gets_designs_whose_stress_is_not_ju
     asked = request(**keys, material="{youngs_modulus: 1.477 GPa, poisson_ratio: 0.3}")
     assert [one.materials[0]["yield_strength"] for one in asked.with_strengths] == [0.015 * 1.477e9, 0.04 * 1.477e9]
     candidate = search.offer_of(family("vcfm"), asked, Run()).candidates[0]
-    one = made(ProposalJob("vcfm", candidate, asked, 0))
+    one = make_proposal(ProposalJob("vcfm", candidate, asked, 0))
     assert one.passes, one.missed or one.message
     assert one.spec.mechanism.material.yield_strength is None
     assert any("no strength is known" in reason for reason in one.unjudged)
@@ -317,7 +325,7 @@ def test_a_material_without_a_known_strength_gets_designs_whose_stress_is_not_ju
 def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
     asked, candidates = offered("cam", envelope="[80 mm, 60 mm, 20 mm]")
     one = next(each for each in candidates if each.variant == "catalogue springs")
-    made_of = made(ProposalJob("cam", one, asked, 0))
+    made_of = make_proposal(ProposalJob("cam", one, asked, 0))
     assert made_of.good, made_of.missed or made_of.message
     springs, plate = made_of.spec.mechanism.springs, made_of.spec.mechanism.contact.width
     assert springs.name.startswith("generic-extension")
@@ -363,7 +371,7 @@ def test_a_search_without_time_has_asked_and_ends_with_6():
 def test_what_was_found_before_the_time_was_up_is_kept(monkeypatch):
     clock = iter([0.0] + [1.0] * 6 + [100.0] * 10_000)
     monkeypatch.setattr(search, "time", SimpleNamespace(time=lambda: next(clock)))
-    monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, text="cam"))
+    monkeypatch.setattr(search, "make_proposal", lambda job: Proposal(job.family, job.candidate.variant, text="cam"))
     found = suggest(request(), Run(time_budget=50.0))
     assert found.proposals
     assert found.late
@@ -380,7 +388,7 @@ def test_one_proposal_is_told_of_in_the_singular(count, reported):
 def test_a_candidate_whose_time_is_up_is_not_made():
     asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
-    one = made(ProposalJob("cam", offer.candidates[0], asked, 0, deadline=1.0))
+    one = make_proposal(ProposalJob("cam", offer.candidates[0], asked, 0, deadline=1.0))
     assert (one.text, one.message) == ("", OUT_OF_TIME)
 
 
@@ -389,9 +397,11 @@ def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next
     asked = request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     designed = next(one for one in offer.candidates if one.variant == "tapered strip")
-    assert made(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
+    assert make_proposal(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
     kept = []
-    monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY))
+    monkeypatch.setattr(
+        search, "make_proposal", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY)
+    )
     monkeypatch.setattr(search, "nearest", lambda *_: {})
     notes = SimpleNamespace(find=lambda _key: None, add=lambda _key, record: kept.append(record))
     assert not suggest(request(), Run(notes=notes)).proposals
@@ -407,13 +417,13 @@ def test_a_family_out_of_reach_says_what_it_would_need():
 def test_kept_shapes_scale_as_beams_that_only_bend():
     """Twice as large with twice the thickness: twice the force at twice the travel, the stress as before."""
     from cfmkit.families.beam.model import analyze
-    from cfmkit.families.beam.proposals import _written
+    from cfmkit.families.beam.proposals import _write_shape
 
     shape = kept_shapes()[0]
     own = shape.spec.mechanism
     block = {"youngs_modulus": 2e9, "poisson_ratio": 0.35, "yield_strength": 76e6}
     end = float(shape.motion[-1])
-    spec = _written(shape, 2.0, block, (2.0 * own.thickness, own.width), (end, 2.0 * end))
+    spec = _write_shape(shape, 2.0, block, (2.0 * own.thickness, own.width), (end, 2.0 * end))
     curve = analyze(spec.replace({"analysis.fidelity": "inextensible"}), Run()).curve
     assert curve.effort[-1] == pytest.approx(2.0 * shape.force[-1], rel=1e-5)
     assert curve.extra["max_stress"].values[-1] == pytest.approx(shape.stress[-1], rel=1e-4)
@@ -427,7 +437,7 @@ def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(enve
     asked = request(force=force, travel="4 mm", ripple="4 %", envelope=envelope)
     first = function_named(family("beam").propose)(asked, Run()).candidates[0]
     assert first.variant == shape
-    found = made(ProposalJob("beam", first, asked, 0))
+    found = make_proposal(ProposalJob("beam", first, asked, 0))
     assert found.passes, found.missed
     assert found.numbers["ripple"] < 0.025
 
@@ -439,7 +449,7 @@ def test_two_layers_are_proposed_where_one_does_not_travel_so_far():
         "beam", force="9.67 N", travel="13 mm", ripple="5.3 %", envelope=room, material=material
     )
     layered = next(one for one in candidates if one.variant == "shape lan-2010 in two layers")
-    one = made(ProposalJob("beam", layered, asked, 0))
+    one = make_proposal(ProposalJob("beam", layered, asked, 0))
     assert one.passes, one.missed or one.message
     assert one.spec.mechanism.copies.layers == 2
 
@@ -463,9 +473,11 @@ def test_the_order_follows_what_is_preferred():
     asked = request()
     offer = function_named(family("cam").propose)(asked, Run())
     found = [
-        one for one in (made(ProposalJob("cam", each, asked, 0, None)) for each in offer.candidates[:5]) if one.good
+        one
+        for one in (make_proposal(ProposalJob("cam", each, asked, 0, None)) for each in offer.candidates[:5])
+        if one.good
     ]
-    flat = ordered(found, ("ripple",))
+    flat = order_proposals(found, ("ripple",))
     assert [one.numbers["ripple"] for one in flat] == sorted(one.numbers["ripple"] for one in found)
 
 
@@ -521,7 +533,7 @@ def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
         text = f"[{value.replace(' x ', ', ')}]" if key == "envelope" else value
         again = request(**{"envelope": "[26 mm, 20 mm, 12 mm]", key: text})
         jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
-        assert any(made(job).passes for job in jobs), key
+        assert any(make_proposal(job).passes for job in jobs), key
 
 
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
@@ -547,7 +559,7 @@ def pinned(force_or_torque, room):
     asked = read_request(None, force_or_torque | {"ripple": "2 %", "envelope": room}).request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     assert offer.candidates, offer.reason
-    return [made(ProposalJob("slider-crank", one, asked, 0)) for one in offer.candidates[5:8]]
+    return [make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in offer.candidates[5:8]]
 
 
 @pytest.mark.parametrize("torque", ["100 N*mm", "1 N*m"])
@@ -574,7 +586,7 @@ def test_springs_at_pins_stay_within_the_depth_required():
     keys = {"torque": "100 N*mm", "angle": "60 deg", "ripple": "5 %", "envelope": "[150 mm, 150 mm, 12 mm]"}
     asked = read_request(None, keys).request()
     offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
-    tried = (made(ProposalJob("slider-crank", one, asked, 0)) for one in offered[10:])
+    tried = (make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in offered[10:])
     one = next(one for one in tried if one.good)
     springs, turned = one.spec.mechanism.springs, cfmkit.analyze(one.spec).values
     high = {
@@ -609,7 +621,7 @@ def test_an_angle_that_no_crank_turns_with_its_springs_is_refused_before_any_des
 def test_springs_for_a_torque_are_the_flattest_of_those_that_fit():
     """The flattest of any size would be too long for this depth."""
     asked, offer = torque_offer("100 N*mm", "60 deg", "[150 mm, 150 mm, 12 mm]")
-    best = made(ProposalJob("slider-crank", offer.candidates[0], asked, 0))
+    best = make_proposal(ProposalJob("slider-crank", offer.candidates[0], asked, 0))
     assert best.good, best.missed or best.message
     assert best.numbers["depth"] <= asked.depth
 
@@ -637,8 +649,8 @@ def test_springs_for_a_force_are_the_flattest_of_those_that_fit():
         {"design": {"force": "200 N", "travel": ["0.8 mm", "20.8 mm"], "springs": ["pivot", "crank_pin", "slider_pin"]}}
     )
     with pytest.raises(SolutionError, match="no spring of steel wire fits at the crank pin"):
-        wound(family("slider-crank").design(free, Run()).spec, asked)
-    best = made(ProposalJob("slider-crank", offered[0], asked, 0))
+        add_custom_springs(family("slider-crank").design(free, Run()).spec, asked)
+    best = make_proposal(ProposalJob("slider-crank", offered[0], asked, 0))
     assert best.good, best.missed or best.message
     assert best.numbers["depth"] <= asked.depth
 
@@ -652,14 +664,14 @@ def test_a_force_that_no_springs_at_the_pins_hold_is_refused_with_the_largest_th
 def test_proposals_that_differ_by_what_nobody_sees_stay_in_their_order():
     ripples = (0.0102, 0.0102 * (1.0 - 1e-5), 0.009)
     three = [Proposal("slider-crank", str(k), numbers={"ripple": ripple}) for k, ripple in enumerate(ripples)]
-    assert [one.variant for one in ordered(three, ("ripple",))] == ["2", "0", "1"]
+    assert [one.variant for one in order_proposals(three, ("ripple",))] == ["2", "0", "1"]
 
 
 @pytest.mark.parametrize(("name", "key"), [("stress", "safety_factor"), ("ripple", "ripple"), ("depth", "depth")])
 def test_what_is_not_known_of_a_proposal_does_not_make_it_the_best(name, key):
     known = {"stress": (1.2, 3.0)}.get(name, (0.03, 0.01))
     three = [Proposal("beam", str(k), numbers={key: value}) for k, value in enumerate((None, *known))]
-    assert [one.variant for one in ordered(three, (name,))] == ["2", "1", "0"]
+    assert [one.variant for one in order_proposals(three, (name,))] == ["2", "1", "0"]
 
 
 @pytest.mark.parametrize(("kind", "make"), [("torsion", torsion_spring), ("extension", extension_spring)])
@@ -677,7 +689,7 @@ def test_a_torque_over_a_quarter_of_a_turn_is_held_by_springs_that_are_wound_up_
         None, {"torque": "5 N*m", "angle": "90 deg", "ripple": "3 %", "envelope": "[150 mm, 700 mm]"}
     ).request()
     offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
-    assert any(made(ProposalJob("slider-crank", one, asked, 0)).good for one in offered[5:])
+    assert any(make_proposal(ProposalJob("slider-crank", one, asked, 0)).good for one in offered[5:])
 
 
 def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
@@ -688,7 +700,7 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
     keys = {"force": "0.4384 N", "travel": "2.55 mm", "ripple": "1.44 %", "envelope": "[39.6 mm, 12.2 mm, 9.2 mm]"}
     asked = read_request(None, keys | {"process": "laser"}).request()
     offered = function_named(family("beam").propose)(asked, Run()).candidates
-    missed = [made(ProposalJob("beam", one, asked, 0)).missed for one in offered]
+    missed = [make_proposal(ProposalJob("beam", one, asked, 0)).missed for one in offered]
     assert any(all("needs" not in miss for miss in misses) for misses in missed)
 
 

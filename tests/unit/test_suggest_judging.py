@@ -21,13 +21,13 @@ from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.runs.suggestion_files import as_json, exit_code, table
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
-from cfmkit.studies.parts.assumed_errors import assumed
+from cfmkit.studies.parts.assumed_errors import assume_errors
 from cfmkit.studies.parts.near_parts import expected_shares
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
-from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judged, made
-from cfmkit.studies.suggest.requirements_of_request import demanded
+from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judge_proposal, make_proposal
+from cfmkit.studies.suggest.requirements_of_request import list_requirements
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -95,7 +95,7 @@ def test_what_a_process_makes_is_accepted(material):
 def beams():
     """A network that does what is required by its beams, and that no solid has judged."""
     asked = request()
-    return asked, made(ProposalJob("beam", first("beam", asked), asked, 0))
+    return asked, make_proposal(ProposalJob("beam", first("beam", asked), asked, 0))
 
 
 def test_what_its_beams_alone_judged_meets_nothing(beams):
@@ -134,11 +134,11 @@ def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(bea
         asked_for.append(spec.fidelity)
         return Proposal(name, variant, near.text, next(outcomes), model="solid", own="reissner")
 
-    monkeypatch.setattr(judging, "judged", judge)
+    monkeypatch.setattr(judging, "judge_proposal", judge)
     correct = {judging.FIDELITY: "solid"}
     monkeypatch.setattr(judging, "function_named", lambda _: lambda spec, _request: spec.replace(correct))
     candidate = replace(first("beam", asked), correct="it:is")
-    found = made(ProposalJob("beam", candidate, asked, 0, near=near))
+    found = make_proposal(ProposalJob("beam", candidate, asked, 0, near=near))
     assert found.good
     assert asked_for == ["solid", "solid"]
 
@@ -151,9 +151,9 @@ def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(n
     asked = request(**keys) if name == "slider-crank" else request(ripple="5 %", force="[9 N, 11 N]", **deep)
     offers = offer_of(family(name), asked, Run()).candidates
     job = ProposalJob(name, next(one for one in offers if one.variant == variant), asked, 0)
-    near = made(job)
+    near = make_proposal(job)
     assert near.pending == "solid", near.missed or near.message
-    one = made(replace(job, near=near))
+    one = make_proposal(replace(job, near=near))
     assert one.good, one.missed or one.message or one.open
     spec = cfmkit.loads(one.text)
     assert spec.fidelity == "solid"
@@ -189,7 +189,7 @@ def test_the_mean_of_a_row_is_that_of_both_directions():
 
 def test_the_file_of_a_proposal_keeps_the_whole_request():
     asked = request(process="wire-edm", material="steel-s235", hysteresis="30 %")
-    one = made(ProposalJob("cam", first("cam", asked), asked, 0))
+    one = make_proposal(ProposalJob("cam", first("cam", asked), asked, 0))
     assert one.text, one.message
     spec = cfmkit.loads(one.text)
     names = {requirement.metric for requirement in spec.requirements}
@@ -225,12 +225,12 @@ def test_the_box_of_a_metric_of_a_sweep_is_computed():
 
 def test_what_cannot_be_judged_is_said_and_meets_nothing():
     asked = request(cycles="20000", hysteresis="5 %")
-    one = made(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
+    one = make_proposal(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
     assert one.passes, one.missed or one.message
     assert one.unjudged == (
         "hysteresis not judged: no loss factor is known of pom", "life not judged: no S-N data for pom",
     )  # fmt: skip
-    cam = made(ProposalJob("cam", first("cam", asked), asked, 0))
+    cam = make_proposal(ProposalJob("cam", first("cam", asked), asked, 0))
     assert cam.unjudged == (
         "life not judged: no S-N data for pom", "life not judged: no S-N data for the wire of its springs",
     )  # fmt: skip
@@ -253,7 +253,7 @@ def test_a_part_is_aimed_between_its_force_without_and_with_the_stiffening(share
 @pytest.mark.parametrize("force", ["12 N", "8 N"])
 def test_an_adjustment_is_judged_at_both_ends_whichever_is_required(force):
     asked = request(force=force, ripple="4 %", envelope="[150 mm, 120 mm, 30 mm]", adjustable="[8 N, 12 N]")
-    one = made(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
+    one = make_proposal(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
     assert one.passes, one.missed or one.message
     values = cfmkit.analyze(one.spec).values
     assert values["adjusted_force_min"].value <= 8.2
@@ -265,9 +265,9 @@ def test_an_adjustment_is_judged_at_both_ends_whichever_is_required(force):
 
 def test_one_end_that_is_not_reached_is_missed():
     asked = request(force="8 N", ripple="4 %", envelope="[150 mm, 120 mm, 30 mm]", adjustable="[8 N, 12 N]")
-    good = made(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
+    good = make_proposal(ProposalJob("vcfm", first("vcfm", asked), asked, 0))
     preloads = tuple(0.5 * one for one in good.spec.analysis.preloads)
-    short = judged("vcfm", "2 Vs", good.spec.replace({"analysis.preloads": preloads}), asked)
+    short = judge_proposal("vcfm", "2 Vs", good.spec.replace({"analysis.preloads": preloads}), asked)
     assert [one for one in short.missed if one.startswith("adjusted force max")]
 
 
@@ -285,7 +285,7 @@ def test_one_end_that_is_not_reached_is_missed():
 )
 def test_the_rates_of_springs_scatter_by_five_per_cent(config, paths):
     spec = cfmkit.load(CONFIGS / f"{config}.yaml")
-    found = assumed(spec)
+    found = assume_errors(spec)
     assert set(found.rates) <= paths
     assert found.rates
     for one in Parts.assumed(spec, 0).parameters:
@@ -362,7 +362,7 @@ def test_the_links_of_springs_at_pins_bear_them_by_formulas_of_their_own(hystere
     """Moments from the springs' turns along the curve, bars of the sheet in its file."""
     keys = LINKAGE | ({} if hysteresis is None else {"hysteresis": hysteresis})
     asked = read_request(None, keys).request()
-    one = made(ProposalJob("slider-crank", first("slider-crank", asked, "springs at pins"), asked, 0))
+    one = make_proposal(ProposalJob("slider-crank", first("slider-crank", asked, "springs at pins"), asked, 0))
     assert one.text, one.message
     spec, result = one.spec, cfmkit.analyze(one.spec)
     mechanism, extra = spec.mechanism, result.curve.extra
@@ -406,7 +406,7 @@ def test_a_safety_factor_is_required_of_stresses_and_leaves_less_strength_to_the
     assert usual.safety == 1.5
     assert usual.strength_used == pytest.approx(request().strength_used / 1.5)
     result = cfmkit.analyze("configs/vcfm_pla.yaml")
-    rows = {one["metric"]: one for one in demanded(usual, result, None, ())}
+    rows = {one["metric"]: one for one in list_requirements(usual, result, None, ())}
     assert rows["safety_factor"]["min"] == "1.5"
 
 
@@ -432,7 +432,7 @@ def test_a_verdict_names_what_fails_or_is_open(proposal, verdict):
 def test_a_mechanism_whose_springs_are_stretched_too_far_is_no_proposal():
     """It misses no number that was required: only a warning says it."""
     spec = cfmkit.load("configs/cam.yaml").replace({"mechanism.springs.max_elongation": 0.05})
-    found = judged("cam", "2 springs", spec, request(force="50 N", travel="100 mm", envelope="[1 m, 1 m]"))
+    found = judge_proposal("cam", "2 springs", spec, request(force="50 N", travel="100 mm", envelope="[1 m, 1 m]"))
     assert found.fails == ("springs",)
     assert found.missed[0].startswith("spring_overstretched: ")
     assert found.near

@@ -20,7 +20,7 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
-from cfmkit.families.vcfm.leaves.laws_in_rows import stacked
+from cfmkit.families.vcfm.leaves.laws_in_rows import stack_laws
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
@@ -34,10 +34,10 @@ from cfmkit.metrics import Window, evaluate
 from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.results import Status
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
-from cfmkit.studies.plan import Draw, sampled
+from cfmkit.studies.plan import Draw, sample_axes
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.variants_in_rows import evaluate_rows
 from cfmkit.studies.varied_axes import axes, collect_variations
@@ -230,7 +230,7 @@ NAMES = (*IN_WINDOW, "static_balance", *QUANTITIES)
 def test_rows_have_the_numbers_of_their_points(model, window):
     spec = table_i(f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]")
     ranges = {path: item for path, item in RANGES.items() if not path.endswith("modulus")}
-    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
+    plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
     many = Work(Study(spec, plan.paths, metrics_of(spec, NAMES)), plan)
     assert many.vectorised
     together = run(many)
@@ -254,7 +254,7 @@ def test_rows_have_the_warnings_of_their_points(model, window, preloads):
         preloads=preloads,
     )  # fmt: skip
     ranges = RANGES | {"mechanism.bistable.angle": "4 deg:17 deg", "mechanism.bistable.thickness": "0.4 mm:4 mm"}
-    plan = sampled(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
+    plan = sample_axes(axes(spec, collect_variations(ranges), drawn=True), Draw("sobol", 64))
     many = Work(Study(spec, plan.paths, metrics_of(spec, ["force_mean", "rise"])), plan)
     assert many.vectorised
     together, seen = run(many), set()
@@ -445,14 +445,14 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     """Before thin leaves buckle, too: 1/500 of the rise at Q = 40. To 1e-6 of the peak, up to three times the rise."""
     from cfmkit.elastica import Control, Displacement, trace
     from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
-    from cfmkit.families.vcfm.interpolated_equilibrium_path import traced
+    from cfmkit.families.vcfm.interpolated_equilibrium_path import trace_leaf
 
     rise = 4.265427 * MM
     spec = table_i(
         f"mechanism.bistable.thickness={rise / slenderness} m", f"mechanism.bistable.structure={structure}",
         "analysis.fidelity=exact",
     )  # fmt: skip
-    found = traced(leaf_network(spec), "shuttle", top * rise)
+    found = trace_leaf(leaf_network(spec), "shuttle", top * rise)
     onset, draw = found.edges[1], np.random.default_rng(7)
     places = np.sort(np.concatenate([draw.uniform(0, onset, 20), draw.uniform(0, top * rise, 60)]))
     path = trace(leaf_network(spec), Displacement("shuttle", DOWN, places), Control(tolerance=1e-8))
@@ -531,7 +531,7 @@ def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
     assert leaf.negative_stiffness == pytest.approx(bar.negative_stiffness, rel=1e-4)
     assert leaf.balance == bar.balance
     assert not leaf.buckled(travel).any()
-    two = stacked([leaf, ForceAndStress(replace(LEAF, thickness=2e-3))])
+    two = stack_laws([leaf, ForceAndStress(replace(LEAF, thickness=2e-3))])
     assert two.force(travel)[1] == pytest.approx(2.0 * leaf.force(travel)[0], rel=1e-12)
     assert two.state(travel)[1].shape == two.buckled(travel).shape == (2, 9)
     assert two.balance[:, 0].tolist() == [bar.balance] * 2
@@ -693,7 +693,7 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
     )
     variants = [spec.replace({"mechanism.bistable.width": width}) for width in (6e-3, 7e-3)]
     ((_, found),) = solve_rows(variants)
-    low, high = np.array([between(spec.analysis.window, (0.0, spec.travel)) for spec in variants]).T
+    low, high = np.array([window_places(spec.analysis.window, (0.0, spec.travel)) for spec in variants]).T
     mean = metric_of_branches("force_mean", {"load": found.branches["load"].within((low, high))})["load"]
     expected = [evaluate(cfmkit.analyze(one), ["force_mean"])["force_mean"].value for one in variants]
     assert mean.tolist() == pytest.approx(expected, rel=1e-12)

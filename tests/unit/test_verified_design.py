@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
-from cfmkit.studies.verify_design_by_solid_model import verified
+from cfmkit.studies.verify_design_by_solid_model import verify_by_solid
 
 QUICK = ("analysis.solid.poses=9", "analysis.solid.error=0.1", "analysis.points=61", "design.verify=solid")
 
@@ -40,7 +40,7 @@ def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
         return replace(found, curves=tuple(replace(one, effort=1.04 * one.effort) for one in found.curves))
 
     monkeypatch.setattr("cfmkit.families.vcfm.plane_fem_analysis.analyze", stiffer)
-    found = verified(spec, Design(spec, Status.COMPLETE), Run())
+    found = verify_by_solid(spec, Design(spec, Status.COMPLETE), Run())
     mean = found.search["verified_solid_before"].quantity.value
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(11.15 / mean)
     for path in ("mechanism.bistable.width", "mechanism.positive.width"):
@@ -50,7 +50,7 @@ def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
 
 def test_a_design_that_cannot_be_a_solid_is_refused_in_a_sentence():
     spec = cfmkit.load("configs/cam.yaml")
-    found = verified(spec, Design(spec, Status.COMPLETE), Run())
+    found = verify_by_solid(spec, Design(spec, Status.COMPLETE), Run())
     assert found.status is Status.INVALID
     assert found.message.startswith("design.verify: this design cannot be analysed as a solid")
 
@@ -58,7 +58,7 @@ def test_a_design_that_cannot_be_a_solid_is_refused_in_a_sentence():
 def test_no_design_stays_no_design():
     spec = cfmkit.load("configs/vcfm_pla.yaml")
     found = Design(None, Status.INFEASIBLE, "why")
-    assert verified(spec, found, Run()) is found
+    assert verify_by_solid(spec, found, Run()) is found
 
 
 PUSHED = """
@@ -87,7 +87,7 @@ def test_under_a_load_the_widths_make_the_solid_as_stiff_as_the_beams_over_the_t
         return analyze(given.replace({"analysis.fidelity": "inextensible", "mechanism.width": 0.0066}), run)
 
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", stiffer)
-    found = verified(spec, Design(spec, Status.COMPLETE), Run())
+    found = verify_by_solid(spec, Design(spec, Status.COMPLETE), Run())
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(1 / 1.1, rel=1e-4)
     assert found.spec.at("mechanism.width") == pytest.approx(0.006 / 1.1, rel=1e-4)
     (reported,) = (text for word, text in found.notes if word == "verify")
@@ -122,7 +122,7 @@ def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_windo
         return analyze(given.replace(stiffer), run)
 
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", other)
-    made = verified(spec, design(spec, Run()), Run())
+    made = verify_by_solid(spec, design(spec, Run()), Run())
     sense = 1.0 if "4 mm" in window else -1.0
     solid = api.evaluate(cfmkit.analyze(made.spec), ["nominal_force"])["nominal_force"].value
     assert solid == pytest.approx(sense * 20.0, rel=1e-6)
@@ -145,7 +145,7 @@ def test_a_solid_from_a_sheet_is_made_of_another_force_and_says_that_margins_are
         return analyze(given.replace(thinner | {"analysis.fidelity": "extensible"}), run)
 
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", softer)
-    made = verified(spec, design(spec, Run()), Run())
+    made = verify_by_solid(spec, design(spec, Run()), Run())
     (reported,) = (text for word, text in made.notes if word == "verify")
     assert "it is designed for 20.408 N instead of 20 N" in reported  # 20 N / 0.98
     assert ("the margins of design.yield are not repeated" in reported) == (share is not None)

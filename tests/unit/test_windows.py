@@ -9,7 +9,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import InputError, SpecError
 from cfmkit.results import WINDOW_OUTSIDE
-from cfmkit.specs.units import Place, TravelShare, between
+from cfmkit.specs.units import Place, TravelShare, window_places
 
 # (specification, travel, a metric): one of every family and kind of motion
 FAMILIES = {
@@ -133,6 +133,6 @@ def test_a_share_is_never_a_place_of_the_same_number():
 
 
 def test_the_travel_may_go_down_and_a_window_without_width_is_refused():
-    assert between((TravelShare(0.1), TravelShare(1.0)), (0.0, -0.02)) == (-0.02, -0.002)
+    assert window_places((TravelShare(0.1), TravelShare(1.0)), (0.0, -0.02)) == (-0.02, -0.002)
     with pytest.raises(InputError, match="150 mm and 100 % has no width"):
-        between((Place(0.15), TravelShare(1.0)), (0.0, 0.15))
+        window_places((Place(0.15), TravelShare(1.0)), (0.0, 0.15))

@@ -186,9 +186,9 @@ def test_a_problem_can_be_put_at_any_path() -> None:
 def test_the_two_parsers_see_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     from cfmkit.specs.yamlio import tree_builder
 
-    fast = tree_builder.read(GOOD)
+    fast = tree_builder.read_text(GOOD)
     monkeypatch.setattr(tree_builder, "_LOADERS", tree_builder._LOADERS[-1:])
-    assert tree_builder.read(GOOD) == fast
+    assert tree_builder.read_text(GOOD) == fast
 
 
 # Families

@@ -148,10 +148,10 @@ def test_any_option_is_read_or_refused(option: str) -> None:
 @settings(max_examples=200, deadline=None)
 @given(mutated())
 def test_the_fast_parser_and_the_one_in_python_never_read_one_text_differently(text: str) -> None:
-    fast = tree_builder.read(text)
+    fast = tree_builder.read_text(text)
     both, tree_builder._LOADERS[:] = list(tree_builder._LOADERS), tree_builder._LOADERS[-1:]
     try:
-        slow = tree_builder.read(text)
+        slow = tree_builder.read_text(text)
     finally:
         tree_builder._LOADERS[:] = both
     if not fast.faults and not slow.faults:

@@ -7,7 +7,7 @@ import pytest
 import cfmkit
 from cfmkit.documents.document import Written
 from cfmkit.documents.suggestion_document import document_of
-from cfmkit.documents.terminal import page, printed
+from cfmkit.documents.terminal import page, print_blocks
 from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.families.base import function_named
@@ -17,7 +17,7 @@ from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.studies.parts.near_parts import expected_shares
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging
-from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made, redesigned
+from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, make_proposal, redesign_for_yield
 from cfmkit.studies.suggest.search import _key, _Making, _Times
 from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, moved_for_yield
 
@@ -79,7 +79,7 @@ def test_for_a_yield_the_thickest_leaves_come_first(name, keys):
 def test_a_yield_that_the_modulus_rules_out_is_said_to_be_so_with_what_to_do():
     keys = {"force": "20 N", "travel": "5 mm", "envelope": "[200 mm, 150 mm, 30 mm]", "material": "pla"}
     asked = request(**keys, process="fdm", ripple="6 %", **{"yield": "60 %"})
-    one = made(ProposalJob("vcfm", offered("vcfm", asked)[0], asked, 0))
+    one = make_proposal(ProposalJob("vcfm", offered("vcfm", asked)[0], asked, 0))
     assert one.near, one.missed or one.message
     assert not one.movable
     # 1 - 0.975/1.025 of 4 GPa, out of 1.6 to 4 GPa
@@ -114,7 +114,7 @@ def test_more_is_requested_where_fewer_drawn_parts_are_good_than_first_order_has
         missed, share = next(outcomes)
         return Proposal("vcfm", "2 Vs", near.text, missed, numbers={"yield": share}, movable=bool(missed))
 
-    found = redesigned(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
+    found = redesign_for_yield(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
     assert asked == [0.8, pytest.approx(0.85)]
     assert found.good
     assert found.notes[0].startswith("designed with margins: yield")
@@ -126,7 +126,7 @@ def test_what_margins_do_not_reach_names_the_largest_yield_and_the_costliest_tol
     def judge(_spec):
         return Proposal("vcfm", "2 Vs", near.text, ("yield 58 %",), numbers={"yield": 0.58}, movable=True)
 
-    found = redesigned(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
+    found = redesign_for_yield(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
     assert found.near
     assert not found.movable
     assert found.numbers["yield"] == 0.58
@@ -140,7 +140,7 @@ def test_what_moves_out_of_the_room_for_a_yield_stays_as_it_was(near, monkeypatc
     def judge(_spec):
         return Proposal("vcfm", "2 Vs", near.text, ("needs 82 mm across the travel: 80 mm given",))
 
-    found = redesigned(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
+    found = redesign_for_yield(near, Candidate("2 Vs", near.spec), request(**{"yield": "80 %"}), Run(), judge)
     assert found.numbers["yield"] == 0.5
     assert "needs 82 mm" in found.missed[0]
 
@@ -189,7 +189,7 @@ def test_the_page_says_how_the_search_ended_and_v_how_long_it_took():
         "warnings": [],
     }
     document = document_of(data | {"suggest": {}}, ExitCode.OK, Written("out", (), 94.7))
-    short, full = (printed(page(document, 80, everything), 80) for everything in (False, True))
+    short, full = (print_blocks(page(document, 80, everything), 80) for everything in (False, True))
     assert short.startswith("suggest   3 mechanisms meet the requirements\n")
     assert "the time budget ended the search before everything was tried" in " ".join(short.split())
     assert "94.70 s" in full

@@ -57,9 +57,9 @@ class AnalyzeOptions(Computing, Measuring):
 def run(options: AnalyzeOptions, terminal: Terminal) -> Document:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; with --data also a measured curve."""
     from cfmkit.cli.run_spec_and_print_page import execute
-    from cfmkit.runs.run import Verb, analysed
+    from cfmkit.runs.run import Verb, run_analysis
 
-    work, inputs = analysed, {}
+    work, inputs = run_analysis, {}
     words: tuple[str, ...] = ()
     if options.data is not None:
         inputs, words = data_record(options.data), ("--data", options.data, *chain(*measuring_words(options)))
@@ -85,9 +85,9 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
         comparison_warnings,
         shortfall,
     )
-    from cfmkit.runs.run import analysed
+    from cfmkit.runs.run import run_analysis
 
-    found = analysed(spec, run)
+    found = run_analysis(spec, run)
     if not found.result.curves:
         return found
     comparison = compare(found.result, source)

@@ -98,7 +98,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
     from cfmkit.cli.progress import watching
     from cfmkit.documents.batch_document import document_of
     from cfmkit.documents.document import Note, Written
-    from cfmkit.runs.batch import batch, unreached
+    from cfmkit.runs.batch import batch, list_unreached_options
     from cfmkit.studies.batch_sources_and_outcomes import message
 
     start = run_study_in_folder.now()
@@ -135,12 +135,12 @@ def run(options: BatchOptions, terminal: Terminal) -> Document:
         document,
         data=dict(found.summary)
         | written.data
-        | {"junit": options.junit, "reused": _reused(found.entries)}
+        | {"junit": options.junit, "reused": _count_reused(found.entries)}
         | ({"accepted": found.accepted} if found.accepted else {}),
         notes=(*document.notes, *named),
         complaints=(
             *_complaints(found, options, terminal),
-            *unreached(found.entries, options.changes),
+            *list_unreached_options(found.entries, options.changes),
             *(_annotations(found) if options.annotations else ()),
         ),
         quiet_complaints=() if found.exit_code is ExitCode.OK else (message(found.entries),),
@@ -190,5 +190,5 @@ def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -
         yield f"interrupted  {left} of {len(found.entries)} specs were not run; {go_on(options.fresh)}"
 
 
-def _reused(entries: Sequence[Entry]) -> int:
+def _count_reused(entries: Sequence[Entry]) -> int:
     return sum(one.reused for one in entries)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
-from cfmkit.documents.document import BAD, GOOD, Document, Span, whole_line, within
+from cfmkit.documents.document import BAD, GOOD, Document, Span, format_bounds, whole_line
 from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Checked:
 def run(options: CheckOptions, terminal: Terminal) -> Document:
     """Check specs without computing anything: every problem of every file, with its line and column."""
     files = _files(options.specs)
-    found = [_checked(name, options.changes, len(files) > 1, terminal.excerpts) for name in files]
+    found = [_check_file(name, options.changes, len(files) > 1, terminal.excerpts) for name in files]
     bad = sum(item.spec is None for item in found)
     message = f"{bad} of {len(found)} files are not valid" if bad else ""
 
@@ -68,7 +68,7 @@ def _files(named: list[str]) -> list[str]:
     return found
 
 
-def _checked(name: str, changes: tuple[str, ...], of_many: bool, excerpts: bool) -> Checked:
+def _check_file(name: str, changes: tuple[str, ...], of_many: bool, excerpts: bool) -> Checked:
     from cfmkit.runs.specfile import bind, read_spec
 
     try:
@@ -100,4 +100,4 @@ def _lines(found: list[Checked], everything: bool) -> Iterator[TextLine]:
         about = f"       {item.spec.family}  {' '.join(item.spec.name.split())}"
         yield whole_line(name, Span("ok", GOOD), about)
         for one in item.spec.requirements if everything else ():
-            yield whole_line(f"    {one.metric} {within({'min': one.min, 'max': one.max})}")
+            yield whole_line(f"    {one.metric} {format_bounds({'min': one.min, 'max': one.max})}")

@@ -38,13 +38,13 @@ class DesignOptions(Computing):
 def run(options: DesignOptions, terminal: Terminal) -> Document:
     """Design a mechanism for the targets of its spec, analyse it, and draw the parts to cut or print."""
     from cfmkit.cli.run_spec_and_print_page import execute
-    from cfmkit.runs.run import Verb, designed
+    from cfmkit.runs.run import Verb, run_design
     from cfmkit.studies.serial_and_cluster_executors import cores
 
     budget = None if options.time_budget is None else seconds(options.time_budget)
     running = partial(long_run, options.jobs or cores(), options.fresh, budget=budget)
     return execute(
-        Verb("design", "designed and analysed", designed, running=running), options, terminal, options.report
+        Verb("design", "designed and analysed", run_design, running=running), options, terminal, options.report
     )
 
 

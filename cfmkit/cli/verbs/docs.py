@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.guide import look_for, page, pages, search
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.documents.document import Document, Paragraph, Verbatim, field, listed
+from cfmkit.documents.document import Document, Paragraph, Verbatim, field, record_table
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def run(options: DocsOptions, terminal: Terminal) -> Document:
     records = [{"name": item.name, "title": item.title, "path": str(item.path)} for item in listing]
     fields = (field("name"), field("title", wraps=True))
     where = Paragraph("files", f"{listing[0].path.parent}; a link to FILE.md in a page is `cfmkit docs FILE`")
-    return Document({"pages": records}, (*listed("pages", records, fields), where))
+    return Document({"pages": records}, (*record_table("pages", records, fields), where))
 
 
 def _search(word: str) -> Document:
@@ -67,7 +67,7 @@ def _search(word: str) -> Document:
         if targets := look_for(word):
             yield Paragraph("see", ", ".join(targets))
         columns = (field("page"), field("section", wraps=True), field("line", "", wraps=True))
-        yield from listed("", records[:MAX_SECTIONS], columns)
+        yield from record_table("", records[:MAX_SECTIONS], columns)
         if (more := len(records) - MAX_SECTIONS) > 0:
             yield Paragraph("more", f"{more} sections; --json has all")
         yield Paragraph("read", f"`cfmkit docs {records[0]['page']}` prints a page")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.cli.options import Common
-from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, listed
+from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, record_table
 from cfmkit.store.lock import SOFT_LOCK
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _families() -> Iterator[Record]:
     """Yield every family that is offered, with what is wrong with it."""
     from cfmkit import families
 
-    for offer, found in families.examined():
+    for offer, found in families.examine_families():
         package, version = ("cfmkit", __version__) if offer is None else (offer.package, offer.version)
         about = {"package": package, "version": version}
         if isinstance(found, str):
@@ -165,19 +165,23 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
 def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield TextLine((Span("cfmkit doctor", LABEL), Span("  what this installation has")))
     versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
-    yield from listed("versions", versions, (field("name"), field("version", wraps=True)))
-    yield from listed("packages", found["packages"], (field("name"), Field("version", _version)))
+    yield from record_table("versions", versions, (field("name"), field("version", wraps=True)))
+    yield from record_table("packages", found["packages"], (field("name"), Field("version", _version)))
     access = Field("", lambda one: "writable" if one["writable"] else "cannot be written to")
-    yield from listed("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
+    yield from record_table("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
     locks = {True: "by the operating system", False: f"none: the file {SOFT_LOCK} marks a live run", None: "not tried"}
-    yield from listed("file locks here", [{"locks": locks[found["locks"]["native"]]}], (field("locks", wraps=True),))
-    yield from listed("beam engine", [{"engine": _engine(found["solver"])}], (field("engine", wraps=True),))
+    yield from record_table(
+        "file locks here", [{"locks": locks[found["locks"]["native"]]}], (field("locks", wraps=True),)
+    )
+    yield from record_table("beam engine", [{"engine": _engine(found["solver"])}], (field("engine", wraps=True),))
     fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is incomplete"}
-    yield from listed("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
+    yield from record_table("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
     size = Field("size", lambda one: f"{one['files']} files, {one['megabytes']} MB")
-    yield from listed("caches (may be deleted)", found["caches"], (field("name"), size, field("path", wraps=True)))
+    yield from record_table(
+        "caches (may be deleted)", found["caches"], (field("name"), size, field("path", wraps=True))
+    )
     state = Field("state", lambda one: one["reason"] or one["state"], wraps=True)
-    yield from listed("families", found["families"], (field("name"), field("package"), field("version"), state))
+    yield from record_table("families", found["families"], (field("name"), field("package"), field("version"), state))
     reported = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
     yield Verbatim("\n".join(["", *reported, ""]))
 

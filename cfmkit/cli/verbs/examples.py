@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
-from cfmkit.documents.document import BAD, GOOD, Document, Paragraph, field, listed, next_command
+from cfmkit.documents.document import BAD, GOOD, Document, Paragraph, field, next_command, record_table
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Document:
     if options.run is not None:
         if options.name is not None or options.out is not None:
             raise UsageError("--run keeps nothing: it takes neither NAME nor --out")
-        return _checked(options.run, options, terminal)
+        return _check_examples(options.run, options, terminal)
     if options.name is not None:
         written = [str(path) for path in copy(options.name, options.out or ".", options.schema is not False)]
         verb = _verb(options.name, written[0])
@@ -71,7 +71,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Document:
         raise UsageError("--out and --schema are for a copy: name an example")
     records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
     fields = (field("name"), field("family"), field("about", wraps=True))
-    return Document({"examples": records}, tuple(listed("examples", records, fields)))
+    return Document({"examples": records}, tuple(record_table("examples", records, fields)))
 
 
 def _verb(name: str, path: str) -> str:
@@ -90,7 +90,7 @@ def _verb(name: str, path: str) -> str:
     return "design" if family(kind).design and getattr(spec, "design", None) is not None else "analyze"
 
 
-def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Document:
+def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> Document:
     """Return the outcome of examples that were run in a folder that is gone afterwards, the quick ones first."""
     from tempfile import TemporaryDirectory
 
@@ -118,7 +118,7 @@ def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Documen
     wrong = [one for one in records if one["exit_code"] != 0]
     reported = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
     page = (
-        *listed("examples", records, (field("name"), field("status"), field("message", wraps=True))),
+        *record_table("examples", records, (field("name"), field("status"), field("message", wraps=True))),
         Paragraph("verdict", reported, BAD if wrong else GOOD),
     )
     return Document({"message": reported, "examples": records}, page, found.exit_code)

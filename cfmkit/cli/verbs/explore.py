@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.failures import Stopped, told
+from cfmkit.cli.failures import Stopped, report_failure
 from cfmkit.cli.options import Changing, argument, flag, option
 from cfmkit.documents.document import Document, line, whole_line
 from cfmkit.store.safe_disk_changes import reason
@@ -47,7 +47,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Document:
         raise UsageError(f"--port: {options.port} is not allowed: must be <= 65535")
     explorer = Explorer.of(options.spec, options.changes)
     try:
-        server = ExplorerServer(explorer, options.port, lambda error: told(error, terminal))
+        server = ExplorerServer(explorer, options.port, lambda error: report_failure(error, terminal))
     except OSError as error:
         raise UsageError(f"--port: {options.port} cannot be listened on: {reason(error)}") from None
     with server:

@@ -48,7 +48,7 @@ def run(options: ExportOptions, terminal: Terminal) -> Document:
     """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
     from cfmkit.cli.run_spec_and_print_page import folder_of
     from cfmkit.documents.run_document import warning_of
-    from cfmkit.runs.exported_files import exported
+    from cfmkit.runs.exported_files import export_files
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder
@@ -56,7 +56,7 @@ def run(options: ExportOptions, terminal: Terminal) -> Document:
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
-        drawn, drawing, failed = exported(spec, options.kerf, options.tolerance, options.format)
+        drawn, drawing, failed = export_files(spec, options.kerf, options.tolerance, options.format)
         for name, data in drawn.items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal.arguments)

@@ -140,13 +140,13 @@ def _numbers(report: MeasureReport, heading: str) -> PageTable:
 
     heads = ("", "raw", "filtered" if report.source.filtered else "")
     rows = []
-    for name in _shown(report):
+    for name in _shown_warnings(report):
         raw, smooth = report.numbers.raw[name], report.numbers.filtered.get(name)
         rows.append((words(name), _short(raw), _short(smooth) if smooth else ""))
     return PageTable(heading, tuple(GridColumn(head, wraps=not at) for at, head in enumerate(heads)), tuple(rows))
 
 
-def _shown(report: MeasureReport) -> list[str]:
+def _shown_warnings(report: MeasureReport) -> list[str]:
     from cfmkit.experiment.coverage import UNKNOWN
 
     curve = report.source.raw[0]

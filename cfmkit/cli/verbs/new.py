@@ -77,11 +77,13 @@ def template(name: str) -> str:
         If there is no such family, or it comes without a template.
     """
     from cfmkit.families import family
-    from cfmkit.families.base import packaged
+    from cfmkit.families.base import read_packaged
     from cfmkit.specs.keys_and_schema import keys
 
     record = family(name)
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
     kinds = {key.path: key.kind for key in keys(record.spec_type)}
-    return re.sub(r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), packaged(record.template))
+    return re.sub(
+        r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), read_packaged(record.template)
+    )

@@ -19,7 +19,7 @@ from cfmkit.documents.document import (
     TextLine,
     field,
     line,
-    listed,
+    record_table,
 )
 from cfmkit.errors import ExitCode
 from cfmkit.runs.papers import VERDICTS
@@ -50,9 +50,9 @@ class PapersOptions(Common):
 def run(options: PapersOptions, terminal: Terminal) -> Document:
     """Recompute the numbers printed in the papers and report which agree; exit 5 if a verdict does not hold."""
     from cfmkit.cli.progress import watching
-    from cfmkit.runs.papers import check, chosen
+    from cfmkit.runs.papers import check, choose_rows
 
-    asked = chosen(options.name)
+    asked = choose_rows(options.name)
     records: list[dict[str, Any]] = []
     with watching(terminal, "rows") as progress:
         progress.total(len(asked))
@@ -87,7 +87,7 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, v
     yield BLANK
     yield Paragraph("verdict", reported, BAD if "do not hold" in reported else GOOD)
     named = [{"count": str(n), "verdict": verdict, "meaning": VERDICTS[verdict]} for verdict, n in counts.items()]
-    yield from listed("", named, (field("count"), field("verdict"), field("meaning", wraps=True)))
+    yield from record_table("", named, (field("count"), field("verdict"), field("meaning", wraps=True)))
 
 
 def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[Block]:
@@ -100,17 +100,17 @@ def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[
         Field("here", _here, wraps=True),
         Field("verdict", lambda one: "DOES NOT HOLD" if one["trouble"] else one["verdict"]),
     )
-    yield from listed(title, shown, fields)
+    yield from record_table(title, shown, fields)
     silent = sum(len(one["printed"]) for one in records) - sum(len(one["printed"]) for one in shown)
     if silent:
         yield line(f"  and {silent} inputs, which are as printed (-v lists them)", FAINT)
     reasons = [one for one in shown if one["why"] and (verbose or one["verdict"] in ("misprint", "disagrees"))]
-    yield from listed(
+    yield from record_table(
         "reasons", reasons, (field("place", ""), field("what", "", wraps=True), field("why", "", wraps=True))
     )
     if verbose:
         commands = [one for one in shown if one["command"]]
-        yield from listed(
+        yield from record_table(
             "commands", commands, (field("place", ""), field("what", "", wraps=True), field("command", "", wraps=True))
         )
 

@@ -32,7 +32,7 @@ def run(options: SchemaOptions, terminal: Terminal) -> Document:
 
     if options.family is not None:
         return _answer(schema([families.family(options.family)]))
-    return with_skipped_families(families.skipped(), _answer(schema(families.records())))
+    return with_skipped_families(families.list_skipped(), _answer(schema(families.records())))
 
 
 def _answer(found: dict[str, Any]) -> Document:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.documents.document import BLANK, GOOD, Document, Paragraph, field, listed, with_skipped_families
+from cfmkit.documents.document import BLANK, GOOD, Document, Paragraph, field, record_table, with_skipped_families
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class ShowOptions(Common):
 def run(options: ShowOptions, terminal: Terminal) -> Document:
     """Explain a family with every key; list units, metrics, materials, stock or papers; or explain one word."""
     from cfmkit.cli.show_by_meaning import explain_by_meaning
-    from cfmkit.cli.show_topics import explain, skipped
+    from cfmkit.cli.show_topics import explain, list_skipped_families
 
     if options.figure is not None:
         return _copy_drawing(options.topic, options.figure)
@@ -56,7 +56,9 @@ def run(options: ShowOptions, terminal: Terminal) -> Document:
         answer = by_meaning
     if options.topic and set(answer.data) == {"terms"}:
         answer = explain_by_meaning(options.topic) or answer
-    return with_skipped_families(skipped(options.topic), replace(answer, data={"show": options.topic, **answer.data}))
+    return with_skipped_families(
+        list_skipped_families(options.topic), replace(answer, data={"show": options.topic, **answer.data})
+    )
 
 
 def _refer_to_help(name: str | None) -> None:
@@ -89,7 +91,7 @@ def _copy_drawing(name: str | None, given: str) -> Document:
     with reporting(path):
         write_new(path, files[path.suffix.lower()])
     page = (
-        *listed("", rows, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
+        *record_table("", rows, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
         BLANK,
         Paragraph("written", visible(str(path)), GOOD),
     )

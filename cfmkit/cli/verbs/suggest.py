@@ -179,7 +179,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
         complaints=tuple(_bugs(found.bugs, terminal.tracebacks)),
         quiet_complaints=complaints,
     )
-    return with_skipped_families(families.skipped(), document)
+    return with_skipped_families(families.list_skipped(), document)
 
 
 def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
-def without_contacts(mesh: Discretisation) -> Discretisation:
+def open_all_contacts(mesh: Discretisation) -> Discretisation:
     """Return the arrays of a network in which every contact is open: forces of contacts are held at zero."""
     if not mesh.contacts:
         return mesh
@@ -30,7 +30,7 @@ def without_contacts(mesh: Discretisation) -> Discretisation:
 def with_closed(mesh: Discretisation, closed: frozenset[int]) -> Discretisation:
     """Return the arrays of a network in which some contacts are closed, by their numbers, and all others open."""
     if not closed:
-        return without_contacts(mesh)
+        return open_all_contacts(mesh)
     contacts = tuple(contact._replace(closed=number in closed) for number, contact in enumerate(mesh.contacts))
     held = [contact.unknown for contact in contacts if not contact.closed]
     return replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
@@ -95,7 +95,7 @@ class ContactEquations(NumpyEquations):
 
     def stiffen(self, mesh: Discretisation) -> ContactEquations:
         """Return the equations of the same network with another flexibility along its beams."""
-        return ContactEquations(mesh, self.ramp, plain=self.plain.stiffen(without_contacts(mesh)))
+        return ContactEquations(mesh, self.ramp, plain=self.plain.stiffen(open_all_contacts(mesh)))
 
     def gradient(self, free: Any, way: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""

@@ -68,10 +68,10 @@ def follow_in_contact(
         for number, contact in enumerate(problem.mesh.contacts)
         if contact.slide >= 0 or problem.values(start.x, start.drive)[contact.unknown] > FORCE_ROUNDING
     )
-    yield from _until_full(_follow(problem, start, targets, options, branch, closed), options)
+    yield from _limit_points(_follow(problem, start, targets, options, branch, closed), options)
 
 
-def _until_full(items: Iterator[Item], options: Options) -> Iterator[Item]:
+def _limit_points(items: Iterator[Item], options: Options) -> Iterator[Item]:
     """Yield the items of a path, at most as many points as are allowed."""
     between = 0
     for item in items:

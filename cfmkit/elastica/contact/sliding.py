@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.equations import GapBounds, without_contacts
+from cfmkit.elastica.contact.equations import GapBounds, open_all_contacts
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, compute_moved_tables
@@ -97,7 +97,7 @@ class SlidingEquations(NumpyEquations):
         copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
         indices = e._replace(**copies)
         whole = replace(mesh, elements=indices)
-        return cls(whole, ramp, plain=make(replace(without_contacts(whole), moving=None), ramp))
+        return cls(whole, ramp, plain=make(replace(open_all_contacts(whole), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
         """Return the equations with other values of the unknowns that are held, (size,)."""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.terms import TERMS, Contribution, along_direction
+from cfmkit.elastica.mechanics.terms import TERMS, Contribution, force_along_direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def curve_spring(mesh: Discretisation, spring: Attached, z: Any, _share: Any, _d
     along = np.array([np.cos(item.direction), np.sin(item.direction)])
     rest = mesh.attachments.origin[spring.places[0]] + mesh.attachments.arm[spring.places[0]]
     energy, force, stiffness = item.evaluate((at.place[0] - rest) @ along * scales.length)
-    return along_direction(
+    return force_along_direction(
         at, along, energy / scales.moment, force / scales.force, stiffness * scales.length / scales.force
     )
 

@@ -146,7 +146,7 @@ def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | N
     mesh, motions = at.mesh, effort_motions(at, rates)
     stepped = at.z + 1j * COMPLEX_STEP * motions
     known = {name: value.imag / COMPLEX_STEP for name, value in partials(mesh, stepped, at.drive).items()}
-    total = _contracted(known, designs)
+    total = _contract(known, designs)
     for k, pair in enumerate(_changed_terms(designs)):
         for own in pair:
             total[:, k] += _term_slopes(own, at, motions)
@@ -155,7 +155,7 @@ def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | N
     return np.asarray(total * mesh.scales.moment / mesh.scales.drive)
 
 
-def _contracted(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
+def _contract(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
     total = 0.0
     for name, table in (designs.tables | designs.places).items():
         if np.iscomplexobj(table):

@@ -30,7 +30,7 @@ from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
-from cfmkit.elastica.model.driven_node import driven
+from cfmkit.elastica.model.driven_node import find_driven_node
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.errors import InputError
@@ -225,7 +225,7 @@ class _ArrayBuilder:
         self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
-        self.driven = driven(network, drive)
+        self.driven = find_driven_node(network, drive)
         along = self.driven is not None and self.driven[1] == FRAME_OF_DRIVE
         self.turned = {drive.node: drive.direction} if along else {}  # type: ignore[union-attr]
         self.turns = {name: body[2] for name, body in self.bodies.items()}

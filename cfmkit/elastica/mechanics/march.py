@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.equations import ContactEquations, without_contacts
+from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
@@ -69,14 +69,14 @@ def _module() -> Any:
     return _march
 
 
-def compiled() -> Any:
+def load_compiled() -> Any:
     """Return the compiled module, None if it was not built, or is switched off by `SWITCH`."""
     return None if SWITCH in os.environ else _module()
 
 
 def engine() -> str:
     """Return what the beam engine runs on: "C" or "numpy"."""
-    return "numpy" if compiled() is None else "C"
+    return "numpy" if load_compiled() is None else "C"
 
 
 def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
@@ -89,14 +89,14 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
     ramp : bool
         Whether the way is the share of what is constant instead of the drive.
     """
-    key = equations, ramp, compiled() is not None
+    key = equations, ramp, load_compiled() is not None
     if key not in mesh.known:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(KNOWN) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif mesh.contacts:
-            mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(without_contacts(mesh), ramp))
+            mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
         else:
             mesh.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(mesh, ramp)
     return mesh.known[key]  # type: ignore[no-any-return]
@@ -294,7 +294,7 @@ def march_many(
     if isinstance(own, CompiledEquations) and not own.follows:
         kept, given, some = design_arrays(own, designs), _plan_row(plan, 0, True), np.array(chosen, np.int64)
         rows = _rows(own, kept, designs.count)
-        if not compiled().march_many(rows, given, goals, efforts, codes, some, states, plan.room):
+        if not load_compiled().march_many(rows, given, goals, efforts, codes, some, states, plan.room):
             raise MemoryError
     else:
         for number in range(designs.count):
@@ -338,7 +338,9 @@ def solve_designs(designs: NetworkDesigns, free: FloatArray, drives: FloatArray,
     if isinstance(own, CompiledEquations) and not own.follows:
         kept = design_arrays(own, designs)
         rows = _rows(own, kept, designs.count)
-        if compiled().solve_many(rows, np.array(free, float, order="C"), ways, np.empty(0), found, tolerance, True):
+        if load_compiled().solve_many(
+            rows, np.array(free, float, order="C"), ways, np.empty(0), found, tolerance, True
+        ):
             raise MemoryError
     else:
         for number in range(designs.count):

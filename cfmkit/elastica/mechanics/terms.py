@@ -55,10 +55,10 @@ def slide_spring(mesh: Discretisation, spring: Attached, z: Any, share: Any, _dr
     rest = mesh.attachments.origin[spring.places[0]] + mesh.attachments.arm[spring.places[0]]
     gap = (at.place[0] - rest) @ along - share * item.free_displacement / scales.length
     stiffness = item.stiffness * scales.length / scales.force
-    return along_direction(at, along, stiffness * gap**2 / 2, stiffness * gap, stiffness)
+    return force_along_direction(at, along, stiffness * gap**2 / 2, stiffness * gap, stiffness)
 
 
-def along_direction(at: Any, along: Any, energy: Any, force: Any, stiffness: Any) -> Contribution:
+def force_along_direction(at: Any, along: Any, energy: Any, force: Any, stiffness: Any) -> Contribution:
     """Return the term of a force along a fixed direction at an attachment."""
     reach = along @ at.jacobian[0]
     hessian = stiffness * np.outer(reach, reach)

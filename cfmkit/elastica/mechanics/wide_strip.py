@@ -68,7 +68,7 @@ def curling_share(z: Any) -> tuple[Any, Any, Any]:
     [1.0, 0.994488, 0.02]
     """
     small = np.real(z) < 1.0
-    near, far = _by_series(np.where(small, z, 0.0)), _closed(np.where(small, 1.0, z))
+    near, far = _by_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
     g, first, second = (np.where(small, *pair) for pair in zip(near, far, strict=True))
     return g, first, second
 
@@ -82,7 +82,7 @@ def _by_series(z: Any) -> tuple[Any, Any, Any]:
     return g, first, second
 
 
-def _closed(z: Any) -> tuple[Any, Any, Any]:
+def _closed_form(z: Any) -> tuple[Any, Any, Any]:
     th = np.sqrt(np.sqrt(z))
     e, c, s = np.exp(-th), np.cos(th), np.sin(th)
     below = 1 + 2 * e * s - e * e

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
 
 
-def driven(network: Network, drive: Drive) -> tuple[str, int, float] | None:
+def find_driven_node(network: Network, drive: Drive) -> tuple[str, int, float] | None:
     """Return node, local degree of freedom and sense of what a drive moves; None for loads.
 
     The local number is 0, 1 or 2 in the frame of the node's support, or 3 where the frame turns along the drive.

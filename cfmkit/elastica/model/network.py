@@ -63,7 +63,7 @@ CLAMPED = Support(True, True, True)
 PINNED = Support(True, True, False)
 
 
-def guided(direction: float, rotates: bool = False) -> Support:
+def slider_support(direction: float, rotates: bool = False) -> Support:
     """Return the support of a node that slides along `direction` [rad] and, if requested, rotates."""
     return Support(along=False, across=True, rotation=not rotates, direction=direction)
 

@@ -327,7 +327,7 @@ def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
     )
 
 
-def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
+def unloaded_places(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
     """Return the places before any load, (k, 2) [m], at the fractions of `states`."""
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 

@@ -71,7 +71,7 @@ class BetweenLoads(BetweenPoints):
         return np.sort(self.own_drive[self._contacts])  # bifurcations are reported by loads: motions may be several
 
 
-def between_loads(
+def interpolate_loads(
     path: EquilibriumPath,
     node: str,
     along: float | None,

@@ -50,7 +50,7 @@ AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at 
 KNOWN = 1e-12  # share of the drive's range within which a place is that of a point
 
 
-def between_points(
+def interpolate_path(
     path: EquilibriumPath, unit: float = 1.0, axial: bool = True, allowed: float | None = None
 ) -> BetweenPoints | None:
     """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance.

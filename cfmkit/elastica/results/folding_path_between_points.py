@@ -183,6 +183,8 @@ def _largest(path: EquilibriumPath, change: FloatArray) -> float:
     return float(np.abs(change[mesh.free < mesh.n_motions]).max(initial=0.0))
 
 
-def along_the_way(path: EquilibriumPath, observe: Callable[[EquilibriumPath], Observed]) -> AlongTheWay | None:
+def interpolate_folding_path(
+    path: EquilibriumPath, observe: Callable[[EquilibriumPath], Observed]
+) -> AlongTheWay | None:
     """Return a path at every place of its way; None of one that is too short, or misses its tolerance."""
     return AlongTheWay(path, observe) if len(path) >= FEWEST and np.all(path.accurate) else None

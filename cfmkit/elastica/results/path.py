@@ -306,7 +306,7 @@ class EquilibriumPath(ShortRepr):
     def line_motion(self, beam: str) -> FloatArray:
         """Return the displacements of the sampled places of a beam, (n, k, 2) [m]."""
         found = self.states(beam)
-        rest = beam_states.unloaded(self.network, self.at, beam, self._fractions)
+        rest = beam_states.unloaded_places(self.network, self.at, beam, self._fractions)
         return read_only(np.stack([found.x, found.y], axis=-1) - rest)
 
     def shape(self, beam: str, point: int) -> FloatArray:

@@ -83,7 +83,7 @@ def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArr
     elements = [number for numbers in own for number in numbers]
     together = max(1, MAX_TOGETHER // max(1, len(elements) * len(signs) * N_GRID))
     parts = [
-        _on_elements(net, replace(at, z=at.z[k : k + together], drive=at.drive[k : k + together]), elements, signs)
+        _element_extremes(net, replace(at, z=at.z[k : k + together], drive=at.drive[k : k + together]), elements, signs)
         for k in range(0, max(1, len(at.z)), together)
     ]
     return _highest(own, parts)
@@ -120,7 +120,7 @@ def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]
     return best, np.clip(arc, 0.0, 1.0), chosen, where
 
 
-def _on_elements(net: Network, at: Equilibria, elements: list[int], signs: FloatArray) -> tuple[Any, Any, Any]:
+def _element_extremes(net: Network, at: Equilibria, elements: list[int], signs: FloatArray) -> tuple[Any, Any, Any]:
     """Return the highest stresses on each of m elements, places on their beams and on them, (m, p, c) each."""
     fractions, to_series = places(at.mesh.degree + N_MORE_PLACES)
     widths = np.array([net.beams[at.mesh.elements.beam[number]].section.width for number in elements])

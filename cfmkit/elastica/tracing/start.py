@@ -59,7 +59,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
     branch: PathBranch | None = None
     first: Buckling | None = None
     ramps = list(_ramps(mesh))
-    at_rest = NetworkProblem(_without_loads(mesh), ramp=True) if ramps else problem
+    at_rest = NetworkProblem(_remove_loads(mesh), ramp=True) if ramps else problem
     at = correct(at_rest, np.zeros(len(mesh.free)), 0.0)
     if at is None:
         return DriveStart(problem, None, (), None, None, None)
@@ -119,7 +119,7 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
     springs = [spring.item for spring in mesh.springs]
     tight = any(getattr(item, name, None) for item in springs for name in FREE)
     if tight or mesh.elements.gap.any():
-        yield "prestress", (_without_loads, True)
+        yield "prestress", (_remove_loads, True)
     if any(not load.grows for load in mesh.loads) or mesh.elements.line[:, 0].any() or mesh.base.any():
         yield "constant loads", (_loads_as_drive, False)
 
@@ -131,7 +131,7 @@ def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh
     return NetworkProblem(alter(mesh), ramp=ramp, remesh=own)
 
 
-def _without_loads(mesh: Discretisation) -> Discretisation:
+def _remove_loads(mesh: Discretisation) -> Discretisation:
     """Return the network with its supports at rest and no loads."""
     elements = mesh.elements._replace(line=np.zeros_like(mesh.elements.line))
     return replace(mesh, loads=(), elements=elements, base=np.zeros(mesh.size), rate=np.zeros(mesh.size))

@@ -347,7 +347,7 @@ def trace_on(
         points.pop()
     status, message = _explain(start, ending, unit)
     if events:
-        points = [_at_event(point, events, drive, unit) for point in points]
+        points = [_settle_event(point, events, drive, unit) for point in points]
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, points), points, told, status, message)
     if changes:
@@ -410,7 +410,7 @@ def _tell(event: PathEvent, unit: float) -> Event:
     return Event(event.kind, event.drive * unit, event.before, event.after)
 
 
-def _at_event(point: Point, events: list[PathEvent], drive: Drive, unit: float) -> Point:
+def _settle_event(point: Point, events: list[PathEvent], drive: Drive, unit: float) -> Point:
     """Return a point, which if it lies at a bifurcation is as stable as the path is on the better side of it.
 
     There the number of unstable directions is rounding.

@@ -47,7 +47,7 @@ class Requested:
     stable: Any
 
 
-def requested(path: Path) -> Requested:
+def collect_requested(path: Path) -> Requested:
     """Return a path's values at the requested points: the default of what `trace_many` collects."""
     keep = path.at_requested
     return Requested(path.drive[keep], path.effort[keep], path.stable[keep])
@@ -57,7 +57,7 @@ def trace_many(
     networks: Iterable[Network | Callable[[], Network]],
     drive: Drive,
     control: Control | None = None,
-    collect: Callable[[Path], Any] = requested,
+    collect: Callable[[Path], Any] = collect_requested,
     workers: int = 1,
 ) -> Iterator[NetworkOutcome]:
     """Yield one outcome for each network, in their order; nothing but the collected values is kept.
@@ -154,7 +154,7 @@ def _outcomes(
             except CfmError as error:
                 yield NetworkOutcome("INVALID", str(error), None)
                 continue
-            if together is None and collect is requested:
+            if together is None and collect is collect_requested:
                 together = _follow_rest(path, built, number, control)
             yield NetworkOutcome(path.status.name, path.message, collect(path))
 

@@ -69,7 +69,7 @@ class BeamRows:
         allowable = np.array([_or_nan(one.assembly.allowable_stress) for one in each])
         curves = CurveRows(
             _samples(each),
-            _padded([law.places for law in self._laws]),
+            _pad_rows([law.places for law in self._laws]),
             paths.effort,
             np.array([_or_nan(one.effort_error) for one in each]),
             np.array([_or_nan(target_of(one)) for one in each]),
@@ -79,7 +79,7 @@ class BeamRows:
             StressRows(tuple, self._stress_at, allowable, paths.largest_stress),
             kind_of(each[0]),
             None if np.isnan(pose).any() else pose,
-            _padded([law.peaks for law in self._laws], np.nan),
+            _pad_rows([law.peaks for law in self._laws], np.nan),
             traced=True,
         )
         return {"load": curves}
@@ -95,7 +95,7 @@ def _or_nan(value: float | None) -> float:
     return np.nan if value is None else float(value)
 
 
-def _padded(rows: Sequence[FloatArray], behind: float | None = None) -> FloatArray:
+def _pad_rows(rows: Sequence[FloatArray], behind: float | None = None) -> FloatArray:
     """Return rows of different lengths as one array, filled up with a value; None: with the last of each."""
     most = max(map(len, rows))
     return np.array([np.append(row, np.full(most - len(row), row[-1] if behind is None else behind)) for row in rows])
@@ -103,7 +103,7 @@ def _padded(rows: Sequence[FloatArray], behind: float | None = None) -> FloatArr
 
 def _samples(each: Sequence[Solution]) -> RowSamples:
     count = np.array([len(one.motion) for one in each])
-    return RowSamples(_padded([one.motion for one in each]), _padded([one.effort for one in each]), count)
+    return RowSamples(_pad_rows([one.motion for one in each]), _pad_rows([one.effort for one in each]), count)
 
 
 @one_blas_thread

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.results.folding_path_between_points import Observed
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,7 +79,7 @@ def window_of(solution: OnCurve) -> tuple[float, float]:
     """Return the window of the analysis in places, or the whole travel."""
     window = solution.spec.analysis.window
     if window is not None:
-        return between(window, travel_of(solution))
+        return window_places(window, travel_of(solution))
     return float(solution.motion.min()), float(solution.motion.max())
 
 

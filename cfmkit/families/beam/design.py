@@ -47,11 +47,11 @@ def design(spec: BeamSpec, run: Run) -> Design:
         Seed, progress and time budget.
     """
     if spec.design is not None and spec.design.rescale is not None:
-        return rescaled(spec, spec.design.rescale)
+        return rescale(spec, spec.design.rescale)
     if spec.design is not None and spec.design.optimise is not None:
-        from cfmkit.families.beam.shaping.design import shaped
+        from cfmkit.families.beam.shaping.design import optimise_shape
 
-        return shaped(spec, spec.design.optimise, run)
+        return optimise_shape(spec, spec.design.optimise, run)
     if spec.design is not None and spec.design.free:
         return Design(spec, Status.COMPLETE)  # as it is: its values move for the yield alone
     return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale' or 'optimise'")
@@ -69,7 +69,7 @@ STEP = 1e-5
 """Travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]."""
 
 
-def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
+def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
     """Return the specification with the changes made and the force wanted reached, or why it cannot be.
 
     Parameters
@@ -98,7 +98,7 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
             )
         if wanted.force is None:
             break
-        again, reached = _corrected(changed, wanted, force)
+        again, reached = _correct_value(changed, wanted, force)
         if reached is None:
             return Design(
                 None,
@@ -108,7 +108,7 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break
-    return Design(changed, Status.COMPLETE, _reported(spec, changed), warnings=(*found, *_stress(changed)))
+    return Design(changed, Status.COMPLETE, _report_changes(spec, changed), warnings=(*found, *_stress(changed)))
 
 
 def _force(spec: BeamSpec) -> float | None:
@@ -118,7 +118,7 @@ def _force(spec: BeamSpec) -> float | None:
     return force if force is not None and np.isfinite(force) and force != 0 else None
 
 
-def _corrected(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec, float | None]:
+def _correct_value(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec, float | None]:
     """Return the specification whose free value gives the force wanted, and that force."""
     target = math.copysign(wanted.force or 0.0, force)
     exponent = EXPONENTS[wanted.free]
@@ -128,7 +128,7 @@ def _corrected(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec,
         if not force / target > 0:
             break
         factor = (target / force) ** (1 / exponent)
-        spec = _scaled(spec, wanted.free, factor)
+        spec = _scale(spec, wanted.free, factor)
         again = _force(spec)
         if again is None:
             break
@@ -155,7 +155,7 @@ def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:
     for name, value in _sizes(mechanism).items():
         asked = getattr(wanted, name)
         if asked is not None and abs(asked / value - 1) > CLOSE:
-            spec = _scaled(spec, name, asked / value)
+            spec = _scale(spec, name, asked / value)
     return spec
 
 
@@ -183,10 +183,10 @@ def size_of(mechanism: Mechanism) -> float:
     raise ValueError("all nodes are at one place")
 
 
-def _scaled(spec: BeamSpec, name: str, factor: float) -> BeamSpec:
+def _scale(spec: BeamSpec, name: str, factor: float) -> BeamSpec:
     """Return the specification with its width, thickness or size times a factor."""
     if name == "size":
-        return _resized(spec, factor)
+        return _resize(spec, factor)
     mechanism = spec.mechanism
     beams = {
         key: beam.model_copy(update={name: _times(getattr(beam, name), factor)}) if getattr(beam, name) else beam
@@ -202,7 +202,7 @@ def _times(thickness: Thickness, factor: float) -> Thickness:
     return thickness * factor
 
 
-def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
+def _resize(spec: BeamSpec, factor: float) -> BeamSpec:
     """Return the specification with all lengths in the plane times a factor, those of part and analysis included."""
     mechanism, analysis = spec.mechanism, spec.analysis
     nodes = {name: node.model_copy(update={"at": _point(node.at, factor)}) for name, node in mechanism.nodes.items()}
@@ -254,10 +254,12 @@ def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
     place, why = _reaches_allowable_stress(spec)
     if place is None:
         return (None, why) if why else (spec, "")
-    end = _down(place)
-    ended = _windowed(spec, 0.0, end)
+    end = _round_down(place)
+    ended = _set_window(spec, 0.0, end)
     start = number_of("range_start", solve(ended))
-    return (ended if start is None or abs(_up(start)) >= abs(end) else _windowed(ended, _up(start), end)), ""
+    return (
+        ended if start is None or abs(_round_up(start)) >= abs(end) else _set_window(ended, _round_up(start), end)
+    ), ""
 
 
 def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
@@ -288,17 +290,17 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
     return None, f"the stress does not reach the allowable one, {allowable}, within a travel of {where}{more}"
 
 
-def _down(value: float) -> float:
+def _round_down(value: float) -> float:
     """Return a place rounded to a hundredth of a millimetre towards rest, as a short decimal."""
     return math.copysign(round(math.floor(abs(value) / STEP + 1e-6) * STEP, 9), value)
 
 
-def _up(value: float) -> float:
+def _round_up(value: float) -> float:
     """Return the same rounded away from rest."""
     return math.copysign(round(math.ceil(abs(value) / STEP - 1e-6) * STEP, 9), value)
 
 
-def _windowed(spec: BeamSpec, start: float, end: float) -> BeamSpec:
+def _set_window(spec: BeamSpec, start: float, end: float) -> BeamSpec:
     low, high = sorted((start, end))
     return _with_analysis(spec, travel=Place(end), window=(Place(low), Place(high)))
 
@@ -315,7 +317,7 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
     predicted = force * _force_ratio(spec.mechanism, changed.mechanism)
     if wanted.force is not None:
         target = math.copysign(wanted.force, predicted)
-        changed = _scaled(changed, wanted.free, (target / predicted) ** (1 / EXPONENTS[wanted.free]))
+        changed = _scale(changed, wanted.free, (target / predicted) ** (1 / EXPONENTS[wanted.free]))
         predicted = target
     reached = _force(changed)
     if reached is not None and abs(reached / predicted - 1) <= CLOSE:
@@ -353,7 +355,7 @@ def _stress(spec: BeamSpec) -> list[Finding]:
     ]
 
 
-def _reported(old: BeamSpec, new: BeamSpec) -> str:
+def _report_changes(old: BeamSpec, new: BeamSpec) -> str:
     """Return what was changed, in one sentence."""
     changes = []
     now = _sizes(new.mechanism)

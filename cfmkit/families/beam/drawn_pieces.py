@@ -16,8 +16,8 @@ import numpy as np
 from cfmkit.export.contours import signed_area
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
 from cfmkit.export.union import OutlinePiece
-from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
-from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored
+from cfmkit.families.beam.network_from_spec import is_on_axis, mirror_axis, moving_nodes
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -112,21 +112,21 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: fl
     pieces = [strip.piece for found in halves.values() for strip in found]
     for name, found in halves.items():
         for one, two in itertools.pairwise(found):
-            pieces += _closed([BeamEnd(name, one, True), BeamEnd(name, two, False)])
+            pieces += _close_ends([BeamEnd(name, one, True), BeamEnd(name, two, False)])
     for ends in meeting_ends(assembly, halves).values():
-        pieces += _closed(ends)
+        pieces += _close_ends(ends)
     blocks = list(_blocks(assembly, beams))
     solid = [block.shape for block in blocks]
-    eyes = [end for node, ends in meeting_ends(assembly, halves).items() if _pinned(assembly, node) for end in ends]
+    eyes = [end for node, ends in meeting_ends(assembly, halves).items() if _is_pinned(assembly, node) for end in ends]
     blocks += [
         DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE * end.thickness, bulge))
         for node, ends in meeting_ends(assembly, beams).items()
-        if _pinned(assembly, node)
+        if _is_pinned(assembly, node)
         for end in ends
     ]
     if axis is not None:
         bars = bars_between_halves(assembly, beams, *axis)
-        solid += [mirrored(shape, *axis) for shape in solid] + list(bars.values())
+        solid += [mirror_points(shape, *axis) for shape in solid] + list(bars.values())
         blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
     pieces += [OutlinePiece.polygon(shape) for shape in solid] + [_round(end, EYE) for end in eyes]
     return DrawnParts(pieces, [_round(end, HOLE) for end in eyes], blocks)
@@ -137,7 +137,7 @@ def _round(end: BeamEnd, size: float) -> OutlinePiece:
     return OutlinePiece.disc((float(end.at[0]), float(end.at[1])), size * end.thickness)
 
 
-def _pinned(assembly: Assembly, node: str) -> bool:
+def _is_pinned(assembly: Assembly, node: str) -> bool:
     """Return True if the beams at a node of either half end in eyes."""
     support = assembly.network.nodes[node.rstrip("'")].support
     return support.across and not support.rotation and not is_padded(assembly, node.rstrip("'"))
@@ -149,11 +149,11 @@ def meeting_ends(assembly: Assembly, halves: dict[str, list[BeamStrip]]) -> dict
     for name, own in halves.items():
         beam, image = assembly.network.beams[name.rstrip("'")], name.endswith("'")
         for node, end in ((beam.start, BeamEnd(name, own[0], False)), (beam.end, BeamEnd(name, own[-1], True))):
-            found.setdefault(f"{node}'" if image and not on_axis(assembly, node) else node, []).append(end)
+            found.setdefault(f"{node}'" if image and not is_on_axis(assembly, node) else node, []).append(end)
     return found
 
 
-def _closed(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
+def _close_ends(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
     """Yield what closes the ends of beams at a node.
 
     Where all beams leave to one side, more than half a turn between two of them is open: there the corners of these two
@@ -197,7 +197,7 @@ def is_padded(assembly: Assembly, node: str) -> bool:
 
     Not on the mirror axis: there the beams of the two halves meet.
     """
-    if on_axis(assembly, node):
+    if is_on_axis(assembly, node):
         return False
     found = assembly.network.nodes[node]
     linked = {link.node for link in assembly.network.links}
@@ -282,12 +282,12 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
         side, out = half * np.array([end.along[1], -end.along[0]]), -depth * end.along
         pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
         for other in ends:
-            pad = _behind(pad, other) if other is not end else pad
+            pad = _part_behind_end(pad, other) if other is not end else pad
         if len(pad) > 2 and abs(signed_area(pad)) > LEAST * depth * half:
             yield pad, end
 
 
-def _behind(shape: FloatArray, end: BeamEnd) -> FloatArray:
+def _part_behind_end(shape: FloatArray, end: BeamEnd) -> FloatArray:
     """Return what of a convex polygon (n, 2) lies behind the end of a beam [m]; nothing may be left."""
     ahead = (shape - end.at) @ end.along
     ahead = np.where(np.abs(ahead) <= STANDS * end.thickness, 0.0, ahead)
@@ -310,7 +310,7 @@ def _bar(a: FloatArray, b: FloatArray, width: float, ends: Sequence[BeamEnd] = (
     bar = np.array([a - over - side, b + over - side, b + over + side, a - over + side])
     for end in ends:
         if max(float((place - end.at) @ end.along) for place in (a, b)) <= STANDS * width:
-            bar = _behind(bar, end)
+            bar = _part_behind_end(bar, end)
     return bar
 
 
@@ -323,11 +323,11 @@ def bars_between_halves(
     found: dict[str, FloatArray] = {}
     for node in sorted(moving_nodes(assembly)):
         ends = ends_at(assembly, halves, node)
-        if not ends or on_axis(assembly, node):
+        if not ends or is_on_axis(assembly, node):
             continue
         pads = list(pads_behind(assembly, node, ends)) if is_padded(assembly, node) else []
         middle = _far_side(pads[0][0], pads[0][1]) if pads else _anchor(assembly, beams, node)
-        other = mirrored(middle[None], at, direction)[0]
+        other = mirror_points(middle[None], at, direction)[0]
         if np.hypot(*(other - middle)) > 0:
             images = ends_at(assembly, halves, f"{node}'")
             found[node] = _bar(middle, other, _shuttle(assembly) or PAD * thick, [*ends, *images])

@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.families.beam.drawn_pieces import both_halves
 from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
 from cfmkit.families.beam.part import SPARSE, strips_of
-from cfmkit.families.beam.strips_and_gaps import mirrored
+from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
 
@@ -32,7 +32,7 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
     from cfmkit.solid.stress_along_fillets import stressed_fillets
 
     spec = assembly.spec
-    beams, nodes = _named(assembly)
+    beams, nodes = _name_polygons(assembly)
     rows = []
     for one in stressed_fillets(solved, spec.mechanism.fillet):
         joined = one.arc.touched(beams)
@@ -42,16 +42,16 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
     travel = np.array([row.motion for row in rows])
     drive: Any = assembly.drive()  # through a displacement or a rotation: a solid has no other
     paths = partial(both_images, assembly.network, lambda points: replace(drive, points=points))
-    return with_nominal(rows, nominal_stresses(rows, travel, paths, partial(_described, assembly)))
+    return with_nominal(rows, nominal_stresses(rows, travel, paths, partial(_described_half, assembly)))
 
 
-def _described(assembly: Assembly, points: FloatArray) -> FloatArray:
+def _described_half(assembly: Assembly, points: FloatArray) -> FloatArray:
     """Return points of the part (m, 2), and where in the half that is described they are if they are mirrored [m]."""
     axis = mirror_axis(assembly)
-    return points if axis is None else np.concatenate([points, mirrored(points, *axis)])
+    return points if axis is None else np.concatenate([points, mirror_points(points, *axis)])
 
 
-def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
+def _name_polygons(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
     """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
     network, axis = assembly.network, mirror_axis(assembly)
     exact = EXACT * min(thinnest_of(beam.section) for beam in network.beams.values())
@@ -59,6 +59,6 @@ def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, F
     beams = {name: [polygon for strip in found for polygon in strip.polygons] for name, found in halves.items()}
     nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
     if axis is not None:
-        others = {name: mirrored(place[None], *axis)[0] for name, place in nodes.items()}
+        others = {name: mirror_points(place[None], *axis)[0] for name, place in nodes.items()}
         nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > exact}
     return beams, nodes

@@ -15,20 +15,20 @@ from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import COARSE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
-from cfmkit.families.beam.strips_and_gaps import mirrored, strips
+from cfmkit.families.beam.strips_and_gaps import mirror_points, strips
 from cfmkit.families.beam.tip_on_uneven_surface import ride
-from cfmkit.families.fem_results import numbered
+from cfmkit.families.fem_results import number_fillets
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, color_key, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.rounding_noise import vanishing
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
-from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, apply_style, axes_mm, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -102,16 +102,16 @@ def stress_map(result: Result) -> Figure:
     """Return the stress of the part as a solid at up to three poses, in one scale, with the place of its peak."""
     solution: SolidSolution = result.state
     middle = len(solution.fine.course.poses) // 2
-    views = stress_views(solution.fine, middle, numbered(solution.fillets), result.curve.motion_dimension)
+    views = stress_views(solution.fine, middle, number_fillets(solution.fillets), result.curve.motion_dimension)
     return stress_map_figure(result, views, "equivalent stress of the part as cut")
 
 
-@styled
+@apply_style
 def shapes(result: Result) -> Figure:
     """Return the mechanism to scale: as cut, and bent at several places of the travel."""
     solution: Solution = result.state
     poses = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))[1:]
-    shown, made = bodies(solution, poses, centre_line=bent), made_strips(solution.assembly)
+    shown, made = bodies(solution, poses, centre_line=centre_line), made_strips(solution.assembly)
     drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
     springs = _both(solution, spring_lines(solution.path))
     box = _box([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
@@ -189,7 +189,7 @@ def _names(solution: Solution) -> list[Label]:
 def _both(solution: Solution, lines: list[FloatArray]) -> list[FloatArray]:
     """Return lines of what is described, and those of its mirrored half."""
     axis = mirror_axis(solution.assembly)
-    return lines if axis is None else [*lines, *(mirrored(line, *axis) for line in lines)]
+    return lines if axis is None else [*lines, *(mirror_points(line, *axis) for line in lines)]
 
 
 def _box(shown: Sequence[PosedBody]) -> parts.Box:
@@ -205,7 +205,7 @@ def _supports(solution: Solution, ax: Axes) -> None:
             continue
         color = VERMILLION if name == solution.assembly.driven else INK
         here = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
-        for at in [here] if axis is None else [here, mirrored(here, *axis)]:
+        for at in [here] if axis is None else [here, mirror_points(here, *axis)]:
             ax.plot(
                 *parts.mm(at[0]), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
                 markerfacecolor=color if support.along or color != INK else "white", linestyle="", gid=f"at-{name}",
@@ -373,9 +373,9 @@ def moving(result: Result) -> Moving | None:
     if result.spec.at("analysis.fidelity") == "solid":
         return None
     solution: Solution = result.state
-    points = chosen(len(solution.keep))
+    points = choose_poses(len(solution.keep))
     made = made_strips(solution.assembly)
-    shown = bodies(solution, points, regions(solution.spec, COARSE), bent)
+    shown = bodies(solution, points, regions(solution.spec, COARSE), centre_line)
     box = _box([*made, *shown])
 
     def draw(ax: Axes, number: int) -> None:
@@ -393,7 +393,7 @@ _PLACES = 65  # of an element: more than a picture shows
 _NEAR = 1e-9  # of the size: parts shorter than this are not there
 
 
-def bent(path: Path, beam: str, point: int) -> FloatArray:
+def centre_line(path: Path, beam: str, point: int) -> FloatArray:
     """Return the centre line of a beam at a point of the path, (n, 2) [m]."""
     found = states(path.network, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _PLACES))
     line = np.stack([found.x[0], found.y[0]], axis=-1)

@@ -17,7 +17,7 @@ from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
 from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units
-from cfmkit.families.beam.scalar_results import within
+from cfmkit.families.beam.scalar_results import find_in_window
 from cfmkit.families.findings import finder, stiffer, too_soft
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
@@ -185,7 +185,7 @@ def _events(name: str, kind: str) -> FindingRule[Solution]:
     def sentence(solution: Solution) -> Sentence:
         found = places(solution)
         more = f" and {len(found) - 6} more" if len(found) > 6 else ""
-        tail = _after(solution) if kind == "bifurcation" else ""
+        tail = _describe_bifurcation(solution) if kind == "bifurcation" else ""
         return (f"{kind}{'s' if len(found) > 1 else ''} at {', '.join(found[:6])}{more}{tail}",)
 
     return FindingRule(name, lambda solution: bool(places(solution)), sentence)
@@ -200,13 +200,13 @@ def _bifurcations_under(what: str) -> FindingRule[Solution]:
 
     def sentence(solution: Solution) -> Sentence:
         stays = solution.path.stable[:1].all()
-        tail = _after(solution) if stays else "; nothing stable was found beyond"
+        tail = _describe_bifurcation(solution) if stays else "; nothing stable was found beyond"
         return (f"bifurcation under {', '.join(shares(solution))} of the {what}{tail}",)
 
     return FindingRule("bifurcation", lambda solution: bool(shares(solution)), sentence)
 
 
-def _after(solution: Solution) -> str:
+def _describe_bifurcation(solution: Solution) -> str:
     """Return the course of the curve at a bifurcation, in words."""
     if (solution.path.branch[solution.keep] == "primary").all():
         return "; the curve stays on the primary path"
@@ -285,7 +285,7 @@ def _is_overstressed(solution: Solution) -> bool:
 def _too_large_stress(solution: Solution) -> Sentence:
     """Return where the stress in the window is too large, in words."""
     names, window, shown = _beams_of_known_strength(solution), window_of(solution), solution.with_ends
-    inside = np.flatnonzero(within(shown, *window))
+    inside = np.flatnonzero(find_in_window(shown, *window))
     values = np.array([shown.stresses[name][0] for name in names])
     if not len(inside):  # the window lies between two points: the nearer one tells the place
         inside = np.array([np.abs(shown.motion - 0.5 * sum(window)).argmin()])
@@ -319,7 +319,7 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
     return FindingRule("thick_beam", is_short, sentence)
 
 
-def _hindered(solution: Solution) -> tuple[float, str]:
+def _hindered_share(solution: Solution) -> tuple[float, str]:
     """Return by what share of their energy beams that are solved as narrow ones are too soft, and where."""
     if not _has_curve(solution) or solution.spec.mechanism.wide_beams:
         return 0.0, ""
@@ -332,7 +332,7 @@ def _hindered(solution: Solution) -> tuple[float, str]:
 
 def _wide_beams(solution: Solution) -> Sentence:
     wide, narrow = "mechanism.wide_beams=true", solution.spec.analysis.modes  # frequencies are of narrow beams only
-    return too_soft(*_hindered(solution)), (wide, "analysis.modes=0") if narrow else wide
+    return too_soft(*_hindered_share(solution)), (wide, "analysis.modes=0") if narrow else wide
 
 
 def _gap_of(solution: Solution, moving: bool) -> BeamGap | None:
@@ -435,9 +435,9 @@ RULES: tuple[FindingRule[Solution], ...] = (
 LAST_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule(
         "wide_beam",
-        lambda solution: bool(too_soft(*_hindered(solution))),
+        lambda solution: bool(too_soft(*_hindered_share(solution))),
         _wide_beams,
-        lambda solution: stiffer(_hindered(solution)[0]),
+        lambda solution: stiffer(_hindered_share(solution)[0]),
     ),
     FindingRule("beams_touch", _touches, _touching_beams),
     FindingRule("gap_small", _has_small_gap, _small_gap),

@@ -35,7 +35,7 @@ _SMOOTH = re.compile(
 """Values of which every number of the network is a smooth function that takes complex ones."""
 
 
-def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
+def sample_poses(spec: BeamSpec, places: FloatArray) -> Sampled | None:
     """Return force and stress at places, each beam's own stress; None if the path does not reach them all.
 
     Parameters
@@ -45,7 +45,7 @@ def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
     places : (p,) array
         Displacements, increasing, all to one side of rest [m].
     """
-    found = _followed(spec, places)
+    found = _follow_path(spec, places)
     if found is None:
         return None
     assembly, path, at = found
@@ -76,13 +76,13 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
         return None
     known = [path for path in paths if _SMOOTH.fullmatch(path) and isinstance(spec.at(path), float)]
-    found = _followed(spec, places)
+    found = _follow_path(spec, places)
     if found is None or not known:
         return None
     assembly, path, at = found
 
     def build(x: Any) -> Network:
-        return assemble(_with(spec, dict(zip(known, x, strict=True)))).network
+        return assemble(_replace_values(spec, dict(zip(known, x, strict=True)))).network
 
     try:
         slopes = gradient(path, build, np.array([spec.at(one) for one in known]), at)
@@ -104,7 +104,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     )
 
 
-def _followed(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:
+def _follow_path(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:
     """Return a mechanism, its path from rest, and the path's points at places; None if it does not get there."""
     if not spec.mechanism.drive.is_displacement or spec.fidelity == "solid" or spec.analysis.through_folds:
         return None
@@ -120,7 +120,7 @@ def _followed(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArr
     return assembly, path, np.asarray(keep[np.searchsorted(np.abs(poses), np.abs(places))])
 
 
-def _with(block: Any, values: Mapping[str, Any]) -> Any:
+def _replace_values(block: Any, values: Mapping[str, Any]) -> Any:
     """Return a block, a mapping or a list with other values at dotted paths, which are not checked: complex ones."""
     below: dict[str, dict[str, Any]] = {}
     for path, value in values.items():
@@ -128,7 +128,7 @@ def _with(block: Any, values: Mapping[str, Any]) -> Any:
         below.setdefault(head, {})[rest] = value
 
     def item(now: Any, inside: dict[str, Any]) -> Any:
-        return inside[""] if "" in inside else _with(now, inside)
+        return inside[""] if "" in inside else _replace_values(now, inside)
 
     if isinstance(block, tuple):
         return tuple(item(one, below[str(k)]) if str(k) in below else one for k, one in enumerate(block))

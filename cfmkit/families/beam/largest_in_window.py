@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import distinct
-from cfmkit.metrics.winding_branches import inside
+from cfmkit.metrics.winding_branches import places_inside
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -61,9 +61,9 @@ def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: t
         x, rows = reached[order], rows[:, order]
         wanted, ask = np.array([*np.clip(window, x[0], x[-1]), *law.corners]), law.at
     elif winding is not None:
-        x, wanted, ask = winding.arc, _arcs(winding, inside(winding, *window)), partial(_solved, winding)
+        x, wanted, ask = winding.arc, _arcs(winding, places_inside(winding, *window)), partial(_solve_lengths, winding)
     else:
-        return _top(rows, points.accurate & _within(reached, window))
+        return _top(rows, points.accurate & _find_in_window(reached, window))
     top = None
     for number in range(ROUNDS):
         wanted = wanted[np.abs(wanted[:, None] - x).min(axis=1) > SAME * np.abs(x).max()]
@@ -74,7 +74,7 @@ def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: t
             x = np.insert(x, places, wanted[known])
             rows = np.insert(rows, places, observe(there)[:, known], axis=1)
         reached = x if winding is None else winding.states(_ways(winding, x))[0]
-        top = _top(rows, _within(reached, window))
+        top = _top(rows, _find_in_window(reached, window))
         if top is None:
             break
         # what was missed by little is looked at once; then only what is higher is
@@ -95,12 +95,12 @@ def _ways(winding: AlongTheWay, arcs: FloatArray) -> FloatArray:
     return np.asarray(np.interp(arcs, winding.arc, np.arange(float(len(winding.arc)))))
 
 
-def _solved(winding: AlongTheWay, arcs: FloatArray) -> Path:
+def _solve_lengths(winding: AlongTheWay, arcs: FloatArray) -> Path:
     """Return the equilibria after some lengths of the way."""
     return winding.at(_ways(winding, arcs))
 
 
-def _within(motion: FloatArray, window: tuple[float, float]) -> FloatArray:
+def _find_in_window(motion: FloatArray, window: tuple[float, float]) -> FloatArray:
     """Return which places are in a window, (n,) of bool."""
     slack = SLACK * float(np.ptp(motion)) if len(motion) else 0.0
     return np.asarray((motion >= window[0] - slack) & (motion <= window[1] + slack))

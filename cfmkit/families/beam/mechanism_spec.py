@@ -72,7 +72,7 @@ def _unknown(mechanism: Mechanism) -> Iterator[Fault]:
     for place, kind, name in references(mechanism):
         known: Mapping[str, object] = getattr(mechanism, f"{kind}s")
         if name not in known:
-            yield place, f"there is no {kind} {name!r}; {kind}s are {_listed(known)}"
+            yield place, f"there is no {kind} {name!r}; {kind}s are {_list_names(known)}"
 
 
 def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str, str]]:
@@ -101,7 +101,7 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
     yield ("drive", mechanism.drive.kind, "node"), "node", mechanism.drive.node
 
 
-def _listed(names: Iterable[str]) -> str:
+def _list_names(names: Iterable[str]) -> str:
     every = list(names)
     return ", ".join(every[:12]) + (", ..." if len(every) > 12 else "")
 

@@ -109,7 +109,7 @@ def solve(spec: BeamSpec) -> Solution:
     _refuse_torn_beams(assembly)
     refuse_sides_in_obstacles(assembly)
     path = trace(assembly.network, assembly.drive(), assembly.control())
-    keep, ends = _kept(assembly, path)
+    keep, ends = _keep_points(assembly, path)
     return Solution(assembly, path, keep, ends)
 
 
@@ -162,7 +162,7 @@ def _way_to_support(network: Network, node: str, lengths: Mapping[str, float]) -
     return min((way + moved[name] for name, way in ways.items()), default=math.inf)
 
 
-def _kept(assembly: Assembly, path: Path) -> tuple[Any, Any]:
+def _keep_points(assembly: Assembly, path: Path) -> tuple[Any, Any]:
     """Return which points make the curve, and those where windows end between them.
 
     The curve has those requested, or all where folds may make it many-valued.

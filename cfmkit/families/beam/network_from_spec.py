@@ -36,7 +36,7 @@ from cfmkit.families.beam.network_elements_spec import (
     MomentDrive,
     RotationDrive,
 )
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -89,7 +89,7 @@ class Assembly(ShortRepr):
         even, extent = self._even, self.spec.extent
         if self.spec.analysis.through_folds:
             return even
-        ends = np.array([end for _, window in self.spec.windows() for end in between(window, (0.0, extent))])
+        ends = np.array([end for _, window in self.spec.windows() for end in window_places(window, (0.0, extent))])
         close = 1e-6 * abs(extent) / len(even)  # an end that all but meets a point needs none of its own
         apart = np.abs(ends[:, None] - even).min(axis=1, initial=np.inf) > close
         inside = apart & (ends * np.sign(extent) > 0) & (np.abs(ends) < abs(extent))
@@ -174,10 +174,10 @@ def assemble(spec: BeamSpec) -> Assembly:
         contacts=contacts_of(mechanism),
     )
     if mechanism.closure == "chain":
-        network = chained(network)
+        network = move_free_nodes(network)
     driven = mechanism.drive.node
     if copies is not None and copies.layers > 1:
-        network, driven = stacked(network, driven, copies.layers, copies.layer_pitch)
+        network, driven = stack_stages(network, driven, copies.layers, copies.layer_pitch)
     return Assembly(spec, network, driven, parallel_parts(spec), allowable_stress(spec))
 
 
@@ -195,7 +195,7 @@ def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
     return complex(*copies.mirror), assembly.direction
 
 
-def on_axis(assembly: Assembly, node: str) -> bool:
+def is_on_axis(assembly: Assembly, node: str) -> bool:
     """Return True if a node is on the mirror axis, by the thickness of the beams that meet there."""
     found, axis = assembly.network.nodes[node], mirror_axis(assembly)
     if axis is None:
@@ -263,7 +263,7 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
         of.modulus,
         beam.width or mechanism.width,
         _thickness(beam.thickness or mechanism.thickness),
-        axial=spec.fidelity != "inextensible" or between_held_places(mechanism, beam),
+        axial=spec.fidelity != "inextensible" or is_between_held_places(mechanism, beam),
         shear=spec.fidelity in ("reissner", "solid"),
         poisson_ratio=of.poisson,
         wide=mechanism.wide_beams,
@@ -281,7 +281,7 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
     )
 
 
-def between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
+def is_between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
     """Return True for a straight beam between two places that do not move.
 
     Without stretching it could not even bend, and its axial force would be any: the whole network would be rigid.
@@ -305,7 +305,7 @@ def resolve(spec: BeamSpec) -> BeamSpec:
     return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=switches), "analysis": analysis})
 
 
-def chained(network: Network) -> Network:
+def move_free_nodes(network: Network) -> Network:
     """Return the network with its free nodes moved to where the beams end."""
     placed = {
         name: complex(node.x, node.y)
@@ -340,7 +340,7 @@ def _own_chord(network: Network, beam: Beam) -> complex:
 _ROOM = 1.15  # of the pitch that is chosen, for what joins the stages
 
 
-def stacked(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
+def stack_stages(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
     """Return `count` equal stages in series, and the moving part of the last.
 
     Parameters
@@ -357,20 +357,22 @@ def stacked(network: Network, driven: str, count: int, pitch: float | None = Non
     nodes, beams, links = dict(network.nodes), dict(network.beams), list(network.links)
     dx, dy = _step(network, driven, pitch)
     for stage in range(2, count + 1):
-        below = _named(driven, stage - 1)
+        below = _name_node(driven, stage - 1)
         for name, node in network.nodes.items():
             clamped = node.support.along and name != driven
             moved = Node(node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, FREE if clamped else node.support)
-            nodes[_named(name, stage)] = moved
+            nodes[_name_node(name, stage)] = moved
             if clamped:
-                links.append(Link(below, _named(name, stage)))
+                links.append(Link(below, _name_node(name, stage)))
         for name, beam in network.beams.items():
-            beams[_named(name, stage)] = replace(beam, start=_named(beam.start, stage), end=_named(beam.end, stage))
-        links += [Link(_named(link.master, stage), _named(link.node, stage)) for link in network.links]
-    return Network(nodes, beams, tuple(links)), _named(driven, count)
+            beams[_name_node(name, stage)] = replace(
+                beam, start=_name_node(beam.start, stage), end=_name_node(beam.end, stage)
+            )
+        links += [Link(_name_node(link.master, stage), _name_node(link.node, stage)) for link in network.links]
+    return Network(nodes, beams, tuple(links)), _name_node(driven, count)
 
 
-def _named(name: str, stage: int) -> str:
+def _name_node(name: str, stage: int) -> str:
     return name if stage == 1 else f"{name}.{stage}"
 
 

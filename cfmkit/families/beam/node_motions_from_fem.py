@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.network_from_spec import constant_load, mirror_axis, on_axis
+from cfmkit.families.beam.network_from_spec import constant_load, is_on_axis, mirror_axis
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,14 +44,14 @@ class SolidNodes:
         """
         from cfmkit.solid.point_motions_and_reactions import reaction
 
-        if not on_axis(self.assembly, name):
+        if not is_on_axis(self.assembly, name):
             return reaction(self.solved, name, self._described)
         others = [
             place.name
             for place in self.solved.part.places
             if place.name in self.assembly.network.nodes and place.name != name
         ]
-        if any(on_axis(self.assembly, other) for other in others):
+        if any(is_on_axis(self.assembly, other) for other in others):
             return lambda travel: np.full((len(travel), 3), np.nan)
         load = constant_load(self.assembly, name)
         return lambda travel: -np.sum([self._about(name, other, travel) for other in others], axis=0) - load

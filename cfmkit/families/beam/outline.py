@@ -14,7 +14,7 @@ from cfmkit.families.beam.drawn_pieces import STANDS, both_halves, drawn_parts
 from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes
 from cfmkit.families.beam.part import FINE, SHARE, drawn_fillet, drawn_frame, fine_tolerance, held_places, strips_of
-from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points
 from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_drawn_solid
 from cfmkit.specs.units import format_short
 
@@ -40,7 +40,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     cfmkit.errors.GeometryError
         If the outline of a beam, or its area, is not that of the specification.
     """
-    from cfmkit.export.union import merged
+    from cfmkit.export.union import merge_pieces
 
     assembly = assemble(spec)
     fine = fine_tolerance(assembly)
@@ -52,9 +52,9 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
     part, fillet = spec.mechanism.part or PartSpec(), drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
-    contours = merged(pieces, fine / FINE, fillet, solid.holes)
+    contours = merge_pieces(pieces, fine / FINE, fillet, solid.holes)
     thinnest, holes = fine / FINE, [area for hole in solid.holes for area in hole.covered(fine / FINE)]
-    sections = check_outline(contours, tuple(_specified(beams, pieces, thinnest)), thinnest, fillet, holes)
+    sections = check_outline(contours, tuple(_specified_pieces(beams, pieces, thinnest)), thinnest, fillet, holes)
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)
@@ -79,7 +79,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     )
 
 
-def _specified(
+def _specified_pieces(
     beams: dict[str, list[BeamStrip]], pieces: Sequence[OutlinePiece], size: float
 ) -> Iterator[SpecifiedPiece]:
     """Yield the pieces that a part is united from, the first of which are the strips of beams, with their sections."""
@@ -97,7 +97,7 @@ def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
     if not held:
         return
     at, axis = np.array([(node.x, node.y) for node in held.values()]), mirror_axis(assembly)
-    at = at if axis is None else np.vstack([at, mirrored(at, *axis)])
+    at = at if axis is None else np.vstack([at, mirror_points(at, *axis)])
     words = "across clamps" if all(node.support.rotation for node in held.values()) else "across supports"
     first, last = at[at.argmin(axis=0)], at[at.argmax(axis=0)]
     yield from _distances(words, first[0], last[0], ("x",))
@@ -146,7 +146,7 @@ def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
         for strip in found
     ]
     if axis is not None:
-        own += [Region(mirrored(one.polygon, *axis), one.thickness) for one in own]
+        own += [Region(mirror_points(one.polygon, *axis), one.thickness) for one in own]
     return Sheet(mechanism.width, tuple(own))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica import Path, PointLoad
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.export.contours import Contour
-from cfmkit.export.ground_frame import ground_frame, moved
+from cfmkit.export.ground_frame import ground_frame, move_polygon
 from cfmkit.export.posed_part import PosedBody, PosedPart, rectangle, swept
 from cfmkit.families.beam.drawn_pieces import (
     EYE,
@@ -33,13 +33,13 @@ from cfmkit.families.beam.drawn_pieces import (
 from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import (
     assemble,
+    is_on_axis,
     mirror_axis,
     moving_nodes,
-    on_axis,
     thickest_of,
     thinnest_of,
 )
-from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points, strips
 from cfmkit.families.run_control import Run
 
 if TYPE_CHECKING:
@@ -130,13 +130,13 @@ def held_places(
         region = _region(assembly, node, ends, SHARE * tolerance)
         joined = (bars[node],) if node in bars else ()
         yield replace(region, shapes=(*region.shapes, *joined))
-        if axis is not None and not on_axis(assembly, node):
+        if axis is not None and not is_on_axis(assembly, node):
             yield HeldPlace(
                 f"{node}'",
                 node,
-                mirrored(region.at[None], *axis)[0],
-                tuple(mirrored(shape, *axis) for shape in region.shapes),
-                tuple(mirrored(seam, *axis) for seam in region.seams),
+                mirror_points(region.at[None], *axis)[0],
+                tuple(mirror_points(shape, *axis) for shape in region.shapes),
+                tuple(mirror_points(seam, *axis) for seam in region.seams),
                 region.padded,
             )
 
@@ -149,10 +149,10 @@ def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) ->
     if pads:
         return HeldPlace(node, node, at, tuple(pad for pad, _ in pads), tuple(end.cap for _, end in pads), True)
     end = ends[0]
-    if about.support.across and not about.support.rotation and not on_axis(assembly, node):
+    if about.support.across and not about.support.rotation and not is_on_axis(assembly, node):
         return HeldPlace(node, node, at, (disc(end.at, HOLE * end.thickness, bulge),))
     axis = mirror_axis(assembly)
-    mitre = axis[1] if axis is not None and on_axis(assembly, node) else mitre_direction(ends)
+    mitre = axis[1] if axis is not None and is_on_axis(assembly, node) else mitre_direction(ends)
     section = end.cap if mitre is None else section_at_bend(ends, mitre, drawn_fillet(assembly.spec))
     return HeldPlace(node, node, at, (section,), (section,))
 
@@ -208,7 +208,7 @@ def _swept(assembly: Assembly, places: Sequence[HeldPlace]) -> Any:
     rest = list(itertools.chain.from_iterable(strips_of(assembly).values()))
     half = 0.5 * max(float(one.thickness.max()) for one in rest)
     lines = with_image(assembly, [PosedBody.line("beam", "free", one.points, half) for one in rest])
-    poses = bodies(solution, chosen(solution, N_SWEPT), places)
+    poses = bodies(solution, choose_points(solution, N_SWEPT), places)
     moving = (body if body.closed else replace(body, half=half) for body in poses if body.role != "held")
     return swept([*lines, *moving])
 
@@ -232,7 +232,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     assembly, mechanism = solution.assembly, solution.spec.mechanism
     legs = mechanism.copies.legs if mechanism.copies else 1
     return PosedPart(
-        (*as_made(assembly), *bodies(solution, chosen(solution, N_POSES), regions(solution.spec, COARSE))),
+        (*as_made(assembly), *bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, COARSE))),
         direction=assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi,
         depth=legs * max([mechanism.width or 0.0, *mechanism.of_beams("width").values()]),
         pieces=legs,
@@ -270,10 +270,13 @@ def bodies(
     for name, beam in path.network.beams.items():
         line = np.array([centre_line(path, name, point) for point in at]).reshape(len(at), -1, 2)
         beams.append(PosedBody.line("beam", "free", line, 0.5 * thickest_of(beam.section)))
-    return (*with_image(assembly, beams), *(body for place in places for body in _moved(assembly, path, place, at)))
+    return (
+        *with_image(assembly, beams),
+        *(body for place in places for body in _moved_bodies(assembly, path, place, at)),
+    )
 
 
-def _moved(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence[int]) -> Iterator[PosedBody]:
+def _moved_bodies(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence[int]) -> Iterator[PosedBody]:
     """Yield the shapes of what moves as one rigid piece."""
     motion, axis = path.motion(place.node), mirror_axis(assembly)
     role: Role = "driven" if place.node == assembly.driven else "free"
@@ -283,10 +286,10 @@ def _moved(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence[int]) 
     for x, y, turn in motion[at].tolist():
         by = np.array([x, y])
         if place.name != place.node and axis is not None:
-            by, turn = mirrored(by[None], 0j, axis[1])[0], -turn
+            by, turn = mirror_points(by[None], 0j, axis[1])[0], -turn
         poses.append((by, turn))
     for shape in (shape for shape in place.shapes if len(shape) > 2):
-        cores = [moved(shape, by, turn, place.at) for by, turn in poses] if role != "held" else [shape]
+        cores = [move_polygon(shape, by, turn, place.at) for by, turn in poses] if role != "held" else [shape]
         yield PosedBody.polygon("pad", role, np.array(cores).reshape(-1, *shape.shape))
 
 
@@ -301,11 +304,11 @@ def with_image(assembly: Assembly, described: Sequence[PosedBody]) -> list[Posed
     axis = mirror_axis(assembly)
     if axis is None:
         return list(described)
-    images = [mirrored(one.core.reshape(-1, 2), *axis).reshape(one.core.shape) for one in described]
+    images = [mirror_points(one.core.reshape(-1, 2), *axis).reshape(one.core.shape) for one in described]
     return [*described, *(replace(one, core=image) for one, image in zip(described, images, strict=True))]
 
 
-def chosen(solution: Solution, count: int) -> NDArray[Any]:
+def choose_points(solution: Solution, count: int) -> NDArray[Any]:
     """Return so many points of the curve, evenly, its ends included; none if it has none."""
     if not len(solution.keep):
         return np.zeros(0, int)

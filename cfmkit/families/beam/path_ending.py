@@ -88,7 +88,7 @@ def _in_the_way(solution: Solution) -> str:
     said = f"check {', '.join(keys)}"
     if spec.fidelity != "inextensible":
         return said
-    along, tied = list(_along_the_drive(spec)), _over_determined(solution)
+    along, tied = list(_find_along_drive(spec)), _find_over_determined(solution)
     if tied and not set(tied) <= set(along):
         reported = f"inextensible beams between places that do not move ({', '.join(tied)}) hold the network rigid"
         return f"{said}; {reported}: leave one out, or set 'mechanism.axial: true'"
@@ -98,7 +98,7 @@ def _in_the_way(solution: Solution) -> str:
     return f"{said}; beams are inextensible: 'mechanism.axial: true' lets them stretch"
 
 
-def _over_determined(solution: Solution) -> list[str]:
+def _find_over_determined(solution: Solution) -> list[str]:
     """Return the beams whose forces equilibrium leaves open before any load: the network is held by more than it needs.
 
     They are what the null vectors of the tangent have, where these move nothing.
@@ -120,7 +120,7 @@ def _over_determined(solution: Solution) -> list[str]:
 _SINGULAR, _STILL = 1e-10, 1e-6  # of the largest singular value; motion or force of a null vector of length 1
 
 
-def _along_the_drive(spec: BeamSpec) -> Iterator[str]:
+def _find_along_drive(spec: BeamSpec) -> Iterator[str]:
     """Yield the straight beams whose ends lie one behind the other as seen along a force or a displacement."""
     mechanism = spec.mechanism
     direction = getattr(mechanism.drive, "direction", None)

@@ -19,19 +19,26 @@ from cfmkit.errors import GeometryError
 from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.network_from_spec import assemble, constant_load, mirror_axis, on_axis, resolve, thinnest_of
+from cfmkit.families.beam.network_from_spec import (
+    assemble,
+    constant_load,
+    is_on_axis,
+    mirror_axis,
+    resolve,
+    thinnest_of,
+)
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, EXTREMES, RANGES, number_of, target_of
-from cfmkit.families.beam.strips_and_gaps import mirrored
+from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.results import Quantity, Result, Status, quantities
-from cfmkit.specs.units import between, format_short
+from cfmkit.specs.units import format_short, window_places
 from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
@@ -141,7 +148,7 @@ class SolidSolution(ShortRepr):
     def window(self) -> tuple[float, float]:
         """Range in which stress is judged, from the smaller end on [m or rad]; without a window the whole travel."""
         end, window = self.end, self.spec.analysis.window
-        low, high = sorted((0.0, end) if window is None else between(window, (0.0, end)))
+        low, high = sorted((0.0, end) if window is None else window_places(window, (0.0, end)))
         return low, high
 
     @cached_property
@@ -187,7 +194,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     """
 
     try:
-        assembly, solved = _solved(spec, run)
+        assembly, solved = _solve_part(spec, run)
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; check mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
@@ -195,8 +202,10 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
         message = f"no curve: {why}; check mechanism.drive, {keys}"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
-    solution = _under_load(spec, assembly, solved) if driven_by_load(spec) else _moved(assembly, solved)
-    message = _ended(solution)
+    solution = (
+        _solve_loaded_part(spec, assembly, solved) if driven_by_load(spec) else _solve_moved_part(assembly, solved)
+    )
+    message = _explain_ending(solution)
     if len(solution.motion) < 2:
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {message}")
     curves: tuple[Curve, ...] = (_curve(solution),)
@@ -224,7 +233,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     )
 
 
-def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
+def _solve_part(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
     """Return the network that a part is drawn from and the part, moved far enough where a load drives it.
 
     Raises
@@ -238,7 +247,7 @@ def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
     return assembly, driven_part(spec, assembly).solved(run.progress)
 
 
-def _moved(assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
+def _solve_moved_part(assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
     """Return the points of the curve of a part that is moved: even ones, as far as its path leads."""
     spec, travel = assembly.spec, solved.solution.course.travel
     asked, forwards = np.linspace(0.0, spec.extent, spec.analysis.points), np.sign(spec.extent)
@@ -246,12 +255,12 @@ def _moved(assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
     return SolidSolution(assembly, solved, read_only(asked[reached]))
 
 
-def _under_load(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
+def _solve_loaded_part(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
     """Return the points of the curve of a part under a load: even loads, or an even travel through its maxima."""
-    from cfmkit.solid.path_up_to_load import travels_at, up_to_load, with_poses
+    from cfmkit.solid.path_up_to_load import follow_to_load, travels_at, with_poses
 
     load, through = load_of_one(spec), spec.analysis.through_folds
-    fine, reached = up_to_load(solved.solution, load, through)
+    fine, reached = follow_to_load(solved.solution, load, through)
     solved = replace(solved, solution=with_poses(fine, _ends_of_windows(spec, reached.end)))
     if through:
         motion = read_only(np.linspace(0.0, reached.end, spec.analysis.points))
@@ -266,7 +275,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     from cfmkit.solid.plane_stress_law import LAWS
 
     frame = standing_frame(spec)
-    drawn = drawing(_without_frame(spec, frame))
+    drawn = drawing(_remove_frame(spec, frame))
     cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = LAWS[material.law](material.modulus, material.poisson)
@@ -280,15 +289,15 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     return Part(rings, thinnest, width, law, tuple(places), (), largest, frame, drawn.sections)
 
 
-def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
+def _remove_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
     """Return what bends: without the frame, which stands, and the holes in it."""
-    from cfmkit.export.ground_frame import outside
+    from cfmkit.export.ground_frame import find_outside
 
     part = spec.mechanism.part
     if not frame or part is None or part.frame is None:
         return spec
     pads = [one for place in regions(spec) for one in place.shapes if place.padded]
-    kept = outside([one.at for one in part.holes], frame, pads)
+    kept = find_outside([one.at for one in part.holes], frame, pads)
     holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
     alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
     return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"part": alone})})
@@ -341,7 +350,7 @@ def _stops(spec: BeamSpec) -> list[float]:
 def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
     """Return where every window starts and ends on a travel [m or rad]."""
     windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
-    return [place for window in windows if window is not None for place in between(window, (0.0, end))]
+    return [place for window in windows if window is not None for place in window_places(window, (0.0, end))]
 
 
 def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArray]:
@@ -369,11 +378,11 @@ def _load(assembly: Assembly, place: HeldPlace) -> FloatArray:
     own, axis = constant_load(assembly, place.node), mirror_axis(assembly)
     if axis is None:
         return own
-    image = np.array([*mirrored(own[None, :2], 0j, axis[1])[0], -own[2]])
-    return own + image if on_axis(assembly, place.node) else own if place.name == place.node else image
+    image = np.array([*mirror_points(own[None, :2], 0j, axis[1])[0], -own[2]])
+    return own + image if is_on_axis(assembly, place.node) else own if place.name == place.node else image
 
 
-def _ended(solution: SolidSolution) -> str:
+def _explain_ending(solution: SolidSolution) -> str:
     """Return why the curve ends early, and where; empty if it does not."""
     from cfmkit.solid.path_up_to_load import LoadEnd
 
@@ -470,7 +479,7 @@ def _sharp(spec: BeamSpec) -> str:
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
-    if reported := _ended(solution):
+    if reported := _explain_ending(solution):
         yield finding("ends_early" if course.touching is None else "self_contact", reported)
     for point in solution.solved.critical_points:
         at = format_short(point.travel, "angle" if _turns(spec) else "length")

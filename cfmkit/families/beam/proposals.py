@@ -29,7 +29,7 @@ from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening, is_too_wide
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, called
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -91,11 +91,11 @@ def kept_shapes() -> tuple[Kept, ...]:
     That is bending alone, whose curve is the same for every thickness, or, where beams are stout, with stretch and
     shear: then the curve is exact where the thickness goes with the size, and a guess elsewhere.
     """
-    plain = tuple(_followed(name) for name in SHAPES)
+    plain = tuple(_follow_shape(name) for name in SHAPES)
     return (*plain, *(_in_two_layers(kept) for kept in plain if kept.spec.mechanism.copies is not None))
 
 
-def _followed(name: str) -> Kept:
+def _follow_shape(name: str) -> Kept:
     text = files("cfmkit").joinpath(f"families/beam/shapes/{name}.yaml").read_text(encoding="utf-8")
     spec = read_document(text, name).bind(BeamSpec)
     result = analyze(spec, Run())
@@ -128,17 +128,17 @@ def propose(request: Request, run: Run) -> FamilyOffer:
         largest = min(request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along)
         for share in SIZES:
             for block in request.materials or ({"name": "pom"},):
-                one = _rescaled(request, kept, share * largest, dict(block))
+                one = _rescale_shape(request, kept, share * largest, dict(block))
                 if isinstance(one, Candidate):
                     found.append(one)
                 else:
                     missed.append(one)
     if found:
-        return FamilyOffer(tuple(_varied(found)[:OFFERED]))
+        return FamilyOffer(tuple(_vary_by_turns(found)[:OFFERED]))
     return FamilyOffer(reason=min(missed, key=lambda one: one[0])[1])
 
 
-def _varied(found: list[Candidate]) -> list[Candidate]:
+def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
     """Return candidates of all shapes by turns, that of the most promising one first."""
     kinds = list(dict.fromkeys(one.variant for one in found))
     rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
@@ -147,7 +147,7 @@ def _varied(found: list[Candidate]) -> list[Candidate]:
     return [row[k] for k in range(longest) for row in rows if k < len(row)]
 
 
-def _rescaled(request: Request, kept: Kept, size: float, block: dict[str, Any]) -> Candidate | tuple[float, str]:
+def _rescale_shape(request: Request, kept: Kept, size: float, block: dict[str, Any]) -> Candidate | tuple[float, str]:
     """Return a shape at a size, or how far it misses what is required, and why."""
     length = request.travel / size
     low, high = float(kept.motion[0]), float(kept.motion[-1])
@@ -168,7 +168,7 @@ def _rescaled(request: Request, kept: Kept, size: float, block: dict[str, Any]) 
         return 1.0 + least / request.ripple, reason
     best = int(flat[np.argmin(stress[flat] / 1e3 ** (1 - ripple[flat]))])
     window = float(starts[best]) * size, float(starts[best] + length) * size
-    return _sized(request, kept, size, block, window, (float(stress[best]), _mean(kept, starts[best], length)))
+    return _size_section(request, kept, size, block, window, (float(stress[best]), _mean(kept, starts[best], length)))
 
 
 def _mean(kept: Kept, start: float, length: float) -> float:
@@ -176,7 +176,7 @@ def _mean(kept: Kept, start: float, length: float) -> float:
     return float(np.interp(places, kept.motion, kept.force).mean())
 
 
-def _sized(
+def _size_section(
     request: Request,
     kept: Kept,
     size: float,
@@ -202,7 +202,7 @@ def _sized(
         return request.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick"
     if request.depth is not None and wide > DEEPER * request.depth:
         return wide / request.depth, f"the beams would be {mm(wide)} wide"
-    spec = _written(kept, size, block, (thicker * thin, wide), window)
+    spec = _write_shape(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.envelope.across * kept.envelope.along / (request.envelope[0] * request.envelope[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
     promise = area if request.good_parts is None else -thicker * thin
@@ -210,7 +210,7 @@ def _sized(
     layers = 1 if kept.spec.mechanism.copies is None else kept.spec.mechanism.copies.layers
     promise += layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(request, wide, thicker * thin, strain)
-    variant = called(f"shape {kept.name}", request, block)
+    variant = name_variant(f"shape {kept.name}", request, block)
     here = "cfmkit.families.beam.proposals"
     free = "mechanism.thickness", "mechanism.width"
     return Candidate(variant, spec, False, f"{here}:finish", promise, free, f"{here}:correct")
@@ -220,7 +220,7 @@ def _width(request: Request, kept: Kept, size: float, stiffer: float, thicker: f
     return float(kept.spec.mechanism.width * request.target / force * size**2 / (stiffer * thicker**3))
 
 
-def _written(
+def _write_shape(
     kept: Kept, size: float, block: dict[str, Any], section: tuple[float, float], window: tuple[float, float]
 ) -> BeamSpec:
     """Return the shape at a size, with another material and section."""
@@ -241,7 +241,7 @@ def finish(spec: BeamSpec, request: Request) -> BeamSpec:
     """Return a rescaled shape with the flattest window and the width that its model with stretch and shear wants."""
     made = spec
     for _ in range(2):
-        refitted, thinner = _refitted(made, request, analyze)
+        refitted, thinner = _refit(made, request, analyze)
         if refitted is None:
             return made
         made = refitted
@@ -255,13 +255,11 @@ def correct(spec: BeamSpec, request: Request) -> BeamSpec:
     from cfmkit.families.beam.plane_fem_analysis import analyze as solve_solid
 
     solid = spec.replace({"analysis.fidelity": "solid"})
-    refitted, _ = _refitted(solid, aim_below_stiffening(spec, request, analyze), solve_solid)
+    refitted, _ = _refit(solid, aim_below_stiffening(spec, request, analyze), solve_solid)
     return solid if refitted is None else refitted
 
 
-def _refitted(
-    spec: BeamSpec, request: Request, model: Callable[[BeamSpec, Run], Result]
-) -> tuple[BeamSpec | None, float]:
+def _refit(spec: BeamSpec, request: Request, model: Callable[[BeamSpec, Run], Result]) -> tuple[BeamSpec | None, float]:
     """Return a shape over its flattest window by a model, its force as required, and by what its beams became thinner.
 
     The force is linear in the width. Where the stress is above the allowable one, the beams get thinner and wider: it

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
     name = None if design.rescale is None else design.rescale.adapted(sheet_of(designed.mechanism.part))
     if name is None or name == "size":
         return {}
-    values = {path: designed.at(path) for path in _stated(designed.mechanism, name)}
-    return {path: around(value) for path, value in values.items() if isinstance(value, float)}
+    values = {path: designed.at(path) for path in _stated_paths(designed.mechanism, name)}
+    return {path: range_about(value) for path, value in values.items() if isinstance(value, float)}
 
 
-def _stated(mechanism: Mechanism, key: Literal["thickness", "width"]) -> Iterator[str]:
+def _stated_paths(mechanism: Mechanism, key: Literal["thickness", "width"]) -> Iterator[str]:
     """Yield the paths of the values that beams have: the mechanism's, if any has no other, and their own."""
     if any(getattr(beam, key) is None for beam in mechanism.beams.values()):
         yield f"mechanism.{key}"
@@ -68,7 +68,9 @@ def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tupl
 
 def errors(spec: BeamSpec) -> dict[str, str]:
     """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
-    found = {path: "thickness" for path in _stated(spec.mechanism, "thickness") if isinstance(spec.at(path), float)}
+    found = {
+        path: "thickness" for path in _stated_paths(spec.mechanism, "thickness") if isinstance(spec.at(path), float)
+    }
     for name, node in spec.mechanism.nodes.items():
         if node.support == "free":
             found |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}

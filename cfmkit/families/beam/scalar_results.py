@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.solution import Solution
 
 
-def within(solution: OnCurve, low: float, high: float) -> Any:
+def find_in_window(solution: OnCurve, low: float, high: float) -> Any:
     """Return which accurate points of the curve are in a window."""
     x = solution.motion
     slack = 1e-12 * float(np.abs(x).max())
@@ -80,7 +80,7 @@ def _significant(values: FloatArray, error: float) -> float:
 # --- along the motion -----------------------------------------------------------------------------------------------
 
 
-def _along(read: Callable[[AlongMotion], float], place: bool = True) -> Callable[[OnCurve], float]:
+def _reading_along(read: Callable[[AlongMotion], float], place: bool = True) -> Callable[[OnCurve], float]:
     """Return what reads a place or a force of the range that ends at d; drives by a displacement alone have it."""
 
     def function(solution: OnCurve) -> float:
@@ -209,7 +209,7 @@ def _lowest_frequency(hold: str) -> Callable[[Solution], float]:
         found = natural(solution) if solution.spec.analysis.modes else {}
         if hold not in found:
             return math.nan
-        first = found[hold][within(solution, *window_of(solution)), 0]
+        first = found[hold][find_in_window(solution, *window_of(solution)), 0]
         return float(first.min()) if len(first) and np.isfinite(first).all() else math.nan
 
     return function
@@ -232,33 +232,37 @@ def _of_solids(names: Iterable[str]) -> dict[str, ScalarQuantity[Solution]]:
 
 QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "nominal_force": _quantity(
-        "force", "F_d: force at d, the end of the window or of the travel [Lan, sec. 2]", _along(lambda a: a.nominal)
+        "force",
+        "F_d: force at d, the end of the window or of the travel [Lan, sec. 2]",
+        _reading_along(lambda a: a.nominal),
     ),
     "range_start": _quantity(
-        "length", "c: where the force first reaches 0.95 F_d [Lan, sec. 2]", _along(lambda a: a.start)
+        "length", "c: where the force first reaches 0.95 F_d [Lan, sec. 2]", _reading_along(lambda a: a.start)
     ),
     "range_fraction": _quantity(
         "ratio",
         "(d - c)/d, the operational range as a share of the travel [Lan, sec. 2]",
-        _along(lambda a: a.fraction(a.start), place=False),
+        _reading_along(lambda a: a.fraction(a.start), place=False),
     ),
     "strict_range_start": _quantity(
         "length",
         "smallest c with (max - min) <= 5 % of max of the force on c ... d",
-        _along(lambda a: a.strict_start),
+        _reading_along(lambda a: a.strict_start),
     ),
     "strict_range_fraction": _quantity(
         "ratio",
         "(d - c)/d with c of `strict_range_start`",
-        _along(lambda a: a.fraction(a.strict_start), place=False),
+        _reading_along(lambda a: a.fraction(a.strict_start), place=False),
     ),
     "stress_at_end": _quantity(
         "stress",
         "largest stress at d, the end of the window or of the travel",
-        _along(lambda a: a.stress_at_end, place=False),
+        _reading_along(lambda a: a.stress_at_end, place=False),
     ),
     "stress_limit_displacement": _quantity(
-        "length", "travel at which the stress first reaches the allowable stress", _along(lambda a: a.stress_limit)
+        "length",
+        "travel at which the stress first reaches the allowable stress",
+        _reading_along(lambda a: a.stress_limit),
     ),
     "allowable_stress": _quantity(
         "stress",

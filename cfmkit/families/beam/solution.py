@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
-from cfmkit.elastica.results.between_loads import between_loads
-from cfmkit.elastica.results.between_points import between_points
-from cfmkit.elastica.results.folding_path_between_points import along_the_way
+from cfmkit.elastica.results.between_loads import interpolate_loads
+from cfmkit.elastica.results.between_points import interpolate_path
+from cfmkit.elastica.results.folding_path_between_points import interpolate_folding_path
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
 from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
-from cfmkit.families.beam.strips_and_gaps import BeamGap, mirrored, smallest_gap
+from cfmkit.families.beam.strips_and_gaps import BeamGap, mirror_points, smallest_gap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -80,8 +80,8 @@ class Solution(ShortRepr):
         unit, allowed = self.assembly.effort_unit, self.assembly.allowable_stress
         if not drive.by_motion:
             along = None if drive.turns else self.assembly.direction
-            return between_loads(self.path, self.assembly.driven, along, unit, axial, allowed)
-        return between_points(self.path, unit, axial, allowed)
+            return interpolate_loads(self.path, self.assembly.driven, along, unit, axial, allowed)
+        return interpolate_path(self.path, unit, axial, allowed)
 
     @cached_property
     def along(self) -> AlongMotion:
@@ -93,7 +93,7 @@ class Solution(ShortRepr):
         """The equilibria at every place of the way of a path whose motion turns back."""
         if self.everywhere is not None:
             return None
-        return along_the_way(self.path, lambda path: replace(self, path=path, keep=np.arange(len(path))))
+        return interpolate_folding_path(self.path, lambda path: replace(self, path=path, keep=np.arange(len(path))))
 
     @cached_property
     def with_ends(self) -> Solution:
@@ -238,7 +238,7 @@ class Solution(ShortRepr):
         halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}
         axis = mirror_axis(self.assembly)
         if axis is not None:
-            lines |= {f"{name}'": mirrored(line, *axis) for name, line in lines.items()}
+            lines |= {f"{name}'": mirror_points(line, *axis) for name, line in lines.items()}
         return smallest_gap(lines, halves)
 
     def beam_force(self, beam: str) -> FloatArray:

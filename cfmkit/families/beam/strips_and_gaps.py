@@ -91,7 +91,7 @@ class BeamStrip:
 
     def mirrored(self, at: complex, direction: float) -> BeamStrip:
         """Return its mirror image about the line through a point [m] along a direction [rad]."""
-        points, angle = mirrored(self.points, at, direction), 2.0 * direction - self.angle
+        points, angle = mirror_points(self.points, at, direction), 2.0 * direction - self.angle
         return replace(self, points=points, angle=angle, curvature=-self.curvature)
 
     @property
@@ -171,7 +171,7 @@ def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
     return BeamStrip(*(read_only(one) for one in (points, angle, thickness, turn + np.zeros(len(t)), slope)))
 
 
-def mirrored(points: FloatArray, at: complex, direction: float) -> FloatArray:
+def mirror_points(points: FloatArray, at: complex, direction: float) -> FloatArray:
     """Return the mirror image of points (n, 2) about the line through a point [m] along a direction [rad]."""
     turn = np.exp(1j * direction)
     z = at + turn * np.conj((points @ np.array([1, 1j]) - at) / turn)

@@ -29,10 +29,10 @@ def taut_beams(path: Path, last: int) -> list[str]:
 
     These are beams, or else ways along several of them from the driven node to a support.
     """
-    return list(_pulled(path, last)) or list(_in_line(path, last))
+    return list(_find_pulled(path, last)) or list(_in_line(path, last))
 
 
-def _pulled(path: Path, last: int) -> Iterator[str]:
+def _find_pulled(path: Path, last: int) -> Iterator[str]:
     """Yield the beams that are straight and pulled hard."""
     for name, beam in path.network.beams.items():
         line = path.shape(name, last)
@@ -43,7 +43,7 @@ def _pulled(path: Path, last: int) -> Iterator[str]:
         pull = float(path.end_force(name, 1)[last, :2] @ chord) / way
         stiffness = float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
         if pull * length**2 > _TIGHT * stiffness:
-            yield f"{name}: {_of(way, length)}"
+            yield f"{name}: {_describe_beam(way, length)}"
 
 
 def _in_line(path: Path, last: int) -> Iterator[str]:
@@ -58,10 +58,10 @@ def _in_line(path: Path, last: int) -> Iterator[str]:
     for name, length in ways_to_supports(network, drive.node, lengths).items():
         first, now = (_apart(path, drive.node, name, point) for point in (0, last))
         if now > max(_STRAIGHT * length, first):  # a column is as straight when it begins to shorten
-            yield f"{name} to {drive.node}: {_of(now, length)}"
+            yield f"{name} to {drive.node}: {_describe_beam(now, length)}"
 
 
-def _of(way: float, length: float) -> str:
+def _describe_beam(way: float, length: float) -> str:
     return f"{format_short(way, 'length')} of {format_short(length, 'length')}"
 
 

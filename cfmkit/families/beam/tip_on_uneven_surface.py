@@ -273,11 +273,11 @@ def ride(solution: OnCurve) -> Ride | None:
     stress, stable = tip.stress_at(u), np.interp(u, tip.x, tip.stable) == 1
     values = _values(tip, rows, solution.assembly.allowable_stress)
     shown = Ride(rows, u - surface.preload, u, tip.force(rows), contact, lateral, stress, stable, values, ending)
-    shown = _without_holes(shown, tip.course.holes)
+    shown = _drop_holes(shown, tip.course.holes)
     return replace(shown, findings=tuple(_findings(tip, shown, solution.assembly.allowable_stress)))
 
 
-def _without_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
+def _drop_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
     """Return a ride without what lies in holes of the surface, and without values if there are any."""
     holes = tuple(hole for hole in holes if len(found.place) and hole[0] < found.place[-1])
     if not holes:

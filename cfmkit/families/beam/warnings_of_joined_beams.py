@@ -9,8 +9,8 @@ import numpy as np
 
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock, DrawnStrip, NodesAndBodies, joined_away_from_nodes
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
-from cfmkit.families.beam.strips_and_gaps import mirrored
+from cfmkit.families.beam.network_from_spec import is_on_axis, mirror_axis, moving_nodes
+from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -49,18 +49,20 @@ def joined_unasked(
     fillet : float
         Its inside corners [m].
     """
-    strips = [_drawn(assembly, name, found) for name, found in beams.items()]
+    strips = [_draw_strip(assembly, name, found) for name, found in beams.items()]
     blocks = [*blocks]
     if (axis := mirror_axis(assembly)) is not None:
         strips += [
             DrawnStrip(
-                f"{one.name}'", mirrored(one.points, *axis), one.thickness,
+                f"{one.name}'", mirror_points(one.points, *axis), one.thickness,
                 (_image(assembly, one.ends[0]), _image(assembly, one.ends[1])),
             )
             for one in strips
         ]  # fmt: skip
         blocks += [
-            DrawnBlock(f"{one.name}'", tuple(_image(assembly, node) for node in one.nodes), mirrored(one.shape, *axis))
+            DrawnBlock(
+                f"{one.name}'", tuple(_image(assembly, node) for node in one.nodes), mirror_points(one.shape, *axis)
+            )
             for one in blocks
             if not any(node.endswith("'") for node in one.nodes)  # bars between the halves are their own image
         ]
@@ -96,7 +98,7 @@ def _phrase(join: Join) -> str:
     return f"{pair} at ({at}){filled}"
 
 
-def _drawn(assembly: Assembly, name: str, found: Sequence[BeamStrip]) -> DrawnStrip:
+def _draw_strip(assembly: Assembly, name: str, found: Sequence[BeamStrip]) -> DrawnStrip:
     beam = assembly.network.beams[name]
     points = np.concatenate([strip.points for strip in found])
     return DrawnStrip(name, points, np.concatenate([strip.thickness for strip in found]), (beam.start, beam.end))
@@ -104,7 +106,7 @@ def _drawn(assembly: Assembly, name: str, found: Sequence[BeamStrip]) -> DrawnSt
 
 def _image(assembly: Assembly, node: str) -> str:
     """Return the name of a node in the mirrored half: on the axis it is the same."""
-    return node if on_axis(assembly, node) else f"{node}'"
+    return node if is_on_axis(assembly, node) else f"{node}'"
 
 
 def _nodes_and_bodies(assembly: Assembly) -> NodesAndBodies:
@@ -116,7 +118,7 @@ def _nodes_and_bodies(assembly: Assembly) -> NodesAndBodies:
     if axis is not None:
         pairs += [(_image(assembly, one), _image(assembly, other)) for one, other in pairs]
         pairs += [(name, _image(assembly, name)) for name in sorted(held | moving)]
-        places |= {_image(assembly, name): mirrored(at[None], *axis)[0] for name, at in places.items()}
+        places |= {_image(assembly, name): mirror_points(at[None], *axis)[0] for name, at in places.items()}
     return NodesAndBodies(places, _bodies(pairs))
 
 

@@ -26,10 +26,10 @@ from cfmkit.families.cam.mechanism_from_spec import (
     check_first_pose,
     loads_of,
 )
-from cfmkit.families.cam.model import reached, shortfalls, solve
+from cfmkit.families.cam.model import reachable_travel, shortfalls, solve
 from cfmkit.families.cam.scalar_results import COLUMNS
 from cfmkit.families.no_mechanism import CannotBuild
-from cfmkit.families.rows import SolvedRows, stacked, with_values, without_numbers
+from cfmkit.families.rows import SolvedRows, drop_numbers, stack, with_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -68,12 +68,12 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
     moving = [path for path in variants.values if path not in beside]
     alone: dict[Hashable, list[tuple[int, Assembly]]] = {}
     for members in _alike([variants.values[path] for path in moving], rows):
-        assembly = _assembled(variants, members, moving, plain)
+        assembly = _assemble_first(variants, members, moving, plain)
         if assembly is None:
             continue
         kind = None if len(members) >= SEVERAL else _kind(assembly, plain.keys() >= set(moving))
         if kind is None:
-            yield from _around_one(assembly, members, {path: variants.values[path] for path in beside})
+            yield from _group_around_one_cam(assembly, members, {path: variants.values[path] for path in beside})
             continue
         for row in members.tolist():
             own = _with_others(assembly, {path: variants.values[path][row].item() for path in beside})
@@ -148,7 +148,7 @@ def _alike(columns: list[NDArray[Any]], rows: Rows) -> list[Rows]:
     return sorted(groups, key=lambda members: int(members[0]))
 
 
-def _assembled(variants: Variants, members: Rows, moving: list[str], plain: Mapping[str, Any]) -> Assembly | None:
+def _assemble_first(variants: Variants, members: Rows, moving: list[str], plain: Mapping[str, Any]) -> Assembly | None:
     """Return the first of some mechanisms around one cam put together; None where that is left to the run of each."""
     try:
         if plain.keys() >= set(moving):
@@ -162,7 +162,7 @@ def _assembled(variants: Variants, members: Rows, moving: list[str], plain: Mapp
         check_first_pose(assembly)
     except (CannotBuild, CfmError):
         return None
-    low, end = reached(assembly)
+    low, end = reachable_travel(assembly)
     return None if end <= low or shortfalls(assembly, end) else assembly
 
 
@@ -188,13 +188,13 @@ def _kind(assembly: Assembly, are_plain: bool) -> Hashable | None:
     if kind is None:
         return None
     analysis = spec.analysis
-    corner = assembly.track.corner_end - assembly.track.start > reached(assembly)[0]
+    corner = assembly.track.corner_end - assembly.track.start > reachable_travel(assembly)[0]
     settings = analysis.points, analysis.band, repr(analysis.window), analysis.origin, corner
-    blocks = () if are_plain else (repr([without_numbers(one) for one in (spec.mechanism, analysis, spec.design)]),)
+    blocks = () if are_plain else (repr([drop_numbers(one) for one in (spec.mechanism, analysis, spec.design)]),)
     return kind, assembly.shortfall is None, settings, blocks
 
 
-def _around_one(assembly: Assembly, members: Rows, beside: Mapping[str, NDArray[Any]]) -> Iterator[Group]:
+def _group_around_one_cam(assembly: Assembly, members: Rows, beside: Mapping[str, NDArray[Any]]) -> Iterator[Group]:
     """Yield mechanisms around one cam, few at a time."""
     size = max(1, SAMPLES // assembly.spec.analysis.points)
     which_act = [values > 0 for path, values in beside.items() if "friction" in path or "masses" in path]
@@ -206,7 +206,7 @@ def _around_one(assembly: Assembly, members: Rows, beside: Mapping[str, NDArray[
             }
             if len(chosen) == 1:
                 columns = {path: float(values[0, 0]) for path, values in columns.items()}
-            yield chosen, _solved(solve(_with_others(assembly, columns), len(chosen)), chosen)
+            yield chosen, _solve_group(solve(_with_others(assembly, columns), len(chosen)), chosen)
 
 
 def _side_by_side(group: list[tuple[int, Assembly]], variants: Variants) -> Iterator[Group]:
@@ -216,9 +216,9 @@ def _side_by_side(group: list[tuple[int, Assembly]], variants: Variants) -> Iter
         rows, cams = zip(*group[start : start + size], strict=True)
         chosen = np.array(rows)
         if len(cams) == 1:
-            yield chosen, _solved(solve(cams[0]), chosen)
+            yield chosen, _solve_group(solve(cams[0]), chosen)
             continue
-        yield chosen, _solved(solve(_columns(cams, variants, chosen), len(cams), cams), chosen)
+        yield chosen, _solve_group(solve(_columns(cams, variants, chosen), len(cams), cams), chosen)
 
 
 _WRITTEN_OUT = tuple(
@@ -234,13 +234,13 @@ def _columns(cams: tuple[Assembly, ...], variants: Variants, chosen: Rows) -> As
     varied = {path: values[chosen] for path, values in variants.values.items() if values.dtype != object}
     numbers = [path for path, values in varied.items() if (values != values[0]).any()]
     columns = {path: variants.values[path][chosen].astype(np.float64)[:, None] for path in numbers}
-    columns |= {path: stacked([one.spec.at(path) for one in cams]) for path in _WRITTEN_OUT}
+    columns |= {path: stack([one.spec.at(path) for one in cams]) for path in _WRITTEN_OUT}
     track, profile = TrackRows([one.track for one in cams]), profiles_in_rows([one.profile for one in cams])
-    loads = stacked([one.loads for one in cams])
+    loads = stack([one.loads for one in cams])
     return replace(first, spec=with_values(first.spec, columns), profile=profile, track=track, loads=loads)
 
 
-def _solved(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:
+def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:
     known = np.isfinite(solution.up.slider[..., 1:].sum(axis=-1) + solution.down.slider[..., 1:].sum(axis=-1))
     held = solution.elongation.max(axis=-1) >= 0
     held = held if held.all() else held | (solution.up.contact > 0).any(axis=-1)

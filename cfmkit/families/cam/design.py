@@ -38,7 +38,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
-from cfmkit.families.findings import at_least, at_most, mm, newton, rate
+from cfmkit.families.findings import format_at_least, format_at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
 from cfmkit.results import OVERWRITTEN, Design, Finding, Status
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
@@ -114,7 +114,7 @@ def _with_choice(spec: CamSpec, target: CamDesign, factor: float, choice: Choice
     law = _law(spec, target, choice.force_constant, factor, choice.preload)
     _check_stroke(law, target, choice.springs)
     _check_bend(spec, law, target)
-    written = _written(spec, target, choice, factor)
+    written = _write_profile(spec, target, choice, factor)
     reported = (*_overwritten(spec, written), *_plate_lacks(written))
     return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=reported)
 
@@ -183,7 +183,7 @@ def _check_room(spec: CamSpec) -> None:
     """Raise if the rollers overlap with the springs at rest."""
     mechanism = spec.mechanism
     if (gap := 2.0 * (mechanism.rest_half_width - mechanism.roller_radius)) < 0:
-        room = {"mechanism.roller_radius": at_most(mechanism.rest_half_width)}
+        room = {"mechanism.roller_radius": format_at_most(mechanism.rest_half_width)}
         raise Infeasible(rollers_overlap(gap), room)
 
 
@@ -262,7 +262,7 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
                 f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut "
                 "('design.avoid_undercut')",
             ),
-            {"design.force_constant": at_least(smallest)},
+            {"design.force_constant": format_at_least(smallest)},
         )
     springs = spec.mechanism.springs.scaled_to(pull / (4.0 * constant))
     return Choice(constant, springs, preload=spec.mechanism.effective_preload)
@@ -340,7 +340,7 @@ def _check_bend(spec: CamSpec, law: SlopeLaw, target: CamDesign) -> None:
         cut_profile(path, spec.mechanism.roller_radius, end)
     except CannotBuild as problem:
         raise Infeasible(
-            problem.finding, {"mechanism.roller_radius": at_most(law.tightest(end)[1] * (1 - 1e-6))}
+            problem.finding, {"mechanism.roller_radius": format_at_most(law.tightest(end)[1] * (1 - 1e-6))}
         ) from None
 
 
@@ -411,7 +411,7 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
                 f"with A = {mm(law.force_constant)} the stroke ends at {mm(reached)} of {mm(target.stroke)} "
                 "('design.stroke')",
             ),
-            {"design.stroke": at_most(reached)},
+            {"design.stroke": format_at_most(reached)},
         )
     limit, opened = springs.max_elongation, springs.tension_stretch
     elongation = 2.0 * (end - law.rest_half_width + law.preload) - opened
@@ -423,7 +423,7 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
                 f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)} "
                 f"('mechanism.springs.max_elongation'); the stroke they allow is {mm(shorter)}",
             ),
-            {"design.stroke": at_most(shorter)},
+            {"design.stroke": format_at_most(shorter)},
         )
 
 
@@ -469,7 +469,7 @@ def _plate_lacks(spec: CamSpec) -> Iterator[Finding]:
         yield finding("plate_incomplete", note)
 
 
-def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) -> CamSpec:
+def _write_profile(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) -> CamSpec:
     """Return the spec with the designed profile written out, so that it is a fixed part from now on."""
     mechanism = spec.mechanism
     profile: dict[str, Any] = {

@@ -28,9 +28,9 @@ from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
+from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, apply_style, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     return {maker.__name__: partial(maker, result) for maker in makers} | band_figures(result)
 
 
-@styled
+@apply_style
 def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None = None) -> Axes:
     """Draw the mechanism to scale at one point of the solution; return the axes, which are in millimetres.
 
@@ -143,7 +143,7 @@ def regions(solution: Solution) -> list[MarkedRange]:
     return found
 
 
-@styled
+@apply_style
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale at the start, in the middle and at the end of the travel."""
     solution, heading = result.state, Heading.of(result, "mechanism to scale")
@@ -290,7 +290,7 @@ def clearance(result: Result) -> Figure:
     return diagram_figure(Heading.of(result, "clearances of the moving parts"), [diagram])
 
 
-@styled
+@apply_style
 def undercut(result: Result) -> Figure:
     """Return what undercut does: the roller on the corner, what is cut away, and the force there."""
     solution: Solution = result.state
@@ -377,13 +377,13 @@ def profile(result: Result) -> Figure:
     kinds = (("error along the normal", built.registration.errors), ("error in x", built.across))
     diagrams = []
     for name, errors in kinds:
-        right, left = (_over_height(built, side, values, heights) for side, values in enumerate(errors))
+        right, left = (_values_over_height(built, side, values, heights) for side, values in enumerate(errors))
         series = [Series(right, "right", BLUE, prefer=0.3), Series(left, "left", VERMILLION, prefer=0.7)]
         diagrams.append(Diagram(heights, Scale("height on the cam", "length"), Scale(name, "length"), series))
     return diagram_figure(Heading.of(result, "measured profile less design, positive outside"), diagrams)
 
 
-def _over_height(built: Built, side: int, values: FloatArray, heights: FloatArray) -> FloatArray:
+def _values_over_height(built: Built, side: int, values: FloatArray, heights: FloatArray) -> FloatArray:
     used = built.registration.used[side]
     y = built.registration.points[side][used, 1]
     order = np.argsort(y, kind="stable")
@@ -435,6 +435,6 @@ def moving(result: Result) -> Moving | None:
     solution = result.state
     if solution is None or not hasattr(solution, "states"):
         return None
-    view, points = scene(solution), chosen(len(solution.travel))
+    view, points = scene(solution), choose_poses(len(solution.travel))
     motion = solution.origin + solution.travel[points]
     return Moving(motion, view.box, lambda ax, number: draw_mechanism(solution, int(points[number]), ax, view))

@@ -14,7 +14,7 @@ from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stres
 from cfmkit.families.cam.largest_next_to_samples import largest_of_each
 from cfmkit.families.cam.scalar_results import errors_used, half_extent, largest, pressure_of, root_mean_square
 from cfmkit.families.cam.statics import spring_force
-from cfmkit.families.findings import at_least, finder, mm, mpa, newton
+from cfmkit.families.findings import finder, format_at_least, mm, mpa, newton
 from cfmkit.families.rows import FindingRule
 from cfmkit.numerics.robust_statistics import neighbour_noise
 
@@ -94,12 +94,12 @@ def is_slack(elongation: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(elongation < -SHORTER)
 
 
-def overstretched(longest: FloatArray | float, limit: float) -> Any:
+def is_overstretched(longest: FloatArray | float, limit: float) -> Any:
     """Return whether springs are stretched beyond their limit [m]."""
     return np.asarray(longest > limit * (1 + ROUNDING))
 
 
-def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
+def find_overstress(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
     """Return what to say where the contact yields; None if it does not.
 
     Parameters
@@ -121,7 +121,7 @@ def overstress(mechanism: Mechanism, largest: float, place: str) -> tuple[str, .
     """Return message and cure of a contact that yields under a pressure [Pa] at a place."""
     contact, limit = mechanism.contact, YIELD_PRESSURE * (allowable_stress(mechanism) or 0.0)
     assert contact is not None
-    wider = at_least(contact.width * (largest / limit) ** 2)
+    wider = format_at_least(contact.width * (largest / limit) ** 2)
     safety = f" over a safety factor of {mechanism.safety_factor:g}" if mechanism.safety_factor != 1 else ""
     return (
         f"the contact pressure of {mpa(largest)} {place} is above {mpa(limit)}, at which the material first yields "
@@ -261,10 +261,10 @@ def _slack(solution: Solution) -> tuple[str, ...]:
 
 def _is_overstretched(solution: Solution) -> Any:
     limit = solution.mechanism.springs.max_elongation
-    return limit is not None and overstretched(solution.elongation[..., -1:], limit)
+    return limit is not None and is_overstretched(solution.elongation[..., -1:], limit)
 
 
-def _overstretched(solution: Solution) -> tuple[str, ...]:
+def _describe_overstretch(solution: Solution) -> tuple[str, ...]:
     limit, longest = solution.mechanism.springs.max_elongation, float(solution.elongation[-1])
     past = _travel_at(solution, limit)
     return (f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",)
@@ -312,7 +312,7 @@ def _is_overloaded(solution: Solution) -> Any:
     return (most > 0) & (most > bearings.static_rating * bearings.per_roller)
 
 
-def _overloaded(solution: Solution) -> tuple[str, ...]:
+def _describe_overload(solution: Solution) -> tuple[str, ...]:
     bearings, most = solution.mechanism.bearings, largest(solution.up.contact, solution.down.contact)
     return (
         f"a roller presses with {newton(most or 0.0)} on {bearings.per_roller} bearing(s) with a static rating of "
@@ -325,7 +325,7 @@ def _is_overstressed(solution: Solution) -> Any:
     return allowable is not None and yields(solution.flank.largest_pressure[0], allowable)
 
 
-def _overstressed(solution: Solution) -> tuple[str, ...]:
+def _describe_overstress(solution: Solution) -> tuple[str, ...]:
     top, travel = (float(one[0, 0]) for one in solution.flank.largest_pressure)
     return overstress(solution.mechanism, top, f"at {mm(travel)} of travel")
 
@@ -352,12 +352,12 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
         *map(_jam, range(number)),
         FindingRule("dead_point", _is_dead, _dead_point),
         FindingRule("spring_slack", lambda one: is_slack(one.elongation).any(axis=-1), _slack),
-        FindingRule("spring_overstretched", _is_overstretched, _overstretched),
+        FindingRule("spring_overstretched", _is_overstretched, _describe_overstretch),
         _slack_cable("up"),
         _slack_cable("down"),
         FindingRule("lift_off", _is_lifted, _lift_off),
-        FindingRule("bearing_overloaded", _is_overloaded, _overloaded),
-        FindingRule("overstressed", _is_overstressed, _overstressed),
+        FindingRule("bearing_overloaded", _is_overloaded, _describe_overload),
+        FindingRule("overstressed", _is_overstressed, _describe_overstress),
     )
 
 
@@ -383,11 +383,11 @@ def findings_of_built(built: Built) -> list[Finding]:
             )
         )
     if built.unmeasured:
-        found.append(finding("profile_hole", unmeasured(built)))
+        found.append(finding("profile_hole", describe_unmeasured(built)))
     return found
 
 
-def unmeasured(built: Built) -> str:
+def describe_unmeasured(built: Built) -> str:
     """Return what is said of parts of the flanks without points."""
     spans = " and ".join(f"{mm(low)} to {mm(high)}" for low, high in built.unmeasured)
     return f"a flank has no points where the rollers touch it from {spans} of travel: the force there is not known"
@@ -396,7 +396,7 @@ def unmeasured(built: Built) -> str:
 def _built_mechanics(built: Built) -> Iterator[Finding]:
     """Yield what is wrong with the mechanism that the measured cam is built into."""
     limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
-    if limit and overstretched(longest, limit):
+    if limit and is_overstretched(longest, limit):
         past = float(built.travel[np.argmax(built.elongation > limit)])
         yield finding(
             "spring_overstretched",
@@ -408,7 +408,7 @@ def _built_mechanics(built: Built) -> Iterator[Finding]:
     pressed = pressure_of(built, 1.0)
     if (top := worst(pressed)) is not None:
         place = f"at {mm(float(built.travel[top]))} of travel"
-        if reported := overstressed(built.assembly.spec.mechanism, float(pressed[top]), place):
+        if reported := find_overstress(built.assembly.spec.mechanism, float(pressed[top]), place):
             yield reported
     held = ~np.isfinite(built.forces(1.0)[0]) & np.isfinite(built.sides.slope[0]) & np.isfinite(built.sides.slope[1])
     if held.any():
@@ -455,7 +455,7 @@ def _doubtful_points(built: Built) -> Iterator[Finding]:
             "profile_outliers", f"{outliers} of {count} points are far off or beyond the flank and are omitted"
         )
     stated = float(built.assembly.spec.mechanism.profile.noise or 0.0)
-    seen = max(neighbour_noise(one, use) for one, use in _along(built))
+    seen = max(neighbour_noise(one, use) for one, use in _errors_along(built))
     if seen > TOO_NOISY * stated:
         yield finding(
             "noise_understated",
@@ -470,7 +470,7 @@ def _doubtful_points(built: Built) -> Iterator[Finding]:
         )
 
 
-def _along(built: Built) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _errors_along(built: Built) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield path coordinates and errors of the points that count, one flank after the other [m]."""
     registration = built.registration
     for place, error, keep in zip(registration.parameters, registration.errors, registration.used, strict=True):

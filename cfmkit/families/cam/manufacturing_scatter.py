@@ -92,7 +92,7 @@ def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray,
     loads = assembly.loads
 
     def side() -> tuple[FloatArray, FloatArray]:
-        error = _drawn(generator, tolerance, nominal, places)
+        error = _draw_error(generator, tolerance, nominal, places)
         built = BuiltFlank(flank, error, arc).frame(places)  # type: ignore[arg-type]
         return _track(assembly, built, slider)
 
@@ -105,7 +105,7 @@ def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray,
     return ForceBand(travel, forces, designed.forces(loads, 0.0, loads.rest_half_width)[0])
 
 
-def _drawn(
+def _draw_error(
     generator: np.random.Generator, tolerance: Manufacturing, nominal: CurveFrame, places: FloatArray
 ) -> DrawnError:
     longest = float(places[-1])

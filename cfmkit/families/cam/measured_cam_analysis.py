@@ -29,14 +29,14 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.assembly import Assembly, target_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out, unmeasured
+from cfmkit.families.cam.findings import describe_unmeasured, finding, findings_of_built, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
     check_first_pose,
     check_springs,
+    count_before_overlap,
     displacement_origin,
-    until_overlap,
 )
 from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
@@ -62,7 +62,7 @@ from cfmkit.numerics.rigid_point_registration import (
 from cfmkit.numerics.smoothing_spline import smoothed
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 from cfmkit.tables.measured_outline import read_sides
 
 if TYPE_CHECKING:
@@ -94,15 +94,15 @@ def analyze_built(spec: CamSpec) -> Result:
     try:
         assembly = assemble(spec)
         check_first_pose(assembly)
-        registration = registered(assembly)
+        registration = register_cam(assembly)
         tracks = _tracks(assembly, registration)
         travel, ended = _travel(assembly, tracks)
-        built = _solved(assembly, registration, tracks, travel)
+        built = _solve_cam(assembly, registration, tracks, travel)
         check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     holes = built.unmeasured
-    short = ended.message if ended else unmeasured(built) if large_holes(built) else ""
+    short = ended.message if ended else describe_unmeasured(built) if large_holes(built) else ""
     found = [ended] if ended else []
     asked = assembly.spec.analysis.model_copy(
         update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
@@ -121,7 +121,7 @@ def analyze_built(spec: CamSpec) -> Result:
             *findings_of_built(built),
         ),
         travel=requested_travel(built),
-        valid=_between_holes(built, holes),
+        valid=_intervals_between_holes(built, holes),
         target=(
             target_force(spec, assembly)
             if spec.design or assembly.spec.mechanism.profile.curve
@@ -133,7 +133,7 @@ def analyze_built(spec: CamSpec) -> Result:
     )
 
 
-def _between_holes(built: Built, holes: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+def _intervals_between_holes(built: Built, holes: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
     """Return the intervals of displacement at which both contacts are on measured points [m]."""
     inner = [place for hole in holes for place in hole]
     ends = [float(built.travel[0]), *inner, float(built.travel[-1])]
@@ -141,7 +141,7 @@ def _between_holes(built: Built, holes: Sequence[tuple[float, float]]) -> tuple[
     return tuple((low + built.origin, high + built.origin) for low, high in pairs if low < high)
 
 
-def registered(assembly: Assembly) -> Registration:
+def register_cam(assembly: Assembly) -> Registration:
     """Return the measured points of an assembly's cam, registered to its design."""
     source = assembly.spec.mechanism.profile.file
     if not isinstance(source, DataSource):
@@ -222,7 +222,7 @@ def _narrowest_window(track: BuiltTrack, assembly: Assembly) -> float:
     """Return the width of the narrowest window over which something is measured, by default of the travel [m]."""
     spec = assembly.spec
     travel = spec.analysis.travel or float(track.slider[-1]) - assembly.track.start
-    windows = [between(ends, (0.0, travel)) for _, ends in spec.windows()]
+    windows = [window_places(ends, (0.0, travel)) for _, ends in spec.windows()]
     return min([travel, *(high - low for low, high in windows)])
 
 
@@ -245,11 +245,11 @@ def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[
         short = finding("outside_profile", message)
     travel = np.linspace(low, min(asked or high, high), assembly.spec.analysis.points)
     x = tracks[0].at(start + travel)[0], tracks[1].at(start + travel)[0]
-    count, overlap = until_overlap(travel, start + travel, x, assembly.spec.mechanism)
+    count, overlap = count_before_overlap(travel, start + travel, x, assembly.spec.mechanism)
     return travel[:count], overlap or short
 
 
-def _solved(
+def _solve_cam(
     assembly: Assembly, registration: Registration, tracks: tuple[BuiltTrack, BuiltTrack], travel: FloatArray
 ) -> Built:
     slider = assembly.track.start + travel
@@ -259,7 +259,7 @@ def _solved(
     return Built(
         assembly,
         registration,
-        across(assembly, registration),
+        errors_across(assembly, registration),
         travel,
         sides,
         shares_of(assembly, designed, sides),
@@ -316,7 +316,7 @@ def _way(branch: str) -> float:
     return 1.0 if branch == "load" else -1.0
 
 
-def across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, FloatArray]:
+def errors_across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, FloatArray]:
     """Return the errors of both flanks in x at the same y, positive outside [m]."""
     sides = zip(flanks_of(assembly), registration.points, registration.parameters, strict=True)
     right, left = (flank.side * gaps_across(flank, points, u) for flank, points, u in sides)
@@ -453,7 +453,7 @@ def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) ->
         gap = centers + lift[:, None] * base.normals - at.points
         lift = lift + (roller_radius - np.hypot(gap[:, 0], gap[:, 1])) / (at.normals * base.normals).sum(axis=1)
     centers = centers + lift[:, None] * base.normals
-    return _over_slider(centers, flank.frame(contact), contact, brace_length)
+    return _track_over_slider(centers, flank.frame(contact), contact, brace_length)
 
 
 def _lift(
@@ -475,7 +475,7 @@ def _lift(
     return best, places[where]
 
 
-def _over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
+def _track_over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
     x, y = centers.T
     slider = y + np.sqrt((brace - x) * (brace + x))
     # Where a wave makes the slider fall the roller jumps to the next place at which it rises beyond.

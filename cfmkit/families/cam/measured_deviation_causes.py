@@ -68,7 +68,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     sides, designed = _sides(state, loop.places - state.origin)
     loads, mechanism = state.assembly.loads, state.assembly.spec.mechanism
     drawn = mechanism.springs_rest_as_cut
-    friction, rest = _explained(sides, loads, loop)
+    friction, rest = _explain_loop(sides, loads, loop)
     design = designed.forces(loads, 0.0, drawn)[0]
     on_track = sides.forces(loads, 0.0, drawn)[0]
     smooth = sides.forces(loads, 0.0, rest)[0]
@@ -101,7 +101,7 @@ def _sides(state: Built | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
     return Sides((x[0], x[1]), (slope[0], slope[1])), designed
 
 
-def _explained(sides: Sides, loads: Loads, loop: MeasuredLoop) -> tuple[float, float]:
+def _explain_loop(sides: Sides, loads: Loads, loop: MeasuredLoop) -> tuple[float, float]:
     """Return the friction that has the measured area, and the rest half width [m] that has the measured midline."""
     friction, rest = 0.0, loads.rest_half_width
     area, middle = np.trapezoid(loop.up - loop.down, loop.places), 0.5 * (loop.up + loop.down)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cfmkit.families.cam.assembly import CLOSE, Assembly
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import CAMS_KEPT, RollerPath, reached_path
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
@@ -297,7 +297,7 @@ def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfil
         If nothing of it is left, or a part that the roller needs is missing beyond the start.
     """
     try:
-        profile = cut(path, roller_radius, end)
+        profile = cut_cam(path, roller_radius, end)
         _check_bend(profile)
         return profile
     except WholeCamUndercut:
@@ -435,7 +435,7 @@ def check_first_pose(assembly: Assembly) -> None:
         raise CannotBuild(rollers_overlap(gap))
 
 
-def until_overlap(
+def count_before_overlap(
     travel: FloatArray, slider: FloatArray, x: tuple[FloatArray, FloatArray], mechanism: Mechanism
 ) -> tuple[int, Finding | None]:
     """Return the number of points before the rollers overlap, and what to say if they do.

@@ -37,7 +37,7 @@ from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import findings_of_one, stacked, values_of_one
+from cfmkit.families.rows import findings_of_one, stack, values_of_one
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 
@@ -106,7 +106,10 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         curves=(_curve(solution),),
         values=values_of_one(QUANTITIES, solution) | smallest(solution),
         warnings=LazySequence(partial(_findings, solution, short)),
-        travel=(solution.origin + float(solution.travel[0]), solution.origin + _requested(solution, bool(short))),
+        travel=(
+            solution.origin + float(solution.travel[0]),
+            solution.origin + _requested_travel(solution, bool(short)),
+        ),
         valid=(
             (
                 max(solution.corner_travel, float(solution.travel[0])) + solution.origin,
@@ -141,7 +144,7 @@ def with_band(solution: Solution, seed: int) -> Solution:
     return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
 
 
-def _requested(solution: Solution, short: bool) -> float:
+def _requested_travel(solution: Solution, short: bool) -> float:
     """Return how far the slider was to go [m]; without a request, as far as the flank was to be cut."""
     spec = solution.assembly.spec
     return float(spec.mechanism.profile.stroke or 0.0) if short and not spec.analysis.travel else solution.requested
@@ -149,7 +152,7 @@ def _requested(solution: Solution, short: bool) -> float:
 
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    travel = _requested(solution, short=False)
+    travel = _requested_travel(solution, short=False)
     analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
     return spec.model_copy(update={"analysis": analysis})
 
@@ -172,7 +175,7 @@ def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -
         If a stop leaves no travel.
     """
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
-    low, end = np.array([reached(one) for one in cams]).T if cams else reached(assembly)
+    low, end = np.array([reachable_travel(one) for one in cams]).T if cams else reachable_travel(assembly)
     if not cams and end <= low:
         raise CannotBuild(
             finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
@@ -181,19 +184,19 @@ def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -
     states, friction = track.states(track.start + travel), spec.mechanism.rolling_friction
     up = forces(states, loads, friction)
     down = forces(states, loads, -friction, -1.0) if np.any(friction) or loads.losses else up
-    origin = stacked([displacement_origin(one) for one in cams or (assembly,)])
+    origin = stack([displacement_origin(one) for one in cams or (assembly,)])
     return Solution(assembly, travel, states, up, down, origin, count=count, cams=cams)
 
 
-def reached(assembly: Assembly) -> tuple[float, float]:
+def reachable_travel(assembly: Assembly) -> tuple[float, float]:
     """Return where the travel begins, and as far as it goes: to what is asked, the end of the track, or a stop [m]."""
     spec, track = assembly.spec, assembly.track
     available = track.end - track.start
-    low, high = stopped(spec)
+    low, high = travel_between_stops(spec)
     return low, min(spec.analysis.travel or available, available, high)
 
 
-def stopped(spec: CamSpec) -> tuple[float, float]:
+def travel_between_stops(spec: CamSpec) -> tuple[float, float]:
     """Return between which travels the stops let the slider move [m]."""
     stops = spec.mechanism.stops
     return (0.0, np.inf) if stops is None else (stops.lower, np.inf if stops.upper is None else stops.upper)
@@ -204,7 +207,7 @@ def shortfalls(assembly: Assembly, reached: float) -> tuple[Finding, ...]:
     found = [assembly.shortfall] if assembly.shortfall else []
     asked = assembly.spec.analysis.travel
     short = asked is not None and reached < asked * (1 - CLOSE)
-    if asked is not None and short and stopped(assembly.spec)[1] <= reached * (1 + CLOSE):
+    if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + CLOSE):
         found.append(
             finding(
                 "end_stop",

@@ -22,7 +22,7 @@ from cfmkit.families.cam.part_sizes import count_of, depth_of
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, called
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring
@@ -75,10 +75,10 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a cam is fixed by its springs and cannot be adjusted")
     draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
-    found = _sized(request, draw)
+    found = _size_proportions(request, draw)
     fitting = found["fits"] & found["flat"] & found["lossless"]
     if not fitting.any():
-        return _out_of_reach(request, found)
+        return _explain_no_offer(request, found)
     chosen = _spread(found, np.flatnonzero(fitting))
     candidates: list[Candidate] = []
     for index in chosen:
@@ -92,7 +92,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     return FamilyOffer(tuple(candidates))
 
 
-def _sized(request: Request, draw: FloatArray) -> dict[str, Any]:
+def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
     """Return sizes and measures of many proportions, by name: lengths [m], ratios, and which fit."""
     across, along = request.envelope[:2]
     longest = max(across, along)
@@ -165,7 +165,7 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
             # as few springs as there is room for; without a depth they may be as deep as the envelope is wide
             modest = [count for count, depth in depths.items() if request.depth or depth <= max(request.envelope)]
             count = modest[0] if modest else min(depths, key=lambda one: depths[one])
-            return _written(request, size, dict(block), thick, count, total)
+            return _write_candidate(request, size, dict(block), thick, count, total)
     return None
 
 
@@ -199,7 +199,7 @@ def _from_catalogue(made: Candidate) -> Candidate:
     )
 
 
-def _written(
+def _write_candidate(
     request: Request, size: dict[str, float], material: dict[str, Any], thick: float, count: int, total: float
 ) -> Candidate:
     along = request.envelope[1]
@@ -234,12 +234,12 @@ def _written(
     }
     spec = CamSpec.model_validate(data)
     area = size["width"] * size["height"] / (request.envelope[0] * request.envelope[1])
-    variant = called(f"{count} spring{'s' if count > 1 else ''}", request, material)
+    variant = name_variant(f"{count} spring{'s' if count > 1 else ''}", request, material)
     promise = area + size["ripple"] / request.ripple
     return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise, springs="custom")
 
 
-def _out_of_reach(request: Request, found: dict[str, Any]) -> FamilyOffer:
+def _explain_no_offer(request: Request, found: dict[str, Any]) -> FamilyOffer:
     """Return why no proportions fit."""
     if not found["there"].any():
         return FamilyOffer(reason="no cam of this travel has a path that its roller can follow within such an envelope")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.designing.bounds_and_rounding import range_about
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
@@ -21,10 +21,10 @@ def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
         What came out.
     """
     wanted, mechanism = given.design, designed.mechanism
-    found = {"mechanism.profile.force_constant": around(mechanism.profile.force_constant)}
+    found = {"mechanism.profile.force_constant": range_about(mechanism.profile.force_constant)}
     rate = mechanism.springs.stiffness
     if wanted is not None and wanted.choose == "stiffness" and isinstance(rate, float):
-        found["mechanism.springs.stiffness"] = around(rate)
+        found["mechanism.springs.stiffness"] = range_about(rate)
     return found
 
 

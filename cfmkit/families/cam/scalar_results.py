@@ -18,7 +18,7 @@ from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_cove
 from cfmkit.families.rows import ScalarQuantity
 from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def _bearing_turns(solution: Solution) -> FloatArray:
     return np.asarray(np.abs(rolled - np.diff(np.arcsin(states.x / mechanism.brace_length))) / (2.0 * np.pi))
 
 
-def _taken(solution: Solution, kind: str) -> FloatArray:
+def _friction_energy(solution: Solution, kind: str) -> FloatArray:
     """Return the energy that a kind of friction takes over the window, up and down [J]."""
     up, down = (state.lost or {} for state in (solution.up, solution.down))
     places = solution.travel + solution.origin
@@ -257,7 +257,7 @@ def _taken(solution: Solution, kind: str) -> FloatArray:
 
 def _loop_area(solution: Solution) -> FloatArray:
     """Return the energy that all friction takes over the window [J]; NaN where it is not finite, or nothing."""
-    area = reduce(np.add, (_taken(solution, kind) for kind in solution.up.lost or {}))
+    area = reduce(np.add, (_friction_energy(solution, kind) for kind in solution.up.lost or {}))
     return np.where(np.isfinite(area) & (area > 0), area, np.nan)
 
 
@@ -343,11 +343,11 @@ def _deviations(share: float) -> Callable[[Solution], float]:
 
 
 def _loop_energy(solution: Solution, kind: str) -> FloatArray:
-    return np.where(np.isnan(_loop_area(solution)), np.nan, _taken(solution, kind))
+    return np.where(np.isnan(_loop_area(solution)), np.nan, _friction_energy(solution, kind))
 
 
 def _loop_share(solution: Solution, kind: str) -> FloatArray:
-    return _taken(solution, kind) / _loop_area(solution)
+    return _friction_energy(solution, kind) / _loop_area(solution)
 
 
 def _least_contact(solution: Solution) -> FloatArray:
@@ -459,7 +459,7 @@ def loop_area_per_friction(built: Built) -> float:
     loads, small = built.assembly.loads, 1e-6
     up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
     window = built.assembly.spec.analysis.window
-    ends = between(window, requested_travel(built)) if window else None
+    ends = window_places(window, requested_travel(built)) if window else None
     places = built.travel + built.origin
     return float(_integral(places, up - down, *(ends or (places[0], places[-1])))[0]) / small
 

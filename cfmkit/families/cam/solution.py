@@ -21,7 +21,7 @@ from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.rows import rows_of
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.results import ROUND_OFF
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -198,12 +198,12 @@ class Solution(ShortRepr):
             if losses is None and not np.ndim(friction) and not isinstance(track, TrackRows):
                 # springs and weights do not change leverage
                 (own,) = jams(track, friction, states)
-                known = [_within(own, float(total[0]))] * len(rows)
+                known = [_clip_intervals(own, float(total[0]))] * len(rows)
             else:
                 if len(rows) < self.count:
                     track, parts = track.of_rows(rows), rows_of(parts, rows)
                 each = zip(jams(track, *parts, len(rows)), total[rows].tolist(), strict=True)
-                known = [_within(own, end) for own, end in each]
+                known = [_clip_intervals(own, end) for own, end in each]
             for row, own in zip(rows.tolist(), known, strict=True):
                 found[row] = own
         return found
@@ -228,7 +228,7 @@ class Solution(ShortRepr):
         low, high = places[..., :1], places[..., -1:]
         if stated is None:
             return Several((low, high))
-        ends = [between(stated, pair) for pair in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)]
+        ends = [window_places(stated, pair) for pair in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)]
         return Several(np.array(ends).T[..., None] if low.ndim > 1 else np.array(ends[0])[:, None])
 
     @property
@@ -350,9 +350,9 @@ class FlankSamples(ShortRepr):
         (first, up), (_, down) = (solution.at_travel(corner, way, flank=True) for way in (1.0, -1.0))
         return cls(
             solution,
-            _behind(corner, travel),
-            _behind(leaves, there),
-            TrackStates(*map(_behind, first.fields(), states.fields())),
+            _append_column(corner, travel),
+            _append_column(leaves, there),
+            TrackStates(*map(_append_column, first.fields(), states.fields())),
             _forces_behind(up, solution.up),
             _forces_behind(down, solution.down),
         )
@@ -383,20 +383,20 @@ class FlankSamples(ShortRepr):
 
 
 def _forces_behind(first: Forces, rest: Forces) -> Forces:
-    return Forces(_behind(first.slider, rest.slider), partial(_inside_behind, first, rest))
+    return Forces(_append_column(first.slider, rest.slider), partial(_split_inside_behind, first, rest))
 
 
-def _inside_behind(first: Forces, rest: Forces) -> tuple[FloatArray, FloatArray]:
-    return _behind(first.contact, rest.contact), _behind(first.brace, rest.brace)
+def _split_inside_behind(first: Forces, rest: Forces) -> tuple[FloatArray, FloatArray]:
+    return _append_column(first.contact, rest.contact), _append_column(first.brace, rest.brace)
 
 
-def _behind(first: Any, rest: Any) -> Any:
+def _append_column(first: Any, rest: Any) -> Any:
     """Return (..., 1) and (..., n) as (..., n + 1)."""
     shape = np.broadcast_shapes(np.shape(first)[:-1], rest.shape[:-1])
     return np.concatenate([np.broadcast_to(one, (*shape, one.shape[-1])) for one in (first, rest)], axis=-1)
 
 
-def _within(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[float, float], ...]:
+def _clip_intervals(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[float, float], ...]:
     """Return intervals as far as the travel goes [m]."""
     return tuple((max(low, 0.0), min(high, end)) for low, high in jams if low < end)
 

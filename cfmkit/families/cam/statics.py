@@ -180,22 +180,22 @@ def forces(states: TrackStates, loads: Loads, friction: Any, way: float = 1.0) -
     tangent = brace_tangent(states.x, loads.brace_length)
     turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
-    pull = over(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever)
+    pull = safe_divide(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever)
     at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
     idle = at_rest & (np.abs(lever) < 1e-13)
     is_limit = bool(idle.any()) and weight is None
     if is_limit:
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
         with np.errstate(divide="ignore", invalid="ignore"):
-            pull = np.where(idle, at_dead_point(slope, states.bend, parts, friction), pull)
+            pull = np.where(idle, dead_point_limit(slope, states.bend, parts, friction), pull)
 
     limit = (idle, turn) if is_limit else None
     return Forces(
-        pull + loads.slider_weight, partial(_inside, (slope, tangent, spring, weight), lever, 0.5 * pull, limit)
+        pull + loads.slider_weight, partial(_inner_forces, (slope, tangent, spring, weight), lever, 0.5 * pull, limit)
     )
 
 
-def _inside(
+def _inner_forces(
     loaded: tuple[Any, ...], lever: FloatArray, half_pull: FloatArray, limit: tuple[Any, Any] | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the forces at a contact and in a brace [N].
@@ -204,7 +204,7 @@ def _inside(
     where forces are those of the dead point, and 1 + mu f.
     """
     slope, tangent, *_ = loaded
-    contact = over(load_on_contact(*loaded), lever)
+    contact = safe_divide(load_on_contact(*loaded), lever)
     if limit is not None:
         idle, turn = limit
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -212,7 +212,7 @@ def _inside(
     return contact, half_pull * np.sqrt(1.0 + tangent * tangent)
 
 
-def over(load: FloatArray, lever: FloatArray) -> FloatArray:
+def safe_divide(load: FloatArray, lever: FloatArray) -> FloatArray:
     """Return load / lever; 0 for nothing over anything, NaN where there is no leverage to move the load."""
     moves = lever > 0
     if moves.all():
@@ -221,7 +221,7 @@ def over(load: FloatArray, lever: FloatArray) -> FloatArray:
     return np.where(moves | (load == 0), force, np.nan)
 
 
-def at_dead_point(slope: Real, bend: Real, parts: tuple[float, float, float], friction: float) -> Real:
+def dead_point_limit(slope: Real, bend: Real, parts: tuple[float, float, float], friction: float) -> Real:
     """Return the limit of 0/0, the ratio of the derivatives [N].
 
     At the first point of an ideal profile the springs carry nothing and the slider has
@@ -321,7 +321,7 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     if not any(map(np.any, (turn, losses.pin, weight, outward))):
         dead = (np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width) & (np.abs(lever) < 1e-13)
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
-        pull = np.where(dead, 0.5 * at_dead_point(slope, states.bend, parts, 0.0), pull)
+        pull = np.where(dead, 0.5 * dead_point_limit(slope, states.bend, parts, 0.0), pull)
     contact = ((slope - turn) * (pulled + bend + pull * tangent) + one * (pull - weight)) / ((1.0 + turn**2) * along)
     return _Side(pull, pull * tangent + bend, contact, (pull + bend * cos * sin) / cos)
 
@@ -336,11 +336,13 @@ def _forces_with_losses(states: TrackStates, loads: Loads, rolling: Any, way: fl
         guided,
         lambda: (np.maximum(right.contact, left.contact), np.maximum(np.abs(right.axial), np.abs(left.axial))),
         np.minimum(right.contact, left.contact),
-        _lost(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
+        _friction_power(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
     )
 
 
-def _lost(states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side, _Side]) -> dict[str, FloatArray]:
+def _friction_power(
+    states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side, _Side]
+) -> dict[str, FloatArray]:
     """Return the power that each kind of friction takes, over the slider's speed [N]."""
     tangent = brace_tangent(states.x, loads.brace_length)
     axial, contact = (sum(np.abs(getattr(side, name)) for side in sides) for name in ("axial", "contact"))

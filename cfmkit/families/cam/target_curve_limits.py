@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.findings import at_most, mm, newton
+from cfmkit.families.findings import format_at_most, mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def check_target(target: CamDesign) -> None:
                 f"the target curve goes from {known}, and the slider from 0 mm to {mm(target.stroke)}; let its points "
                 "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
             ),
-            {"design.stroke": at_most(last)} if last > 0 >= first else None,
+            {"design.stroke": format_at_most(last)} if last > 0 >= first else None,
         )
     shape = curve.between(0.0, target.stroke)
     places = np.linspace(0.0, max(target.stroke, shape.places[-1]), 2001)

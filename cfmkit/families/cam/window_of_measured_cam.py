@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +20,7 @@ def travel_window(built: Built) -> tuple[float, float]:
     window = built.assembly.spec.analysis.window
     if window is None:
         return float(built.travel[0]), float(built.travel[-1])
-    low, high = between(window, requested_travel(built))
+    low, high = window_places(window, requested_travel(built))
     return low - built.origin, high - built.origin
 
 
@@ -43,7 +43,7 @@ def window_mask(built: Built) -> NDArray[np.bool_]:
     place, window = built.travel + built.origin, built.assembly.spec.analysis.window
     if window is None:
         return np.ones(len(place), dtype=bool)
-    low, high = between(window, requested_travel(built))
+    low, high = window_places(window, requested_travel(built))
     inside: NDArray[np.bool_] = (place >= low) & (place <= high)
     return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
 

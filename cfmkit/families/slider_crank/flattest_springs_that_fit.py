@@ -147,7 +147,7 @@ def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEff
         one
         for k, begin in enumerate(begins.tolist())
         for upper in largest[:, :, k]
-        if (one := _fitted(motion, effort, begin, upper)) is not None
+        if (one := _fit_window(motion, effort, begin, upper)) is not None
     ]
     return min(found, key=lambda one: one.deviation, default=None)
 
@@ -157,7 +157,7 @@ def _of_fewer(motion: SprungMotion, effort: float, best: HeldEffort, flat: float
     does = best.rates * np.abs(motion.assembly.forces(_window(motion, best.begin))).max(axis=1)
     for k in np.argsort(does).tolist():
         upper = np.where((best.upper > 0.0) & (np.arange(len(does)) != k) & (best.rates > 0.0), best.upper, 0.0)
-        fewer = _fitted(motion, effort, best.begin, upper) if best.rates[k] > 0.0 else None
+        fewer = _fit_window(motion, effort, best.begin, upper) if best.rates[k] > 0.0 else None
         if fewer is not None and fewer.deviation <= max(flat, best.deviation):
             best = fewer
     return best
@@ -167,7 +167,7 @@ def _window(motion: SprungMotion, begin: float) -> FloatArray:
     return np.linspace(begin, begin + motion.length, FITTED)
 
 
-def _fitted(motion: SprungMotion, effort: float, begin: float, upper: FloatArray) -> HeldEffort | None:
+def _fit_window(motion: SprungMotion, effort: float, begin: float, upper: FloatArray) -> HeldEffort | None:
     """Return the best springs below the largest rates for a window; None if there are none."""
     units = motion.assembly.forces(_window(motion, begin))
     if not np.isfinite(units).all() or not upper.any():

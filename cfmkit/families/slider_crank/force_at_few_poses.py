@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
+def sample_poses(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
     """Return force and stress at travels; None of springs, and where the chain has no equilibrium at one of them.
 
     Parameters

@@ -38,11 +38,11 @@ def with_mirror_image(one: Drawing) -> Drawing:
     heights = np.concatenate(polygons(one.contours, "cut"))[:, 1]
     low, high = float(heights.min()), float(heights.max())
     axis = low - 0.05 * (high - low) - 0.002
-    mirrored = tuple(_mirrored(contour, axis) for contour in one.contours)
+    mirrored = tuple(_mirror_contour(contour, axis) for contour in one.contours)
     return replace(one, contours=(*one.contours, *mirrored))
 
 
-def _mirrored(contour: Contour, axis: float) -> Contour:
+def _mirror_contour(contour: Contour, axis: float) -> Contour:
     """Return a contour as seen in a mirror along y = axis [m]."""
 
     def edge(one: Edge) -> Edge:

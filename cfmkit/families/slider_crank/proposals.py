@@ -22,14 +22,14 @@ from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.sprung_linkage_proposals import (
     Proportions,
+    explain_overfilled,
     largest_first,
-    overfilled,
     pushed_analysis,
     pushed_linkage,
     turned_linkages,
 )
 from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, called
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
@@ -100,9 +100,9 @@ def propose(request: Request, run: Run) -> FamilyOffer:
 def _of_force(request: Request) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
-    tried = [one for lengths in PUSHED for one in _pushed(request, lengths)]
+    tried = [one for lengths in PUSHED for one in _offer_pushed(request, lengths)]
     if found := [one for one in tried if isinstance(one, Candidate)]:
-        return FamilyOffer(tuple(_varied(found)))
+        return FamilyOffer(tuple(_vary_by_turns(found)))
     reasons = []
     fits = [largest_printed(request.envelope, lengths) for lengths in PUSHED]
     wide = min((strip_width(request, block, one) for one in fits for block in _materials(request)), default=0.0)
@@ -115,7 +115,7 @@ def _of_force(request: Request) -> FamilyOffer:
     if most := max((one for one in tried if isinstance(one, float)), default=0.0):
         told = format_short(most, "force", 2)
         reasons.append(f"springs of steel wire that fit at the pins hold at most {told} over this travel")
-    elif not reasons and (reason := overfilled(request)) is not None:
+    elif not reasons and (reason := explain_overfilled(request)) is not None:
         reasons.append(reason)
     if reasons:
         return FamilyOffer(reason="; ".join(reasons))
@@ -165,7 +165,7 @@ def largest_printed(envelope: Sequence[float], lengths: Proportions) -> float:
     return FULL_PADS * (1.0 + float(((wide - small) / (large - small)).min()))
 
 
-def _pushed(request: Request, lengths: Proportions) -> list[Candidate | float]:
+def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | float]:
     """Return parts and linkages of some proportions at all sizes that fit.
 
     Or the largest force that springs at pins can hold, where that is less than what is required [N].
@@ -175,7 +175,7 @@ def _pushed(request: Request, lengths: Proportions) -> list[Candidate | float]:
         request.envelope[0] / (lengths.offset + 2 * EYE_SHARE),
         request.envelope[1] / (lengths.stretched + 2 * EYE_SHARE),
     )
-    pins = overfilled(request) is None
+    pins = explain_overfilled(request) is None
     found: list[Candidate | float] = []
     for size in SIZES:
         for start in STARTS:
@@ -203,7 +203,7 @@ def _parts(
         if more[0] and FLEXURES_WIDER * wide <= DOUBT * deep:
             found.append(_flexures(request, block, lengths, crank, travel))
         if all(more) and wide <= DOUBT * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
-            found.append(_tapered(request, block, lengths, crank, travel))
+            found.append(_offer_tapered(request, block, lengths, crank, travel))
     return found
 
 
@@ -246,7 +246,7 @@ def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
     return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * way)
 
 
-def _varied(found: list[Candidate]) -> list[Candidate]:
+def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
     """Return as many candidates as are offered, of different kinds by turns; what takes long to design comes last."""
     kinds = list(dict.fromkeys(one.variant for one in found))
     rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
@@ -294,7 +294,7 @@ def _strip(
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
     return Candidate(
-        called("strip", request, material),
+        name_variant("strip", request, material),
         spec,
         True,
         PART,
@@ -303,7 +303,7 @@ def _strip(
     )
 
 
-def _tapered(
+def _offer_tapered(
     request: Request,
     material: dict[str, Any],
     lengths: Proportions,
@@ -317,7 +317,9 @@ def _tapered(
     shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
     spec = plain.spec.replace({"design.beam": shape})
     promise = LATER + abs(crank / request.envelope[1] - 0.35)
-    return Candidate(called("tapered strip", request, material), spec, True, plain.finish, promise, correct=CORRECT)
+    return Candidate(
+        name_variant("tapered strip", request, material), spec, True, plain.finish, promise, correct=CORRECT
+    )
 
 
 def _flexures(
@@ -348,7 +350,7 @@ def _flexures(
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
     return Candidate(
-        called("flexures", request, material),
+        name_variant("flexures", request, material),
         spec,
         True,
         PART,
@@ -379,10 +381,10 @@ def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     thinner = min(1.0, 0.99 * allowed / float(np.interp(found[1], curve.motion, stress)))
     window = tuple(Place(place, "length") for place in found)
     changes: dict[str, Any] = {"analysis.travel": (0.0, found[1]), "analysis.window": window}
-    return solid.replace(changes | _scaled(solid, thinner, request.target / (mean * thinner**3)))
+    return solid.replace(changes | _scale_sections(solid, thinner, request.target / (mean * thinner**3)))
 
 
-def _scaled(spec: SliderCrankSpec, thinner: float, wider: float) -> dict[str, Any]:
+def _scale_sections(spec: SliderCrankSpec, thinner: float, wider: float) -> dict[str, Any]:
     """Return the thicknesses and widths of a strip, or of flexures, times two factors, by their paths."""
     strip = spec.mechanism.beam
     if strip is not None and spec.piece == "beam":
@@ -410,4 +412,4 @@ def part(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     if not mean > 0.0:
         return made
     factor = request.target / mean
-    return made.replace(_scaled(made, 1.0, factor))
+    return made.replace(_scale_sections(made, 1.0, factor))

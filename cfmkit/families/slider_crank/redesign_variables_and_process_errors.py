@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -49,7 +49,7 @@ def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple
     for joint in design.springs:
         rate, most = getattr(springs, joint), getattr(design.max_rates, joint, None)
         if rate > 0:
-            found[f"mechanism.springs.{joint}"] = around(float(rate), high=most)
+            found[f"mechanism.springs.{joint}"] = range_about(float(rate), high=most)
     return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
 
 

@@ -99,9 +99,9 @@ FINISH = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
 
 def turned_linkages(request: Request) -> FamilyOffer:
     """Return linkages for a torque at their crank, those whose springs can hold most of it first; or why none can."""
-    if (reason := overfilled(request)) is not None:
+    if (reason := explain_overfilled(request)) is not None:
         return FamilyOffer(reason=reason)
-    found = [_turned(request, size, one) for size in SHRUNK for one in TURNED]
+    found = [_offer_turned(request, size, one) for size in SHRUNK for one in TURNED]
     candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
     if candidates:
         return FamilyOffer(tuple(candidates))
@@ -119,7 +119,7 @@ def _too_weak(request: Request, most: float) -> str:
     return f"springs of steel wire that fit at the pins hold at most {reported} over this angle"
 
 
-def overfilled(request: Request) -> str | None:
+def explain_overfilled(request: Request) -> str | None:
     """Return what is wrong where springs at pins would fill more than the envelope, taken as deep as it is wide."""
     wire = request.target * request.travel / ENERGY
     deep = wire / (request.envelope[0] * request.envelope[1])
@@ -128,14 +128,14 @@ def overfilled(request: Request) -> str | None:
     return f"the wire of steel springs for this work would fill the envelope to a depth of {mm(deep)}"
 
 
-def _turned(request: Request, share: float, linkage: tuple[float, float, float, float]) -> Candidate | float:
+def _offer_turned(request: Request, share: float, linkage: tuple[float, float, float, float]) -> Candidate | float:
     """Return a linkage that turns as required around its stretched position, a share of what fits the envelope.
 
     Or the largest torque that springs can hold, where that is less than what is required [N m].
     """
     crank, coupler, offset, unloaded = linkage
     low = math.radians(unloaded)
-    within = _within(request, low)
+    within = _angle_range(request, low)
     angles = np.linspace(low, within[1], 181)
     y = crank * np.sin(angles)
     inside = coupler**2 - (offset - y) ** 2
@@ -163,7 +163,7 @@ def _turned(request: Request, share: float, linkage: tuple[float, float, float, 
     )
 
 
-def _within(request: Request, unloaded: float) -> tuple[float, float]:
+def _angle_range(request: Request, unloaded: float) -> tuple[float, float]:
     """Return between which crank angles a torque may be held [rad]."""
     if unloaded > WOUND_UP:
         return unloaded, unloaded + max(3.0 * request.travel, math.radians(20.0))
@@ -172,7 +172,7 @@ def _within(request: Request, unloaded: float) -> tuple[float, float]:
 
 def _turning(request: Request, link: Linkage, unloaded: float, sheet: float | None = None) -> SprungMotion:
     """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
-    low, high = _within(request, unloaded)
+    low, high = _angle_range(request, unloaded)
     ends = low, min(high, unloaded + math.pi)
     return _sprung(request, Assembly(link, unloaded, np.zeros(len(JOINTS))), ends, min(link.crank, link.coupler), sheet)
 
@@ -269,7 +269,7 @@ def _with_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> Slid
             f"analysis.reference_{name}": 0.5 * sum(window),
         }
     )
-    return wound(sprung, request)
+    return add_custom_springs(sprung, request)
 
 
 def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) -> SliderCrankSpec | None:
@@ -347,7 +347,7 @@ def _force_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEf
     return best
 
 
-def wound(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
+def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     """Return a designed linkage with springs wound to measure of steel wire, which bear its motion.
 
     A torsion spring is no wider than the crank, or the coupler, is long, so that those of two pins stand beside each

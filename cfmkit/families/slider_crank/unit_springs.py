@@ -52,7 +52,7 @@ class UnitCurves(ShortRepr):
     bend: FloatArray | None = None  # (4, ..., n), (q q')''; None if it was not requested
 
 
-def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool = False) -> UnitCurves:
+def curves_along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool = False) -> UnitCurves:
     """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
 
     Differences from the unloaded position are formed without cancellation. NaN where the
@@ -133,7 +133,7 @@ def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatA
     return turn, r1 * np.cos(angle) + linkage.branch * run
 
 
-def along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArray) -> UnitCurves:
+def curves_along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArray) -> UnitCurves:
     """Return the unit curves over the slider's travel towards the pivot: effort is a force at the slider [B, eq. 2-7].
 
     Everything is written in the knee angle psi between crank and coupler, which the travel

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, mm, mpa, newton
+from cfmkit.families.findings import format_at_least, mm, mpa, newton
 from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
@@ -28,7 +28,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     RESCALES,
     SQUAT,
     check_guide,
-    completed,
+    complete_analysis,
     followable_stroke,
     leaf_of_sheet,
     next_leaf,
@@ -102,10 +102,10 @@ def _attempt(spec: VcfmSpec) -> Design:
     sizes = closed_form(spec, target)
     active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
     if target.refine:
-        sizes = refined(spec, target, sizes)
+        sizes = refine_sizes(spec, target, sizes)
         check_width(spec, target, sizes.leaf)
         check_room(target, sizes)
-    made = completed(written(spec, sizes), target, sizes.linear, sizes.leaf.angle)
+    made = complete_analysis(write_sizes(spec, sizes), target, sizes.linear, sizes.leaf.angle)
     return Design(made, Status.COMPLETE, active_bounds=tuple(active))
 
 
@@ -129,7 +129,7 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
                 f"{mpa(spec.mechanism.allowable_stress or 0.0)}, or be steeper than 15 deg: the shortest allowed is "
                 f"{mm(shortest)}",
             ),
-            {"design.leaf_length": at_least(shortest)},
+            {"design.leaf_length": format_at_least(shortest)},
         )
     sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
     if sheet is None:
@@ -169,13 +169,14 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
         finding(
             "out_of_plane_buckling",
             f"leaves of {mm(leaf.length)} would be {mm(leaf.width)} wide and {mm(leaf.thickness)} thick: below "
-            f"twice the thickness they buckle out of the plane; a 'design.leaf_length' of {at_least(longer)} is enough",
+            f"twice the thickness they buckle out of the plane; a 'design.leaf_length' of "
+            f"{format_at_least(longer)} is enough",
         ),
-        {"design.leaf_length": at_least(longer)},
+        {"design.leaf_length": format_at_least(longer)},
     )
 
 
-def written(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
+def write_sizes(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     """Return the spec with the sizes written into its mechanism."""
     leaf, side = sizes.leaf, sizes.side
     return spec.replace(
@@ -223,11 +224,11 @@ def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
             verb = "need" if name == "leaves" else "needs"
             raise Infeasible(
                 finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' allows {mm(limit)}"),
-                {f"design.{path}": at_least(ROOM * found[name])},
+                {f"design.{path}": format_at_least(ROOM * found[name])},
             )
 
 
-def refined(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> DesignSizes:
+def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> DesignSizes:
     """Return the sizes with both widths corrected by the exact model, and leaves long enough for its stress.
 
     From a sheet, whose widths stay, lengths and number are corrected instead.
@@ -262,7 +263,7 @@ def refined(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> DesignSiz
             f"the exact stress of leaves of {mm(float(sizes.leaf.length))} ('design.leaf_length') is {mpa(worst)}, "
             f"{mpa(allowable)} is allowed ('mechanism.material')",
         ),
-        {"design.leaf_length": at_least(float(sizes.leaf.length) * sqrt(1.001 * max(over)))},
+        {"design.leaf_length": format_at_least(float(sizes.leaf.length) * sqrt(1.001 * max(over)))},
     )
 
 
@@ -298,7 +299,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
     full = target.preload_stroke
-    made = written(spec, sizes).replace(
+    made = write_sizes(spec, sizes).replace(
         {"analysis.preloads": (0.0, full) if full else (0.0,), "analysis.branch": "stable"}
     )
     back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
@@ -312,7 +313,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
             followable_stroke(target.height, sizes.leaf),
         )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-    wanted = np.full(len(places), target.level) if target.curve is None else _followed(target.curve, places)
+    wanted = np.full(len(places), target.level) if target.curve is None else _follow_curve(target.curve, places)
     (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
     leaf, side = sizes.leaf, sizes.side
     wider = replace(leaf, width=float(leaf.width * wide)), replace(side, width=float(side.width * stiff))
@@ -322,7 +323,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     return fitted, stresses
 
 
-def _followed(curve: TargetCurve, places: FloatArray) -> FloatArray:
+def _follow_curve(curve: TargetCurve, places: FloatArray) -> FloatArray:
     """Return the forces of a curve at places in the linear region [N].
 
     Raises

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
-from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, traced
+from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, trace_leaf
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, leaf_law, leaf_spring, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 
@@ -59,12 +59,12 @@ def leaf_network(spec: VcfmSpec) -> Network:
 
 
 def _network_of(about: Bistable, made_of: MaterialSpec, wide: bool) -> Network:
-    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, guided
+    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, slider_support
 
     law = leaf_law(about, made_of)
     strip = law.strip
     x, h = strip.reach, strip.rise
-    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, guided(0.5 * np.pi, rotates=not about.guided))}
+    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, slider_support(0.5 * np.pi, rotates=not about.guided))}
     shape, mirrored = law.beam_shapes()
     shares, thicknesses = law.profile
     made = section(strip, Taper(np.array(shares), np.array(thicknesses)) if len(set(thicknesses)) > 1 else None, wide)
@@ -83,7 +83,7 @@ KEPT = 128
 def _leaf_path(about: Bistable, made_of: MaterialSpec, wide: bool, end: float, branch: str | None) -> Traced:
     """Return what a leaf does up to `end` [m]; a branch is followed, and its waviness counts, where one is stated."""
     control = {} if branch is None else {"branch": branch, "imperfection": about.waviness}
-    return traced(_network_of(about, made_of, wide), "shuttle", end, **control)
+    return trace_leaf(_network_of(about, made_of, wide), "shuttle", end, **control)
 
 
 def spring_chain(spec: VcfmSpec) -> SpringChain:
@@ -141,7 +141,7 @@ class ExactSampler:
             return
         self.chain = spring_chain(spec)
         ends = (max(max(preloads) + end, 0.02 * end), min(min(preloads) - back, -0.02 * end))
-        self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
+        self.sides = [trace_leaf(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
         self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
 
     def leaves(self, travel: FloatArray) -> LeafSamples:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.export.posed_part import box
-from cfmkit.families.fem_results import numbered
+from cfmkit.families.fem_results import number_fillets
 from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.model import rests_of
@@ -20,7 +20,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import (
@@ -32,9 +32,9 @@ from cfmkit.plots.style import (
     PURPLE,
     SMALL,
     VERMILLION,
+    apply_style,
     axes_mm,
     new_figure,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a result, by file stem; empty if nothing was solved."""
     if result.state is None or not result.curves:
         return {}
-    makers = [force, split, stress, mechanism]
+    makers = [force, draw_split_forces, stress, mechanism]
     if len(result.curves) > 1:
         makers += [preloads, from_rest, adjustability]
     if result.spec.at("analysis.fidelity") == "solid":
@@ -77,17 +77,17 @@ def force(result: Result) -> Figure:
     flat, alone = value_text(solution.parts.balance, "length"), float(solution.spring_alone[0])
     levels = () if np.isnan(alone) else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
-    look = CurveLook(levels=levels, regions=_beyond(solution))
+    look = CurveLook(levels=levels, regions=_range_beyond(solution))
     return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
 
 
-def _beyond(solution: Solution) -> tuple[MarkedRange, ...]:
+def _range_beyond(solution: Solution) -> tuple[MarkedRange, ...]:
     """Return the part of the travel where the leaves have straightened again."""
     end, last = float(solution.linear[1][0]), float(solution.first.travel[-1])
     return (MarkedRange(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
 
 
-def split(result: Result) -> Figure:
+def draw_split_forces(result: Result) -> Figure:
     """Return what leaves and spring give, their sum, and the paper's law of the leaves [D, Fig. 3 and 11]."""
     solution: Solution = result.state
     push = solution.first
@@ -99,7 +99,7 @@ def split(result: Result) -> Figure:
     if (truss := solution.leaf_kind.truss) is not None and solution.fidelity != "truss":
         bars = solution.parts.half_beams * np.asarray(truss(solution.parts.strip).force(push.travel))
         series.append(Series(bars, "leaves by the truss law", GREY, dashed=True, prefer=0.4))
-    found = list(_beyond(solution))
+    found = list(_range_beyond(solution))
     low = float(solution.linear[0][0])
     if np.isfinite(low):
         found.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
@@ -126,17 +126,17 @@ def stress(result: Result) -> Figure:
     allowed = solution.spec.mechanism.allowable_stress
     passed = allowed is not None and bool(max(np.nanmax(item.values) for item in series) > allowed * 1.005)
     limits = [Limit(allowed, f"allowed {value_text(allowed, 'stress')}", trouble=passed)] if allowed else []
-    diagram = Diagram(over, TRAVEL, Scale("largest stress", "stress"), series, limits, _beyond(solution))
+    diagram = Diagram(over, TRAVEL, Scale("largest stress", "stress"), series, limits, _range_beyond(solution))
     return diagram_figure(Heading.of(result, "largest stress"), [diagram])
 
 
-@styled
+@apply_style
 def preloads(result: Result) -> Figure:
     """Return the curves of all preloads over the travel from the as-made pose [D, Fig. 13 (a)]."""
     return _curves(result, "force for each preload, from the as-made pose", shifted=False)
 
 
-@styled
+@apply_style
 def from_rest(result: Result) -> Figure:
     """Return the curves of all preloads, each from where the shuttle rests [D, Fig. 13 (b)]."""
     return _curves(result, "force for each preload, from where the shuttle rests", shifted=True)
@@ -216,9 +216,9 @@ def stress_map(result: Result) -> Figure:
     solution: Solution = result.state
     sampler: Any = solution.sampler
     leaf, spring = fillets(solution)
-    solids = [("leaf", sampler.pushed.solved, 1.0, numbered(leaf))]
+    solids = [("leaf", sampler.pushed.solved, 1.0, number_fillets(leaf))]
     if sampler.sides:
-        solids.append(("spring", sampler.sides[0].solved, sampler.chain.travel, numbered(spring, len(leaf))))
+        solids.append(("spring", sampler.sides[0].solved, sampler.chain.travel, number_fillets(spring, len(leaf))))
     views = []
     for name, solved, share, own in solids:
         pose = int(solved.peaks[0].argmax())
@@ -227,7 +227,7 @@ def stress_map(result: Result) -> Figure:
     return stress_map_figure(result, views, "stress of leaf and spring as drawn")
 
 
-@styled
+@apply_style
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale in four poses: bent as the leaves really bend."""
     solution: Solution = result.state
@@ -305,7 +305,7 @@ def moving(result: Result) -> Moving:
     """Return the mechanism over the travel of its nominal curve, for a film."""
     solution: Solution = result.state
     nominal = solution.first
-    points = chosen(len(nominal.travel))
+    points = choose_poses(len(nominal.travel))
     shown = bodies(solution, [(float(nominal.travel[point]), nominal.preload) for point in points])
     view, size = parts.box_around(shown, (0.06, 0.06, 0.06, 0.12))
 

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton, percent, rate, stiffer, too_soft
+from cfmkit.families.findings import (
+    TOO_SOFT,
+    finder,
+    format_at_least,
+    mm,
+    mpa,
+    newton,
+    percent,
+    rate,
+    stiffer,
+    too_soft,
+)
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
 from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
@@ -135,7 +146,7 @@ def closed_spring(solution: Solution) -> Sentence:
     else:
         spring = leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
         key, least = spring.opening(spec.mechanism.frame.corner, needed)
-    key, size = f"mechanism.{key}", at_least(least)
+    key, size = f"mechanism.{key}", format_at_least(least)
     return (
         f"the spring closes: its {'blocks' if bought is None else 'turns'} touch when it is compressed by {mm(room)}, "
         f"with a preload of {mm(most)} {place}, and curves end there; use less preload ('analysis.preloads') or travel "

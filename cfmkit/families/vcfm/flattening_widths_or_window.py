@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, at_most, mm
+from cfmkit.families.findings import format_at_least, format_at_most, mm
 from cfmkit.families.vcfm.solution import ROUNDING
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]
     for share in TRIED:
         flat = solution.nominal.flat_parts(share * allowed)
         if np.isfinite(flat[0][0]) and ripple_inside(solution, flat) <= (1.0 - ROUNDING) * allowed:
-            start, end = at_least(float(flat[0][0])), at_most(float(flat[1][0]))
+            start, end = format_at_least(float(flat[0][0])), format_at_most(float(flat[1][0]))
             cure = f"analysis.window=[{start}, {end}]"
             return f"{why}; the force is flat from {start} to {end}: use that as the window", (cure,)
     return f"{why}; no width of leaves or spring makes it flat", ()

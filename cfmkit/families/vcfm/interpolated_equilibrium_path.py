@@ -174,24 +174,24 @@ def _stress_law(x: FloatArray, stress: FloatArray, low: float, high: float) -> C
     return lambda place: np.asarray(law(angle(place)))
 
 
-def traced(network: Network, node: str, end: float, **control: Any) -> Traced:
+def trace_leaf(network: Network, node: str, end: float, **control: Any) -> Traced:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
     route = Route(network, node, control)
     for count in GRIDS:
-        first = _begun(route, end, count)
+        first = _begin_path(route, end, count)
         gaps = np.abs(np.diff(first.edges[1:-1]))
         # bifurcations close together may come from a point requested next to one: other points tell
         if first.problem or not (gaps < CLOSE * abs(end)).any():
             break
     at_its_end = all(abs(first.edges[-1] - place) <= CLOSE * abs(end) for place in first.edges[1:-1])
     if first.problem and at_its_end and not control.get("imperfection"):
-        wavy = traced(network, node, end, **control | {"imperfection": SLIGHT * abs(end)})
+        wavy = trace_leaf(network, node, end, **control | {"imperfection": SLIGHT * abs(end)})
         if not wavy.problem:
             return wavy
     if not first.edges[-1]:
         return Traced(first.points, None, first.edges, first.problem)
     for number in WIDE:
-        panels, points, kept = _resolved(route, first, number)
+        panels, points, kept = _resolve_panels(route, first, number)
         if kept:
             break
     return Traced(points, panels, first.edges, first.problem)
@@ -241,7 +241,7 @@ class Route:
         return max(RESOLVED, self.tolerances[0], self.rounding)
 
 
-def _begun(route: Route, end: float, count: int) -> First:
+def _begin_path(route: Route, end: float, count: int) -> First:
     """Return a first path through so many places at equal distances up to `end` [m]."""
     from cfmkit.elastica import PathStatus
 
@@ -275,7 +275,7 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
     return PathPoints(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
 
 
-def _resolved(route: Route, first: First, number: int) -> tuple[ChebyshevPanels, PathPoints, bool]:
+def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevPanels, PathPoints, bool]:
     """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
 
     Parameters

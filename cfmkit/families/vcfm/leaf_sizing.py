@@ -15,12 +15,12 @@ from dataclasses import replace
 from math import asin, ceil, floor, log10, pi, sin, sqrt
 from typing import TYPE_CHECKING
 
-from cfmkit.families.findings import at_least, at_most, mm, mpa
+from cfmkit.families.findings import format_at_least, format_at_most, mm, mpa
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.v_beam import STEEP, buckled_stress, critical_force, overrated
+from cfmkit.families.vcfm.leaves.v_beam import STEEP, buckled_stress, critical_force, stress_overestimate
 from cfmkit.specs.units import format_short
 from cfmkit.specs.units.windows import TravelShare
 
@@ -90,9 +90,11 @@ def thickness_for(target: VcfmDesign) -> float:
             finding(
                 "stroke_unreachable",
                 f"a stroke of {mm(stroke)} ('design.stroke') needs leaves with a rise above {mm(0.75 * stroke)}; "
-                f"{_given(target)} {mm(rise)}, with which every stroke is shorter than {mm(4.0 * rise / 3.0)}",
+                f"{_name_rise(target)} {mm(rise)}, with which every stroke is shorter than {mm(4.0 * rise / 3.0)}",
             ),
-            {"design.stroke": at_most(longest)} if not least else {"design.stroke": at_most(_stroke_for(rise, least))},
+            {"design.stroke": format_at_most(longest)}
+            if not least
+            else {"design.stroke": format_at_most(_stroke_for(rise, least))},
         )
     thickness = rise * sqrt(free) / pi
     if thickness < least:
@@ -102,12 +104,12 @@ def thickness_for(target: VcfmDesign) -> float:
                 f"a stroke of {mm(stroke)} from a rise of {mm(rise)} needs leaves of {mm(thickness)}, thinner than "
                 f"{mm(least)} ('design.min_thickness')",
             ),
-            {"design.stroke": at_most(_stroke_for(rise, least))},
+            {"design.stroke": format_at_most(_stroke_for(rise, least))},
         )
     return thickness
 
 
-def _given(target: VcfmDesign) -> str:
+def _name_rise(target: VcfmDesign) -> str:
     """Return what states the rise of the leaves, up to the number."""
     if target.rise is not None:
         return "'design.rise' is"
@@ -132,7 +134,7 @@ def followable_stroke(rise: float, leaf: LeafStrip) -> dict[str, str]:
     """Return the stroke from which on exact leaves buckle without a jump; nothing where that is not what is wrong."""
     if rise >= SNAPPING * leaf.thickness:
         return {}
-    return {"design.stroke": at_least(_stroke_for(rise, rise / SNAPPING))}
+    return {"design.stroke": format_at_least(_stroke_for(rise, rise / SNAPPING))}
 
 
 def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float:
@@ -144,7 +146,7 @@ def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float
     return max(sqrt(made.modulus / (spec.mechanism.allowable_stress or 1.0) * stressed), rise / sin(STEEP))
 
 
-def completed(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], angle: float) -> VcfmSpec:
+def complete_analysis(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], angle: float) -> VcfmSpec:
     """Return a designed mechanism with an analysis that shows what was requested, where the spec states none.
 
     The window is the linear region by the closed form, as long as the stroke; the travel ends with it, the preloads
@@ -174,7 +176,7 @@ def completed(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], a
         changes["requirements"] = (
             *({"metric": name, "max": allowed} for name in flat_or_near),
             *adjusted,
-            {"metric": "safety_factor", "min": f"{floor(1e3 * (1.0 - overrated(angle))) / 1e3:.3f}"},
+            {"metric": "safety_factor", "min": f"{floor(1e3 * (1.0 - stress_overestimate(angle))) / 1e3:.3f}"},
         )
     if target.target is not None:
         changes |= {"design.target": target.target.written_out(target.force), "design.force": None}
@@ -183,7 +185,7 @@ def completed(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], a
     if closing <= 0 or made.mechanism.positive is None or "corner" in spec.mechanism.frame.model_fields_set:
         return made
     # higher corners, so that the spring stays open: a rigid part, which no force depends on
-    return made.replace({"mechanism.frame.corner": at_least(made.mechanism.frame.corner + 1.1 * closing)})
+    return made.replace({"mechanism.frame.corner": format_at_least(made.mechanism.frame.corner + 1.1 * closing)})
 
 
 def leaves_for(have: int, wanted: float, sheet: float) -> int:
@@ -222,7 +224,7 @@ def leaf_of_sheet(
         If the sheet is so thin that leaves would buckle out of the plane, or that there would be too many.
     """
     if sheet < SQUAT * thickness:
-        least = at_least(SQUAT * thickness)
+        least = format_at_least(SQUAT * thickness)
         paths = ("part.sheet", "bistable.width", *(["positive.width"] if spec.mechanism.positive else []))
         raise Infeasible(
             finding(

@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     RESCALES,
     SQUAT,
     check_guide,
-    completed,
+    complete_analysis,
     leaf_of_sheet,
     next_leaf,
     shortest_leaf,
@@ -128,16 +128,16 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
         check_guide(spec)
         if target.rise is not None:
             thickness_for(target)  # what the largest rise does not allow no spring does
-        tried = [_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
+        tried = [_design_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
         fitting = sorted(
             (one for one in tried if isinstance(one, LeavesAroundSprings)), key=lambda one: one.rank(target)
         )
         missed = [one for one in tried if isinstance(one, Miss)]
         for number, one in enumerate(fitting[:TRIED], 1):
-            found = _fitted(spec, target, one) if target.refine else one
+            found = _fit_width(spec, target, one) if target.refine else one
             if isinstance(found, LeavesAroundSprings):
                 others = tuple(partial(_with_next, spec, target, other) for other in fitting[number:TRIED])
-                return replace(_made(spec, target, found), next_best=others)
+                return replace(_make_design(spec, target, found), next_best=others)
             missed.append(found)
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
@@ -151,12 +151,12 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
 def _with_next(spec: VcfmSpec, target: VcfmDesign, one: LeavesAroundSprings) -> Design:
     """Return the design around springs that are not the best of the catalogue."""
     try:
-        found = _fitted(spec, target, one) if target.refine else one
+        found = _fit_width(spec, target, one) if target.refine else one
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
     if isinstance(found, Miss):
         return no_design(finding("no_spring_fits", nearest([found])))
-    return _made(spec, target, found)
+    return _make_design(spec, target, found)
 
 
 def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:
@@ -188,7 +188,7 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
             yield BoughtSprings.model_validate(known), offer
 
 
-def _around(
+def _design_around(
     spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: Offer | None
 ) -> LeavesAroundSprings | Miss:
     """Return the leaves around some springs by closed forms, or what the springs miss."""
@@ -235,7 +235,7 @@ def _around(
     else:
         leaf = _wide_enough(spec, own, thickness, length)
     found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count, offer is not None)
-    return _missed(spec, target, found, offer) or found
+    return _find_miss(spec, target, found, offer) or found
 
 
 def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: float) -> LeafStrip:
@@ -247,7 +247,7 @@ def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: floa
     return leaf
 
 
-def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
+def _find_miss(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
     """Return what springs miss with the leaves around them; None if they fit."""
     springs, leaf = found.springs, found.leaf
     most, held = found.deflection, found.held_springs
@@ -286,7 +286,7 @@ def _in_use(spec: VcfmSpec, found: LeavesAroundSprings, offer: Offer) -> Iterato
         yield SpringInUse(offer.wound, least, most, offer.fatigue, offer.life)
 
 
-def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
+def _write_design(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
     """Return the spec with springs and leaves written into its mechanism."""
     leaf = found.leaf
     return spec.replace(
@@ -302,7 +302,7 @@ def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
     )
 
 
-def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
+def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
     """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
     from cfmkit.families.vcfm.exact_model import ExactSampler, farthest_back
 
@@ -312,7 +312,7 @@ def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> L
     places = np.linspace(middle - half, middle + half, 101)
     worst, sheet = np.inf, sheet_of(spec.mechanism.part)
     for _ in range(RESCALES if sheet is None else PASSES):
-        made = _written(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
+        made = _write_design(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
         # leaves are followed as far as the spring can push them, not through all of a long preload
         back = min(own.preload_stroke, BACK * farthest_back(made, (own.preload_stroke,)))
         sampler = ExactSampler(made, last, back)
@@ -325,12 +325,12 @@ def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> L
         worst = float(sampler.leaves(ends).stress.max()) / allowable
         if sheet is not None:
             if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= NEAR:
-                return _missed(spec, target, found, None) or found
+                return _find_miss(spec, target, found, None) or found
             count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own.height)
             found = replace(found, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
             continue
         if worst <= 1.0 + 1e-4:
-            return _missed(spec, target, fitted, None) or fitted
+            return _find_miss(spec, target, fitted, None) or fitted
         if target.leaf_length is not None:
             break
         # stress falls with the square of a length
@@ -352,7 +352,7 @@ def _rest(sampler: ExactSampler, wide: float, preload: float) -> float:
     return float(back[pushed[0]]) if len(pushed) else preload
 
 
-def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Design:
+def _make_design(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Design:
     """Return the design with an analysis that shows what was requested."""
     own = found.target
     note = f"{found.label}: the rise of the leaves follows from their rate, {mm(own.height)}"
@@ -363,8 +363,8 @@ def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Des
             note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
     if (words := guide_words(found.held_springs)) and found.deflection > found.springs.unguided:
         note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(found.springs.unguided)}"
-    made = completed(
-        _written(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
+    made = complete_analysis(
+        _write_design(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
     )
     active = ("design.catalogue",) if target.catalogue else ("mechanism.springs",)
     return Design(made, Status.COMPLETE, note, active_bounds=active)

@@ -19,7 +19,7 @@ from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
 from cfmkit.families.vcfm.findings import RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
-from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stacked
+from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stack_laws
 from cfmkit.families.vcfm.quantities import QUANTITIES
 from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
@@ -119,7 +119,7 @@ def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
     curves.leaves  # noqa: B018  force and stress come of one root, and a curve has both
     known = np.isfinite(curves.force)
     if (known != curves.there).any():
-        curves = Rows(sampler, curves.preload, curves.rest, *_compressed(curves.travel, known))
+        curves = Rows(sampler, curves.preload, curves.rest, *_compress_rows(curves.travel, known))
     kept = curves.count >= LEAST_POINTS
     kept[0] = True
     return Solution((spec,), made, curves if kept.all() else curves.of_rows(np.flatnonzero(kept)), int(kept.sum()))
@@ -135,7 +135,7 @@ def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], So
         size = max(1, MAX_SAMPLES // first.points)
         for start in range(0, len(members), size):
             chosen = members[start : start + size]
-            solution = _solved([specs[index] for index in chosen])
+            solution = _solve_kind([specs[index] for index in chosen])
             yield np.array(chosen), SolvedRows(solution, QUANTITIES, RULES, _is_complete(solution))
 
 
@@ -159,9 +159,9 @@ def _kind(spec: VcfmSpec) -> Hashable | None:
     return analysis.fidelity, spec.mechanism.kinds, *stated, *settings
 
 
-def _solved(specs: Sequence[VcfmSpec]) -> Solution:
+def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     """Return mechanisms of one kind as rows."""
-    made, count = stacked([parts(spec) for spec in specs]), len(specs[0].analysis.preloads)
+    made, count = stack_laws([parts(spec) for spec in specs]), len(specs[0].analysis.preloads)
     preloads = np.concatenate([spec.analysis.preloads for spec in specs])
     each = np.repeat(np.arange(len(specs)), count)
     grid, room = np.stack([travel_grid(spec) for spec in specs]), np.array([spring_room(spec) for spec in specs])
@@ -178,7 +178,7 @@ def _curves(sampler: PartSampler, preloads: FloatArray, grid: FloatArray, room: 
     is_open = (travel + preloads[:, None] <= room[:, None] * (1 + 1e-12)) & (
         np.arange(travel.shape[1]) < count[:, None]
     )
-    return Rows(sampler, preloads[:, None], rest, *_compressed(travel, is_open))
+    return Rows(sampler, preloads[:, None], rest, *_compress_rows(travel, is_open))
 
 
 def _travels(start: FloatArray, grid: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -192,10 +192,10 @@ def _travels(start: FloatArray, grid: FloatArray) -> tuple[FloatArray, NDArray[n
         (number <= backs[:, None]) & (back > (start + 1e-9 * step)[:, None]),
         grid > start[:, None] + 1e-12,
     ]
-    return _compressed(np.hstack([start[:, None], back, grid]), np.hstack(kept))
+    return _compress_rows(np.hstack([start[:, None], back, grid]), np.hstack(kept))
 
 
-def _compressed(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.intp]]:
+def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.intp]]:
     """Return what is kept of each row, its last place repeated, and how much that is."""
     count = kept.sum(axis=1)
     if kept.all():
@@ -253,7 +253,7 @@ def _pulled_ahead(sampler: PartSampler, preload: FloatArray, grid: FloatArray) -
     some &= force[rows, first] != 0
     exact = beyond.any(axis=1) & (first > 0) & ~some
     place = last_places(excess, low[:, None], np.where(some, high, low)[:, None])[:, 0]
-    place = _polished(sampler, preload, place, 1e-9 * (high - low))
+    place = _polish_rest(sampler, preload, place, 1e-9 * (high - low))
     return np.where(slack, 0.0, np.where(exact, high, np.where(some, place, np.nan)))
 
 
@@ -269,10 +269,10 @@ def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -
         return -_force(sampler.of_rows(ends), travel, preload[ends]) / there[ends][:, None]
 
     place = last_places(excess, nothing, np.where(rests, -preload, 0.0)[:, None])[:, 0]
-    return np.where(rests, _polished(sampler, preload, place, 1e-9 * preload), np.nan)
+    return np.where(rests, _polish_rest(sampler, preload, place, 1e-9 * preload), np.nan)
 
 
-def _polished(sampler: PartSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
+def _polish_rest(sampler: PartSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
     """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
     here, ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):

@@ -12,7 +12,7 @@ import numpy as np
 
 from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
 from cfmkit.export.drawn_as_specified import check_outline
-from cfmkit.export.fillets import filleted, sharp_notes
+from cfmkit.export.fillets import round_inside_corners, sharp_notes
 from cfmkit.export.posed_part import rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
@@ -48,7 +48,7 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
     leaves, spring, top = _contours(spec)
     fillet, thinnest = spec.mechanism.fillet, spec.mechanism.thinnest
-    rounded = [filleted(contour, fillet) for contour in (*leaves, *spring)]
+    rounded = [round_inside_corners(contour, fillet) for contour in (*leaves, *spring)]
     cut = [contour for contour, _ in rounded]
     sections = check_outline(cut, tuple(specified_pieces(spec, top)), thinnest, fillet)
     part = spec.mechanism.part or CutPart()
@@ -77,7 +77,7 @@ def sharp_corners(spec: VcfmSpec) -> tuple[str, ...]:
     """Return one line per inside corner of leaves and spring that no fillet fits, with its place."""
     leaves, spring, _ = _contours(spec)
     fillet = spec.mechanism.fillet
-    return _sharp([filleted(contour, fillet) for contour in (*leaves, *spring)], fillet)
+    return _sharp([round_inside_corners(contour, fillet) for contour in (*leaves, *spring)], fillet)
 
 
 def _sharp(rounded: Sequence[tuple[Contour, tuple[complex, ...]]], fillet: float) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from cfmkit.errors import GeometryError
 from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
-from cfmkit.export.fillets import filleted
+from cfmkit.export.fillets import round_inside_corners
 from cfmkit.export.posed_part import MIRROR, PosedBody, PosedPart, band, in_poses, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
@@ -248,10 +248,10 @@ def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     else:
         right += [(out, sizes.foot), (0.0, sizes.foot)]
         inner: list[Item] = [(0.0, bottom), (half, bottom), *lower[0], (wall, sizes.floor), *sizes.ledge]
-        contours = [_whole(right), _contour([*inner, *_mirrored(inner)], hole=True)]
+        contours = [_whole(right), _contour([*inner, *_mirror_chain(inner)], hole=True)]
     for below, above in pairwise(levels):
         hole = [*lower[above], *_back(upper[below])]
-        contours += [_contour(hole, hole=True), _contour(_mirrored(hole), hole=True)]
+        contours += [_contour(hole, hole=True), _contour(_mirror_chain(hole), hole=True)]
     return contours, min(bottom, sizes.foot)
 
 
@@ -308,9 +308,9 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
     sections = tuple(leaf_sections(law, (half, 0.0)))
     if spec.mechanism.bistable.guided:
         shuttle = np.array([[0.0, over], [half, over], [half, -over], [0.0, -over]])
-        return SolvedPiece(filleted(_contour(right), fillet)[0], shuttle, (wall,), True, sections)
+        return SolvedPiece(round_inside_corners(_contour(right), fillet)[0], shuttle, (wall,), True, sections)
     shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])
-    return SolvedPiece(filleted(_whole(right), fillet)[0], shuttle, (wall, wall * MIRROR), True, sections)
+    return SolvedPiece(round_inside_corners(_whole(right), fillet)[0], shuttle, (wall, wall * MIRROR), True, sections)
 
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:
@@ -320,7 +320,7 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     around, bottom, held, glides = law.solved_piece(law.edges(frame.block, frame.corner, fillet, 0.0), half)
     block = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
     contour = _contour([(0.0, 0.0), (half, 0.0), *around])
-    made = filleted(contour, fillet)[0]
+    made = round_inside_corners(contour, fillet)[0]
     x0, y0, x1, y1 = made.extents
     strips = (body for body in _leaf_spring(spec, 0.0, 0.0) if body.name == "spring")
     sections = [_section(strip, law.strip.thickness) for strip in strips]
@@ -336,7 +336,7 @@ def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
         hollow = [(-half, inner[-1][1]), *_back(inner), (-half, inner[0][1])] if inner else []
         return [_contour([(-half, top), (half, top), *outer, (half, low), (-half, low), *hollow])]
     whole = _whole([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
-    return [whole, _contour([*inner, *_mirrored(inner)], hole=True)] if inner else [whole]
+    return [whole, _contour([*inner, *_mirror_chain(inner)], hole=True)] if inner else [whole]
 
 
 def _spring(spec: VcfmSpec) -> LeafSpring:
@@ -344,7 +344,7 @@ def _spring(spec: VcfmSpec) -> LeafSpring:
 
 
 def _whole(right: list[Item]) -> Contour:
-    return _contour([*right, *_mirrored(right)])
+    return _contour([*right, *_mirror_chain(right)])
 
 
 def _points(item: Item) -> FloatArray:
@@ -364,7 +364,7 @@ def _back(items: Sequence[Item]) -> list[Item]:
     return [item if isinstance(item, tuple) else item.reversed() for item in reversed(items)]
 
 
-def _mirrored(items: Sequence[Item]) -> list[Item]:
+def _mirror_chain(items: Sequence[Item]) -> list[Item]:
     """Return the mirror image of a chain, run the other way, so that it closes the first."""
     return [(-item[0], item[1]) if isinstance(item, tuple) else item.mirrored() for item in _back(items)]
 

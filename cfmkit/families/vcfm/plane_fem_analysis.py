@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, tr
 from cfmkit.families.vcfm.outline import drawing, sharp_corners
 from cfmkit.families.vcfm.part import solved_leaf, solved_spring
 from cfmkit.results import Result, Status
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
@@ -121,13 +121,13 @@ class SolidSampler(ExactSampler):
         leaf, *spring = elastic_parts(spec)
         leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
         self.pushed, self.mesh_error = _path(leaves.solution), leaves.error
-        self.pulled = _pulled(spec, leaves, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
+        self.pulled = _pull_back(spec, leaves, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
         self.sides, self.problem = [], problem_of("bistable", (self.pushed, self.pulled), 1.0)
         for one in spring:
             self.chain = spring_chain(spec)
             back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
             springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
-            pull = _pulled(spec, springs, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
+            pull = _pull_back(spec, springs, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
             self.sides, self.mesh_error = [_path(springs.solution), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
         self.accuracy = self.mesh_error.force
@@ -180,7 +180,7 @@ def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
     if spec.mechanism.springs is None:
         pieces["spring"] = solved_spring(spec)
         ends["spring"] = spring_chain(spec).travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
-    own = [place for _, window in spec.windows() for place in between(window, (0.0, spec.travel))]
+    own = [place for _, window in spec.windows() for place in window_places(window, (0.0, spec.travel))]
     places = {"leaf": own}
     if spec.mechanism.springs is None:
         share, preload = spring_chain(spec).travel, spec.analysis.preloads[0]
@@ -206,7 +206,7 @@ def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ())
     return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())
 
 
-def _pulled(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Callable[[float], None]) -> SolidPath:
+def _pull_back(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Callable[[float], None]) -> SolidPath:
     """Return a part that is pulled back to a travel [m], on the mesh found for pushing, with a quarter of the poses."""
     from cfmkit.solid.adaptive_solution import BETWEEN_SHARE
 

@@ -35,7 +35,7 @@ def fit_in_window(
     return float(left), at, float(wide), float(stiff)
 
 
-def lengthened(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
+def lengthen(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
     """Return a mechanism whose leaves of the same rise, and whose spring, are longer by factors."""
     leaf = spec.mechanism.bistable
     rise, length = leaf.length * sin(leaf.angle), leaf.length * factors[0]
@@ -46,7 +46,7 @@ def lengthened(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
     return spec.replace(changes)
 
 
-def opened(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSpec:
+def open_corners(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSpec:
     """Return a mechanism whose corners are so high that its spring stays open: a rigid part, which no force needs."""
     closing = travel + max(preloads) - spring_room(spec)
     higher = {"mechanism.frame.corner": spec.mechanism.frame.corner + 1.1 * closing}
@@ -71,7 +71,7 @@ def preloads_for(
     return (0.0, *(one for one in ((high - request.target) * per_force, (low - request.target) * per_force) if one))
 
 
-def widened(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
+def widen(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
     """Return a mechanism whose leaves, and whose spring unless it is bought, are wider by factors."""
     changes = {"mechanism.bistable.width": spec.mechanism.bistable.width * leaves}
     if spec.mechanism.springs is None:

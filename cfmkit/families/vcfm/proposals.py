@@ -25,11 +25,11 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import is_too_wide
-from cfmkit.families.suggestion_request import Candidate, FamilyOffer, called
+from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
-from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
+from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthen, open_corners, preloads_for, widen
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -111,24 +111,24 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 closest = excess, over
             if excess <= 1.0:
                 pairs = spec.mechanism.bistable.half_beams // 2
-                variant = called(f"{pairs} V{'s' if pairs > 1 else ', guided'}", request, block)
+                variant = name_variant(f"{pairs} V{'s' if pairs > 1 else ', guided'}", request, block)
                 # of made parts those with thick leaves are most alike: an error of the thickness counts three times
                 thick = min(sizes.leaf.thickness, sizes.side.thickness)
                 promise = over["across"] * over["along"] if request.good_parts is None else -thick
                 promise += WIDE_LAST * _is_too_wide(request, block, sizes)
                 found.append(Candidate(variant, spec, True, FINISH, float(promise), correct=CORRECT))
-            if (coiled := _coiled(request, block, spec, sizes)) is not None:
+            if (coiled := _offer_coiled(request, block, spec, sizes)) is not None:
                 found.append(coiled)
     if found:
         ranked = sorted(found, key=lambda one: one.promise)
         plain = [one for one in ranked if one.promise < 0.5 * WIDE_LAST] or ranked
-        return FamilyOffer(tuple(_varied([*plain, *_with_structures(plain)])[:OFFERED]))
+        return FamilyOffer(tuple(_vary_by_turns([*plain, *_with_structures(plain)])[:OFFERED]))
     if closest is None:
         return FamilyOffer(
             reason=f"no leaf as thin as {mm(request.thinnest)} or thicker, too wide to buckle out of the plane, has "
             "this travel, force and adjustment within the stress"
         )
-    return _out_of_reach(request, *closest)
+    return _explain_no_offer(request, *closest)
 
 
 def _is_too_wide(request: Request, block: MaterialBlock, sizes: DesignSizes) -> bool:
@@ -138,7 +138,7 @@ def _is_too_wide(request: Request, block: MaterialBlock, sizes: DesignSizes) -> 
     return any(is_too_wide(request, float(one.width), float(one.thickness), strain) for one in (sizes.leaf, sizes.side))
 
 
-def _varied(found: list[Candidate]) -> list[Candidate]:
+def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
     """Return candidates, those of different numbers of Vs by turns."""
     kinds = sorted(dict.fromkeys(one.variant for one in found), key=_turn)
     rows = [[one for one in found if one.variant == kind] for kind in kinds]
@@ -231,7 +231,7 @@ def _room_over(request: Request, spec: VcfmSpec, sizes: DesignSizes) -> dict[str
     return over
 
 
-def _coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes) -> Candidate | None:
+def _offer_coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes) -> Candidate | None:
     """Return two Vs with helical springs in place of the diamond; None if none of the series fits beside them."""
     frame, parts, leaf = spec.mechanism.frame, spec.mechanism, sizes.leaf
     if parts.bistable.half_beams != 4 or parts.flexures.thickness > parts.bistable.thickness:
@@ -247,7 +247,7 @@ def _coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes: Desig
     promise = promise if request.good_parts is None else -float(leaf.thickness)
     # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
     listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": request.depth})
-    variant = called("2 Vs, catalogue springs", request, block)
+    variant = name_variant("2 Vs, catalogue springs", request, block)
     return Candidate(variant, listed, True, FINISH, float(promise), correct=CORRECT, springs="catalogue")
 
 
@@ -269,7 +269,7 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
             yield CatalogueSpring.of(replace(one, counts=counts))
 
 
-def _out_of_reach(request: Request, excess: float, over: dict[str, float]) -> FamilyOffer:
+def _explain_no_offer(request: Request, excess: float, over: dict[str, float]) -> FamilyOffer:
     """Return which side of the envelope is too small for the design that comes nearest."""
     sides = dict(zip(("across", "along", "depth"), request.envelope, strict=False))
     worst = max(over, key=lambda name: over[name])
@@ -293,16 +293,18 @@ def finish_with(name: str, spec: VcfmSpec, request: Request) -> VcfmSpec:
     raised = 0.0 if request.adjustable is None or design is None or not design.adjustment else max(request.adjustable)
     forces = request.target, max(raised, request.target)
     made, end, stiffness = with_structure(spec, name, forces, request.travel, strength)
-    return _over_flattest(made, request, preloads_for(spec, request, 1.0 / stiffness), end)
+    return _use_flattest_window(made, request, preloads_for(spec, request, 1.0 / stiffness), end)
 
 
 def finish(spec: VcfmSpec, request: Request) -> VcfmSpec:
     """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
     window = spec.analysis.window
-    return _over_flattest(spec, request, preloads_for(spec, request), float(window[1]) if window else request.travel)
+    return _use_flattest_window(
+        spec, request, preloads_for(spec, request), float(window[1]) if window else request.travel
+    )
 
 
-def _over_flattest(spec: VcfmSpec, request: Request, preloads: tuple[float, ...], end: float) -> VcfmSpec:
+def _use_flattest_window(spec: VcfmSpec, request: Request, preloads: tuple[float, ...], end: float) -> VcfmSpec:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
     from cfmkit.families.flattest_window import flattest
     from cfmkit.families.vcfm.exact_model import analyze
@@ -310,7 +312,7 @@ def _over_flattest(spec: VcfmSpec, request: Request, preloads: tuple[float, ...]
     wide = end + 0.2 * request.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
     free = {"analysis.window": None, "analysis.travel": wide, "requirements": ()}
-    made = opened(spec.replace(keys | free), wide, preloads)
+    made = open_corners(spec.replace(keys | free), wide, preloads)
     found = flattest(analyze(made, Run()), request.travel)
     if found is None:
         return made
@@ -366,18 +368,18 @@ def with_structure(
     changes = {f"mechanism.{block}.{key}": value for key, value in keys}
     made = spec.replace({**changes, "design": None, "requirements": (), "mechanism.safety_factor": 1.0})
     made = made.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0,), "analysis.window": None})
-    found = _fitted(made, forces, travel)
+    found = _fit_widths(made, forces, travel)
     for _ in range(ROUNDS):
         over = [stress / strength for stress in found.stresses]
         if max(over) <= 1.0:
             break
-        made = lengthened(made, [max(1.0, sqrt(1.02 * one)) for one in over])
-        found = _fitted(made, forces, travel)
-    made = widened(made, found.wide, found.stiff)
+        made = lengthen(made, [max(1.0, sqrt(1.02 * one)) for one in over])
+        found = _fit_widths(made, forces, travel)
+    made = widen(made, found.wide, found.stiff)
     return made, found.end, found.stiffness
 
 
-def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
+def _fit_widths(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
     """Return the window and the widths with which the force departs least from the wanted one.
 
     The stress of the spring is that at the end of the window with the preload that the largest force needs.

@@ -13,7 +13,7 @@ from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
 from cfmkit.families.vcfm.exact_model import analyze
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.plane_fem_analysis import SolidSampler
-from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
+from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthen, open_corners, preloads_for, widen
 from cfmkit.specs.units import Place
 
 if TYPE_CHECKING:
@@ -57,11 +57,11 @@ def correct(spec: VcfmSpec, request: Request) -> VcfmSpec:
         side = float(np.max(stress) * law.stress(last + largest) / law.stress(last))
         longer[1] = max(1.0, sqrt(1.02 * side / strength))
         preloads = preloads_for(spec, request, 1.0 / rate, preloads)
-    made = lengthened(solid, longer)
-    made = widened(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
+    made = lengthen(solid, longer)
+    made = widen(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
     begin = last - request.travel * (1.0 + INSIDE)
     changes = {
         "analysis.window": (Place(begin, "length"), Place(last, "length")), "analysis.travel": last,
         "analysis.preloads": preloads,
     }  # fmt: skip
-    return opened(made.replace(changes), last, preloads)
+    return open_corners(made.replace(changes), last, preloads)

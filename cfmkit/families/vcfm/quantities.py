@@ -98,7 +98,7 @@ def _force_per_preload(solution: Solution) -> FloatArray:
     return change / preload
 
 
-def _adjusted(solution: Solution, read: Callable[[FloatArray], FloatArray]) -> FloatArray:
+def _value_over_preloads(solution: Solution, read: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return a value of the forces (m, p, places) of all preloads; NaN where one of them has no force in the window."""
     forces = solution.window_forces
     known = (np.isfinite(forces).all(axis=2) & (forces.max(axis=2) > 0)).all(axis=1)
@@ -209,17 +209,17 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "adjusted_force_min": ScalarQuantity(
         "force",
         "smallest mean force over the window, of all preloads",
-        lambda solution: _adjusted(solution, lambda forces: forces.mean(axis=2).min(axis=1)),
+        lambda solution: _value_over_preloads(solution, lambda forces: forces.mean(axis=2).min(axis=1)),
     ),
     "adjusted_force_max": ScalarQuantity(
         "force",
         "largest mean force over the window, of all preloads",
-        lambda solution: _adjusted(solution, lambda forces: forces.mean(axis=2).max(axis=1)),
+        lambda solution: _value_over_preloads(solution, lambda forces: forces.mean(axis=2).max(axis=1)),
     ),
     "adjusted_ripple_max": ScalarQuantity(
         "ratio",
         "largest (max - min)/max of the force over the window, of all preloads",
-        lambda solution: _adjusted(
+        lambda solution: _value_over_preloads(
             solution, lambda forces: (1.0 - forces.min(axis=2) / forces.max(axis=2)).max(axis=1)
         ),
     ),

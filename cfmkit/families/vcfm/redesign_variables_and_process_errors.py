@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
@@ -30,19 +30,19 @@ def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
     leaf, spring = designed.mechanism.bistable, designed.mechanism.positive
     longest = None if wanted.max_span is None else wanted.max_span / (2.0 * math.cos(leaf.angle))
     found = {
-        "mechanism.bistable.width": around(leaf.width, high=wanted.max_width),
-        "mechanism.bistable.thickness": around(leaf.thickness, low=wanted.min_thickness),
-        "mechanism.bistable.angle": around(leaf.angle),
+        "mechanism.bistable.width": range_about(leaf.width, high=wanted.max_width),
+        "mechanism.bistable.thickness": range_about(leaf.thickness, low=wanted.min_thickness),
+        "mechanism.bistable.angle": range_about(leaf.angle),
     }
     if spring is not None:
-        found["mechanism.positive.width"] = around(spring.width, high=wanted.max_width)
+        found["mechanism.positive.width"] = range_about(spring.width, high=wanted.max_width)
     if wanted.leaf_length is None:
-        found["mechanism.bistable.length"] = around(leaf.length, high=longest)
+        found["mechanism.bistable.length"] = range_about(leaf.length, high=longest)
     if sheet_of(designed.mechanism.part) is not None:  # widths are those of the sheet
         found = {path: ends for path, ends in found.items() if not path.endswith(".width")}
         if spring is not None:
-            found["mechanism.positive.length"] = around(spring.length)
-            found["mechanism.positive.thickness"] = around(spring.thickness, low=wanted.min_thickness)
+            found["mechanism.positive.length"] = range_about(spring.length)
+            found["mechanism.positive.thickness"] = range_about(spring.thickness, low=wanted.min_thickness)
     return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
 
 

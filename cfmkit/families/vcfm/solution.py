@@ -20,7 +20,7 @@ from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.metrics.longest_interval_in_band import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -210,7 +210,7 @@ class Solution(ShortRepr):
             stated = [
                 (spec.analysis.window, (start, spec.travel)) for spec, start in zip(self.specs, starts, strict=True)
             ]
-            low, high = np.array([between(ends, travel) for ends, travel in stated if ends is not None]).T
+            low, high = np.array([window_places(ends, travel) for ends, travel in stated if ends is not None]).T
             return low, high
         if self.is_linear.all():  # nothing flat needs to be looked for
             return self.linear[0], np.minimum(self.linear[1], self.travel)

@@ -117,15 +117,15 @@ def _interpolate(
     nearest = near[0]
     if len({sample.value for sample in near}) < 3:
         near = near[:1]
-    if not low.share <= _weighted(near, [sample.share for sample in near]) <= high.share:
+    if not low.share <= _interpolate_at_root(near, [sample.share for sample in near]) <= high.share:
         near = [low, high]  # the third lies on another path
-    x = _weighted(near, np.array([sample.at.x for sample in near]))
-    drive = float(_weighted(near, [sample.at.drive for sample in near]))
-    share = float(_weighted(near, [sample.share for sample in near]))
+    x = _interpolate_at_root(near, np.array([sample.at.x for sample in near]))
+    drive = float(_interpolate_at_root(near, [sample.at.drive for sample in near]))
+    share = float(_interpolate_at_root(near, [sample.share for sample in near]))
     return Located(x, drive, nearest.at, low.at, high.at, share, within)
 
 
-def _weighted(near: list[_Sample], values: Any) -> Any:
+def _interpolate_at_root(near: list[_Sample], values: Any) -> Any:
     """Return Lagrange's interpolation of values at samples to where their function vanishes."""
     weights = [
         float(np.prod([other.value / (other.value - own.value) for other in near if other is not own])) for own in near

@@ -61,10 +61,10 @@ from cfmkit.specs.units.windows import (
     Ends,
     TravelShare,
     WindowEnd,
-    between,
     dimension_of_end,
     ends_increase,
     place_of,
+    window_places,
 )
 
 __all__ = [
@@ -109,7 +109,6 @@ __all__ = [
     "Velocity",
     "Volume",
     "WindowEnd",
-    "between",
     "border_factor",
     "border_unit",
     "decimal_text",
@@ -126,4 +125,5 @@ __all__ = [
     "read_quantity",
     "to_border",
     "unit_table",
+    "window_places",
 ]

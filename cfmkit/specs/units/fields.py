@@ -19,13 +19,13 @@ from cfmkit.errors import QuantityError
 from cfmkit.specs.units.quantities import (
     check_quantity,
     decimal_text,
+    describe_dimensions,
     example,
     format_quantity,
     meant_as_percent,
-    needed,
     read_one_of,
 )
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.units.table import DIMENSIONS, UNITLESS, dimension_of
 
 if TYPE_CHECKING:
@@ -251,9 +251,13 @@ def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> Cor
 def _finite(value: Any, dimensions: tuple[str, ...]) -> float:
     """Return a Python or numpy number as a finite float; nothing else is one, least of all a bool."""
     if value is None:
-        raise QuantityError(f"nothing is given here; {needed(dimensions)} is needed, e.g. {example(dimensions)}")
+        raise QuantityError(
+            f"nothing is given here; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions)}"
+        )
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise QuantityError(f"{described(value)} is not {needed(dimensions)}; write e.g. {example(dimensions)}")
+        raise QuantityError(
+            f"{describe_value(value)} is not {describe_dimensions(dimensions)}; write e.g. {example(dimensions)}"
+        )
     try:
         number = float(value)
     except OverflowError:
@@ -263,16 +267,16 @@ def _finite(value: Any, dimensions: tuple[str, ...]) -> float:
     return number
 
 
-def described(value: Any) -> str:
+def describe_value(value: Any) -> str:
     """Return a value in the words of a specification: ``'text'``, ``5``, ``true``, ``a list``, ``nothing``."""
     if value is None:
         return "nothing"
     if isinstance(value, str):
-        return shown(value)
+        return quote(value)
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
-        return shown(repr(value + 0)).strip("'")
+        return quote(repr(value + 0)).strip("'")
     if isinstance(value, Mapping) or hasattr(type(value), "model_fields"):
         return "a block"
     return "a list" if isinstance(value, list | tuple) else f"a {type(value).__name__}"

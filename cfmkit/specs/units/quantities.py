@@ -17,7 +17,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.strict_decimal_number import NUMBER, number_complaint, odd_character, read_number, shown
+from cfmkit.specs.units.strict_decimal_number import NUMBER, number_complaint, odd_character, quote, read_number
 from cfmkit.specs.units.table import COMMON, DIMENSIONS, SYMBOLS, UNITLESS, UNITS, border_unit, dimension_of, to_border
 from cfmkit.specs.units.unit_size import Size, border_size, is_unit, unit_size
 
@@ -62,21 +62,21 @@ def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     cfmkit.errors.QuantityError
         With what is wrong and what to write instead.
     """
-    number, unit = _split(text, dimensions)
+    number, unit = _split_number(text, dimensions)
     value = read_number(number)
     if not unit:
         return _bare(value, number, dimensions), dimensions[0]
     for name in dimensions:
         if (name, unit) in COMMON:
-            return _scaled(number, unit, COMMON[name, unit]), name
+            return _scale_number(number, unit, COMMON[name, unit]), name
     if not is_unit(unit):
         raise QuantityError(unit_complaint(unit, dimensions))
     size = unit_size(unit)
     for name in dimensions:
         if size.powers == border_size(name).powers:
-            return _scaled(number, unit, size.factor), name
-    found = f"{shown(f'{number} {unit}')} is {_kind(size)}"
-    raise QuantityError(f"{found}; {needed(dimensions)} is needed, e.g. {example(dimensions, number)}")
+            return _scale_number(number, unit, size.factor), name
+    found = f"{quote(f'{number} {unit}')} is {_kind(size)}"
+    raise QuantityError(f"{found}; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions, number)}")
 
 
 def meant_as_percent(text: str) -> str:
@@ -87,7 +87,7 @@ def meant_as_percent(text: str) -> str:
     >>> meant_as_percent("5"), meant_as_percent("0.05"), meant_as_percent("150 %")
     ('5 %', '', '')
     """
-    number, unit = _split(text, ("ratio",))
+    number, unit = _split_number(text, ("ratio",))
     return f"{number} %" if not unit and read_number(number) > 1 else ""
 
 
@@ -99,7 +99,7 @@ def check_quantity(text: str) -> str:
     cfmkit.errors.QuantityError
         If it is not a number, or its unit is not known.
     """
-    number, unit = _split(text, ())
+    number, unit = _split_number(text, ())
     value = read_number(number)
     if not unit:
         return decimal_text(value)
@@ -138,7 +138,7 @@ def decimal_text(value: float) -> str:
     return _shortest(float(value), Fraction(1))
 
 
-def needed(dimensions: tuple[str, ...]) -> str:
+def describe_dimensions(dimensions: tuple[str, ...]) -> str:
     """Return ``a length`` or ``a length or an angle``."""
     return " or ".join(DIMENSIONS[name].phrase for name in dimensions) or "a number with a unit"
 
@@ -149,18 +149,22 @@ def example(dimensions: tuple[str, ...], number: str = "") -> str:
         return "'5 mm'"
     items = [DIMENSIONS[name] for name in dimensions]
     texts = [f"{number} {item.unit}" if number and item.name not in UNITLESS else item.example for item in items]
-    return " or ".join(shown(text) for text in texts)
+    return " or ".join(quote(text) for text in texts)
 
 
-def _split(text: str, dimensions: tuple[str, ...]) -> tuple[str, str]:
+def _split_number(text: str, dimensions: tuple[str, ...]) -> tuple[str, str]:
     """Cut text into number and unit; what does not start with a number is refused with the reason."""
     if odd := odd_character(text):
-        raise QuantityError(f"{shown(text)} holds {odd[1]}")
+        raise QuantityError(f"{quote(text)} holds {odd[1]}")
     text = text.strip(" ")
     if not text:
-        raise QuantityError(f"the text is empty; {needed(dimensions)} is needed, e.g. {example(dimensions)}")
+        raise QuantityError(
+            f"the text is empty; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions)}"
+        )
     if len(text) > LONGEST:
-        raise QuantityError(f"{shown(text)} is too long for {needed(dimensions)}: at most {LONGEST} characters")
+        raise QuantityError(
+            f"{quote(text)} is too long for {describe_dimensions(dimensions)}: at most {LONGEST} characters"
+        )
     match = NUMBER.match(text)
     if not match or not _UNIT_START.match(rest := text[match.end() :]) or _PREFIX.match(text):
         raise QuantityError(_no_number(text, dimensions))
@@ -172,7 +176,7 @@ def _no_number(text: str, dimensions: tuple[str, ...]) -> str:
     for part in (text.split(" ")[0], re.split("[A-Za-z%]", text)[0].strip(" "), text):
         if complaint := number_complaint(part):
             return complaint
-    return f"{shown(text)} is not {needed(dimensions)}; write e.g. {example(dimensions)}"
+    return f"{quote(text)} is not {describe_dimensions(dimensions)}; write e.g. {example(dimensions)}"
 
 
 def _bare(value: float, number: str, dimensions: tuple[str, ...]) -> float:
@@ -190,7 +194,7 @@ def _kind(size: Size) -> str:
     return next((DIMENSIONS[name].phrase for name in names), "of another kind")
 
 
-def _scaled(number: str, unit: str, factor: Fraction) -> float:
+def _scale_number(number: str, unit: str, factor: Fraction) -> float:
     """Return number times unit, correctly rounded; `number` is known to be finite and of bounded length."""
     if float(number) == 0:
         return 0.0
@@ -198,9 +202,9 @@ def _scaled(number: str, unit: str, factor: Fraction) -> float:
     try:
         value = float(exact)
     except OverflowError:
-        raise QuantityError(f"{shown(f'{number} {unit}')} is too large") from None
+        raise QuantityError(f"{quote(f'{number} {unit}')} is too large") from None
     if value == 0:
-        raise QuantityError(f"{shown(f'{number} {unit}')} is too small to differ from zero; write 0 if zero is meant")
+        raise QuantityError(f"{quote(f'{number} {unit}')} is too small to differ from zero; write 0 if zero is meant")
     return value
 
 
@@ -252,12 +256,12 @@ _MOST_TRIES = 200
 def unit_complaint(unit: str, dimensions: Sequence[str]) -> str:
     """Return an error that `unit` is none, with the nearest one, of the wanted dimensions if possible."""
     if "(" in unit and is_unit(re.sub("[()]", "", unit)):
-        return f"{shown(unit)} has parentheses; write the unit without them, e.g. N/mm/s"
+        return f"{quote(unit)} has parentheses; write the unit without them, e.g. N/mm/s"
     if re.search(r"[A-Za-z%)] +[A-Za-z(]", unit) and all(word in SYMBOLS for word in re.findall("[A-Za-z%]+", unit)):
-        return f"{shown(unit)} has two units side by side; put * or / between them"
+        return f"{quote(unit)} has two units side by side; put * or / between them"
     guess = nearest_unit(unit, dimensions)
     hint = f"did you mean {guess!r}?" if guess else "`cfmkit show units` lists them"
-    return f"{shown(unit)} is not a unit; {hint}"
+    return f"{quote(unit)} is not a unit; {hint}"
 
 
 def nearest_unit(unit: str, dimensions: Sequence[str]) -> str | None:

@@ -26,7 +26,7 @@ _MINUS_SIGNS = "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"
 _SHOWN = 50
 
 
-def shown(text: str) -> str:
+def quote(text: str) -> str:
     """Return `text` quoted for a message: on one line, escaped where it cannot be seen, cut where it is long."""
     cut = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
     return f"'{visible(cut)}'"
@@ -79,27 +79,27 @@ def read_number(text: str) -> float:
     0.001
     """
     if len(text) > LONGEST:
-        raise QuantityError(f"{shown(text)} is too long for a number: at most {LONGEST} characters")
+        raise QuantityError(f"{quote(text)} is too long for a number: at most {LONGEST} characters")
     if not NUMBER.fullmatch(text):
         raise QuantityError(_complaint(text))
     if zeros := _LEADING_ZERO.fullmatch(text):
-        raise QuantityError(f"{shown(text)} has a leading zero; write {zeros[1]}{zeros[2]}")
+        raise QuantityError(f"{quote(text)} has a leading zero; write {zeros[1]}{zeros[2]}")
     return _finite(text)
 
 
 def _finite(text: str) -> float:
     value = float(text)
     if value in (float("inf"), float("-inf")):
-        raise QuantityError(f"{shown(text)} is too large: at most 1.8e308")
+        raise QuantityError(f"{quote(text)} is too large: at most 1.8e308")
     if value == 0 and re.search("[1-9]", re.split("[eE]", text)[0]):
-        raise QuantityError(f"{shown(text)} is too small to differ from zero; write 0 if zero is meant")
+        raise QuantityError(f"{quote(text)} is too small to differ from zero; write 0 if zero is meant")
     return value
 
 
 def _complaint(text: str) -> str:
     if not text:
         return "there is no number"
-    return number_complaint(text) or f"{shown(text)} is not a number; write e.g. 12, -0.5 or 1e-3"
+    return number_complaint(text) or f"{quote(text)} is not a number; write e.g. 12, -0.5 or 1e-3"
 
 
 def number_complaint(text: str, only_traps: bool = False) -> str | None:
@@ -108,33 +108,41 @@ def number_complaint(text: str, only_traps: bool = False) -> str | None:
     With `only_traps` text that may well be meant as text, such as a date, is left alone.
     """
     if odd := odd_character(text):
-        return f"{shown(text)} holds {odd[1]}"
+        return f"{quote(text)} holds {odd[1]}"
     for trap, pattern, explain in _REASONS:
         if (trap or not only_traps) and pattern.fullmatch(text):
-            return f"{shown(text)} {explain(text)}"
+            return f"{quote(text)} {explain(text)}"
     return None
 
 
-def _fixed(sentence: str) -> Callable[[str], str]:
+def _fixed_format(sentence: str) -> Callable[[str], str]:
     return lambda _text: sentence
 
 
 _PATTERNS: tuple[tuple[bool, str, Callable[[str], str]], ...] = (
     (True, rf"[{_MINUS_SIGNS}][0-9.].*", lambda text: f"has a unicode minus (U+{ord(text[0]):04X}); write -{text[1:]}"),
-    (False, rf".*[0-9eE][{_MINUS_SIGNS}][0-9].*", _fixed("has a unicode minus or dash; write the ASCII '-'")),
-    (True, "[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+", _fixed("has a comma; write decimals with a dot, thousands plainly")),
+    (False, rf".*[0-9eE][{_MINUS_SIGNS}][0-9].*", _fixed_format("has a unicode minus or dash; write the ASCII '-'")),
+    (
+        True,
+        "[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+",
+        _fixed_format("has a comma; write decimals with a dot, thousands plainly"),
+    ),
     (True, "[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?", lambda text: f"has a decimal comma; write {text.replace(',', '.')}"),
-    (True, "[-+]?[0-9.]+,[0-9.,]*", _fixed("has a comma; write digits with one dot, e.g. 1234.5")),
-    (True, "[-+]?[0-9]+(:[0-9.]+)+", _fixed("has a colon (old YAML reads it in base 60); write one decimal number")),
-    (True, "[-+]?0[xX][0-9a-fA-F_]+", _fixed("is hexadecimal; write it in decimal")),
-    (True, "[-+]?0[oO][0-7_]+", _fixed("is octal; write it in decimal")),
-    (True, "[-+]?0[bB][01_]+", _fixed("is binary; write it in decimal")),
+    (True, "[-+]?[0-9.]+,[0-9.,]*", _fixed_format("has a comma; write digits with one dot, e.g. 1234.5")),
+    (
+        True,
+        "[-+]?[0-9]+(:[0-9.]+)+",
+        _fixed_format("has a colon (old YAML reads it in base 60); write one decimal number"),
+    ),
+    (True, "[-+]?0[xX][0-9a-fA-F_]+", _fixed_format("is hexadecimal; write it in decimal")),
+    (True, "[-+]?0[oO][0-7_]+", _fixed_format("is octal; write it in decimal")),
+    (True, "[-+]?0[bB][01_]+", _fixed_format("is binary; write it in decimal")),
     (True, "[-+]?[0-9][0-9.]*_[0-9._]*", lambda text: f"has an underscore; write {text.replace('_', '')}"),
-    (True, "(?i)[-+]?\\.?(nan|inf(inity)?)", _fixed("is not a finite number")),
+    (True, "(?i)[-+]?\\.?(nan|inf(inity)?)", _fixed_format("is not a finite number")),
     (False, "[-+]?[0-9.]+( [0-9.]+)+", lambda text: f"has a space in it; write {text.replace(' ', '')}"),
-    (False, "[-+]?[0-9.][0-9.eE]*[-+*/^(]+[-+*/^() ]*[0-9].*", _fixed("is arithmetic; write its value")),
-    (False, r"[-+]?[0-9.]*(?![0-9])\d.*", _fixed("has digits that are not 0-9; write ASCII digits")),
-    (False, r"[-+]?[0-9]*(\.[0-9]*){2,}", _fixed("has more than one dot; write e.g. 1234.5")),
+    (False, "[-+]?[0-9.][0-9.eE]*[-+*/^(]+[-+*/^() ]*[0-9].*", _fixed_format("is arithmetic; write its value")),
+    (False, r"[-+]?[0-9.]*(?![0-9])\d.*", _fixed_format("has digits that are not 0-9; write ASCII digits")),
+    (False, r"[-+]?[0-9]*(\.[0-9]*){2,}", _fixed_format("has more than one dot; write e.g. 1234.5")),
 )
 _REASONS = tuple((trap, re.compile(pattern), explain) for trap, pattern, explain in _PATTERNS)
 """What people write instead of a number, in the order in which the explanations should be tried.

@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.units.table import SYMBOLS, UNITS, dimension_of
 
 _FACTOR = re.compile(r" *([*/]?) *([A-Za-z%]+|1) *(?:(?:\^|\*\*) *(-?[1-9])(?![0-9]))? *")
@@ -46,7 +46,7 @@ def unit_size(text: str) -> Size:
     """
     factors = _factors(text)
     if factors is None:
-        raise QuantityError(f"{shown(text)} is not a unit")
+        raise QuantityError(f"{quote(text)} is not a unit")
     registry = _registry()
     product = registry.parse_units("*".join(f"{SYMBOLS[symbol].name}**{power}" for symbol, power in factors))
     factor, base = registry.get_base_units(product)

@@ -94,7 +94,7 @@ def dimension_of_end(end: float) -> str:
     return str(getattr(end, "dimension", PLACES[0]))
 
 
-def between(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
+def window_places(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
     """Return a window as places, increasing [m or rad].
 
     Parameters

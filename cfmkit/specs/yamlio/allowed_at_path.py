@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 from pydantic import BaseModel
 
 from cfmkit.specs.units.fields import PLACE, MetricValue, Place, UnitField
-from cfmkit.specs.units.quantities import example, needed
+from cfmkit.specs.units.quantities import describe_dimensions, example
 
 if TYPE_CHECKING:
     from cfmkit.specs.yamlio.path_notation import Path
@@ -84,15 +84,15 @@ class Slot:
     def expected(self) -> str:
         """Return what to write, with an example: ``a length, e.g. '200 mm'``."""
         if self.quantity:
-            return f"{needed(self.quantity.dimensions)}, e.g. {example(self.quantity.dimensions)}"
+            return f"{describe_dimensions(self.quantity.dimensions)}, e.g. {example(self.quantity.dimensions)}"
         if _OPEN in self.metadata:
             return "a number with the unit of the metric, e.g. '5 %'"
         if self.choices:
             return "one of " + ", ".join(map(repr, self.choices)) if len(self.choices) > 1 else repr(self.choices[0])
         if self.model is not None:
-            return "a block with " + ", ".join(required(self.model) or list(self.model.model_fields)[:6])
+            return "a block with " + ", ".join(required_keys(self.model) or list(self.model.model_fields)[:6])
         if self.origin in (tuple, list):
-            return f"a list{self._length()}, each item {expected(self.child(0), plain=True)}"
+            return f"a list{self._length()}, each item {describe_expected(self.child(0), plain=True)}"
         return _PRIMITIVES.get(self.origin, "a value")
 
     def _length(self) -> str:
@@ -131,12 +131,12 @@ def _flat(extra: list[Any]) -> tuple[Any, ...]:
     return tuple(one for item in extra for one in (*getattr(item, "metadata", ()), item))
 
 
-def required(model: type[BaseModel]) -> list[str]:
+def required_keys(model: type[BaseModel]) -> list[str]:
     """Return the keys that a block must have."""
     return [name for name, field in model.model_fields.items() if field.is_required()]
 
 
-def expected(allowed: tuple[Slot, ...], plain: bool = False) -> str:
+def describe_expected(allowed: tuple[Slot, ...], plain: bool = False) -> str:
     """Return what to write where several types are allowed; `plain` leaves the examples out."""
     words = dict.fromkeys(slot.expected().split(", e.g.")[0] if plain else slot.expected() for slot in allowed)
     joint = ", or " if any("," in word for word in words) else " or "
@@ -149,20 +149,20 @@ def trace(model: type[BaseModel], tree: Any, loc: tuple[str | int, ...]) -> Trac
     label_due = False
     for item in loc:
         if label_due:
-            here, label_due = _narrowed(here, str(item)), False
+            here, label_due = _narrow_trace(here, str(item)), False
             continue
         before = here
-        here = _below(here, item)
+        here = _step_down(here, item)
         label_due = here is not before and len(here.slots) > 1
     return here
 
 
-def _narrowed(here: Trace, tag: str) -> Trace:
+def _narrow_trace(here: Trace, tag: str) -> Trace:
     members = tuple(slot for slot in here.slots if slot.matches(tag)) or here.slots
     return Trace(here.path, here.node, members, here.parents, (*here.tags, (here.path, tag)))
 
 
-def _below(here: Trace, item: str | int) -> Trace:
+def _step_down(here: Trace, item: str | int) -> Trace:
     """Go one step down.
 
     What neither the tree nor the types know is a label. A key or index that a

@@ -17,11 +17,11 @@ from pydantic import BaseModel, ValidationError
 
 from cfmkit.errors import Problem, SpecError, UsageError
 from cfmkit.specs.units.fields import BareFloat, BareInt
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
-from cfmkit.specs.yamlio.path_notation import Path, dotted, typed
+from cfmkit.specs.yamlio.path_notation import Path, parse_indices, to_dotted
 from cfmkit.specs.yamlio.text_decoding import LARGEST, Fault
-from cfmkit.specs.yamlio.tree_builder import DEEPEST, Reading, read
+from cfmkit.specs.yamlio.tree_builder import DEEPEST, Reading, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,7 +90,7 @@ class YamlDocument:
             tree = with_value(self.tree, parsed.path, parsed.value)
         except NoSuchPlace as error:
             return self._with_problems(parsed, [((), str(error))])
-        path = typed(parsed.path, tree)
+        path = parse_indices(parsed.path, tree)
         options = [old for old in self._options if old[0][: len(path)] != path]
         return dataclasses.replace(self, tree=tree, _options=(*options, (path, parsed.label)))
 
@@ -104,12 +104,12 @@ class YamlDocument:
         """
         family = self.tree.get("family") if isinstance(self.tree, dict) else None
         if self._reading.broken or not isinstance(self.tree, dict):
-            raise SpecError(_sorted(self.problems))
+            raise SpecError(_sort_problems(self.problems))
         if isinstance(family, str) and family in known:
             return family
         missing = f"the key 'family' is missing: one of {', '.join(known)}"
         problem = self.problem(("family",), not_among(family, known)) if family else self.problem((), missing)
-        raise SpecError(_sorted((*self.problems, problem)))
+        raise SpecError(_sort_problems((*self.problems, problem)))
 
     def bind(self, spec_type: type[SpecType]) -> SpecType:
         """Return the specification, checked.
@@ -120,22 +120,22 @@ class YamlDocument:
             With every problem of the file and the options.
         """
         if self._reading.broken or not isinstance(self.tree, dict):
-            raise SpecError(_sorted(self.problems))
+            raise SpecError(_sort_problems(self.problems))
         problems = list(self.problems)
         try:
-            spec = spec_type.model_validate(_marked(self.tree), context={"border": True, "folder": self.folder})
+            spec = spec_type.model_validate(_mark_numbers(self.tree), context={"border": True, "folder": self.folder})
         except ValidationError as error:
             for complaint in explain(error, spec_type, self.tree):
                 if not any(complaint.path[: len(spoilt)] == spoilt for spoilt in self._spoilt):
                     problems.append(self.problem(complaint.path, complaint.message, complaint.at_key))
         if problems:
-            raise SpecError(_sorted(problems))
+            raise SpecError(_sort_problems(problems))
         return spec
 
     def problem(self, path: str | Path, message: str, at_key: bool = False) -> Problem:
         """Return a problem at a path, with its place in the file or the option that set it."""
         path = self._path(path)
-        reported = dotted(path)
+        reported = to_dotted(path)
         if option := self._option_at(path):
             return Problem(option, 0, 0, "" if option == f"--set {reported}" else reported, message)
         owner = self._owner(path)
@@ -143,8 +143,8 @@ class YamlDocument:
         return Problem(owner.source, line, column, reported, message, owner._line(line))
 
     def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> YamlDocument:
-        new = [Problem(option.label, 0, 0, dotted(path), message) for path, message in faults]
-        spoilt = (*self._spoilt, typed(option.path, self.tree))
+        new = [Problem(option.label, 0, 0, to_dotted(path), message) for path, message in faults]
+        spoilt = (*self._spoilt, parse_indices(option.path, self.tree))
         return dataclasses.replace(self, problems=(*self.problems, *new), _spoilt=spoilt)
 
     def _option_at(self, path: Path) -> str:
@@ -181,7 +181,7 @@ class YamlDocument:
         return self._lines[number - 1] if 0 < number <= len(self._lines) else ""
 
     def _path(self, path: str | Path) -> Path:
-        return typed(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
+        return parse_indices(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
 
 
 def read_document(data: bytes | str, source: str, folder: FilePath | None = None) -> YamlDocument:
@@ -196,7 +196,7 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
     folder : pathlib.Path, optional
         What file names in it are relative to.
     """
-    reading = read(data)
+    reading = read_text(data)
     if not reading.broken and not isinstance(reading.tree, dict):
         reading.broken = True
         reading.faults.append(_no_block(reading))
@@ -206,7 +206,7 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
             source,
             fault.line,
             fault.column,
-            dotted(fault.path),
+            to_dotted(fault.path),
             fault.message,
             lines[fault.line - 1] if 0 < fault.line <= len(lines) else "",
         )
@@ -231,7 +231,7 @@ def _no_block(reading: Reading) -> Fault:
     return Fault(line, column, (), f"{reported}; a specification starts with 'cfmkit: 1' and 'family: ...'")
 
 
-def _sorted(problems: Sequence[Problem]) -> list[Problem]:
+def _sort_problems(problems: Sequence[Problem]) -> list[Problem]:
     """Return problems in the order of the file, those of options last, and not more than can be read."""
     sources = list(dict.fromkeys(one.source for one in problems))
     ordered = sorted(
@@ -245,12 +245,12 @@ def _sorted(problems: Sequence[Problem]) -> list[Problem]:
     return [*ordered[:MOST_PROBLEMS], more]
 
 
-def _marked(tree: Any) -> Any:
+def _mark_numbers(tree: Any) -> Any:
     """Return a tree whose numbers say that they came without a unit."""
     if isinstance(tree, dict):
-        return {key: _marked(value) for key, value in tree.items()}
+        return {key: _mark_numbers(value) for key, value in tree.items()}
     if isinstance(tree, tuple):
-        return tuple(_marked(value) for value in tree)
+        return tuple(_mark_numbers(value) for value in tree)
     if isinstance(tree, bool) or not isinstance(tree, int | float):
         return tree
     return BareInt(tree) if isinstance(tree, int) else BareFloat(tree)
@@ -267,7 +267,7 @@ class Option:
     @property
     def label(self) -> str:
         """Its name in messages: ``--set a.b``."""
-        return "--set " + dotted(self.path)
+        return "--set " + to_dotted(self.path)
 
 
 _PART = r"""(?:\s*"[^"]+"\s*|\s*'[^']+'\s*|[^."'=]+)"""
@@ -295,24 +295,24 @@ def parse_option(text: str) -> Option:
     parts = [part.strip() for part in re.findall(_PART, path)] if found else []
     example = "write e.g. --set mechanism.springs.count=2"
     if not equals or not value.strip():
-        raise UsageError(f"--set {shown(text)}: no value; {example}")
+        raise UsageError(f"--set {quote(text)}: no value; {example}")
     if not all(parts) or not 0 < len(parts) <= DEEPEST:
-        raise UsageError(f"--set {shown(text)}: {shown(path)} is not a dotted path; {example}")
-    return _read_value(tuple(_unquoted(part) for part in parts), value.strip())
+        raise UsageError(f"--set {quote(text)}: {quote(path)} is not a dotted path; {example}")
+    return _read_value(tuple(_unquote(part) for part in parts), value.strip())
 
 
-def _unquoted(part: str) -> str:
+def _unquote(part: str) -> str:
     return part[1:-1] if part[0] in "\"'" else part
 
 
 def _read_value(path: tuple[str, ...], text: str) -> Option:
-    reading = read(text)
+    reading = read_text(text)
     faults = tuple(reading.faults)
     if not faults and not reading.broken and isinstance(reading.tree, dict | tuple) and text[0] not in "[{":
         what = (
             "a block; write {key: value}, or quote text" if isinstance(reading.tree, dict) else "a list; write [a, b]"
         )
-        faults = (Fault(0, 0, (), f"{shown(text)} would be {what}"),)
+        faults = (Fault(0, 0, (), f"{quote(text)} would be {what}"),)
     return Option(path, reading.tree, faults)
 
 
@@ -342,5 +342,5 @@ def with_value(tree: Any, path: tuple[str, ...], value: Any) -> Any:
 def _index(text: str, items: tuple[Any, ...]) -> int:
     if not re.fullmatch("[0-9]{1,9}", text) or int(text) >= len(items):
         count = f"0 to {len(items) - 1}" if items else "none: the list is empty"
-        raise NoSuchPlace(f"{shown(text)} is not an index of this list; there are {count}")
+        raise NoSuchPlace(f"{quote(text)} is not an index of this list; there are {count}")
     return int(text)

@@ -54,22 +54,22 @@ def _content(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -
         must_tell = sum(slot.model is not None for slot in allowed) != 1
         own = Slot(type(value))
         names = [
-            name for name in type(value).model_fields if name in text and _wanted(value, name, must_tell, complete)
+            name for name in type(value).model_fields if name in text and _is_written(value, name, must_tell, complete)
         ]
         return {name: _content(getattr(value, name), text[name], own.child(name), complete) for name in names}
     if isinstance(value, Mapping) and isinstance(text, dict):
-        return {key: _content(value.get(key), item, _below(allowed, key), complete) for key, item in text.items()}
+        return {key: _content(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
     if isinstance(value, tuple | list) and isinstance(text, list) and len(value) == len(text):
         pairs = enumerate(zip(value, text, strict=True))
-        return [_content(*pair, _below(allowed, index), complete) for index, pair in pairs]
+        return [_content(*pair, _slots_below(allowed, index), complete) for index, pair in pairs]
     return text
 
 
-def _below(allowed: tuple[Slot, ...], key: str | int) -> tuple[Slot, ...]:
+def _slots_below(allowed: tuple[Slot, ...], key: str | int) -> tuple[Slot, ...]:
     return tuple(inner for slot in allowed if slot.model is None for inner in slot.child(key))
 
 
-def _wanted(model: BaseModel, name: str, must_tell: bool, complete: bool) -> bool:
+def _is_written(model: BaseModel, name: str, must_tell: bool, complete: bool) -> bool:
     """Return whether a field is to be written: a None only where it is not the default.
 
     With `must_tell` a field that can hold one word only is written too: it tells readers what the block is.
@@ -99,7 +99,7 @@ def _items(items: list[Any], indent: int) -> Iterator[str]:
     """Yield the lines of a list: plain values many to a line, blocks one below the other."""
     pad = " " * indent
     if all(not isinstance(item, dict | list) for item in items):
-        yield from _wrapped([_flow(item) for item in items], pad)
+        yield from _wrap_list([_flow(item) for item in items], pad)
         return
     for item in items:
         if isinstance(item, dict) and item:
@@ -110,7 +110,7 @@ def _items(items: list[Any], indent: int) -> Iterator[str]:
             yield f"{pad}- {_flow(item)}"
 
 
-def _wrapped(words: list[str], pad: str) -> Iterator[str]:
+def _wrap_list(words: list[str], pad: str) -> Iterator[str]:
     """Yield a flow list over several lines."""
     line = f"{pad}["
     for number, word in enumerate(words):
@@ -144,7 +144,7 @@ def _flow(value: Any) -> str:
 def _text(text: str) -> str:
     """Return text as a scalar, quoted where a reader could take it for something else."""
     plain = _PLAIN.fullmatch(text) and text == text.strip() and text.isprintable()
-    return text if plain and not _OLD_WORDS.fullmatch(text) and _reads_as_text(text) else _quoted(text)
+    return text if plain and not _OLD_WORDS.fullmatch(text) and _reads_as_text(text) else _quote(text)
 
 
 def _reads_as_text(text: str) -> bool:
@@ -154,12 +154,12 @@ def _reads_as_text(text: str) -> bool:
         return False
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     """Return text in double quotes; what cannot be seen is escaped."""
-    return "".join(_escaped(char) for char in json.dumps(text, ensure_ascii=False))
+    return "".join(_escape(char) for char in json.dumps(text, ensure_ascii=False))
 
 
-def _escaped(char: str) -> str:
+def _escape(char: str) -> str:
     if char.isprintable() and not odd_character(char):
         return char
     code = ord(char)

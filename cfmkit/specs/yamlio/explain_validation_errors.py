@@ -13,10 +13,10 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, QuantityError, SpecError
-from cfmkit.specs.units.fields import described
-from cfmkit.specs.units.strict_decimal_number import shown
-from cfmkit.specs.yamlio.allowed_at_path import Trace, expected, trace
-from cfmkit.specs.yamlio.path_notation import Path, dotted
+from cfmkit.specs.units.fields import describe_value
+from cfmkit.specs.units.strict_decimal_number import quote
+from cfmkit.specs.yamlio.allowed_at_path import Trace, describe_expected, trace
+from cfmkit.specs.yamlio.path_notation import Path, to_dotted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -63,7 +63,7 @@ class _Error:
 
 def spec_error(error: ValidationError, model: type[BaseModel], tree: Any) -> SpecError:
     """Return a pydantic error about values that come from no file, with the paths that are wrong."""
-    return SpecError([Problem("", 0, 0, dotted(one.path), one.message) for one in explain(error, model, tree)])
+    return SpecError([Problem("", 0, 0, to_dotted(one.path), one.message) for one in explain(error, model, tree)])
 
 
 def explain(error: ValidationError, model: type[BaseModel], tree: Any) -> list[Complaint]:
@@ -82,17 +82,17 @@ def explain(error: ValidationError, model: type[BaseModel], tree: Any) -> list[C
         _Error(line["type"], trace(model, tree, line["loc"]), line.get("ctx", {}), line["msg"])
         for line in error.errors(include_url=False, include_input=False)[:MOST_EXPLAINED]
     ]
-    complaints = [_complaint(line) for line in _meant([line for line in lines if not line.echo], 0)]
-    return _without_echoes(list(dict.fromkeys(complaints)))
+    complaints = [_complaint(line) for line in _drop_unmeant([line for line in lines if not line.echo], 0)]
+    return _drop_echoes(list(dict.fromkeys(complaints)))
 
 
-def _meant(lines: list[_Error], depth: int) -> list[_Error]:
+def _drop_unmeant(lines: list[_Error], depth: int) -> list[_Error]:
     """Return the errors without those of union members that cannot have been meant."""
     kept = [line for line in lines if len(line.trace.tags) <= depth]
     inside = [line for line in lines if len(line.trace.tags) > depth]
     by_place = sorted(inside, key=lambda line: str(line.trace.tags[depth][0]))
     for _, group in groupby(by_place, key=lambda line: line.trace.tags[depth][0]):
-        kept += _meant(_one_member(list(group), depth), depth + 1)
+        kept += _drop_unmeant(_one_member(list(group), depth), depth + 1)
     return kept
 
 
@@ -127,10 +127,10 @@ def _complaint(line: _Error) -> Complaint:
 
 def _missing(found: Trace) -> Complaint:
     if not found.path:
-        return Complaint((), f"{expected(found.slots)} is missing")
+        return Complaint((), f"{describe_expected(found.slots)} is missing")
     last = found.path[-1]
     what = f"the key {last!r}" if isinstance(last, str) else f"item {last + 1} of the list"
-    return Complaint(found.path[:-1], f"{what} is missing: {expected(found.slots)}")
+    return Complaint(found.path[:-1], f"{what} is missing: {describe_expected(found.slots)}")
 
 
 def _unknown_key(found: Trace) -> str:
@@ -139,9 +139,9 @@ def _unknown_key(found: Trace) -> str:
     key = str(found.path[-1]) if found.path else ""
     removed = (getattr(slot.model, "removed_keys", {}).get(key) for slot in found.parents)
     if instead := next(filter(None, removed), ""):
-        return f"the key {shown(key)} was removed; {instead}"
-    hint = did_you_mean(key, names) or listed("allowed are", names)
-    return f"unknown key {shown(key)}" + (f"; {hint}" if hint else "")
+        return f"the key {quote(key)} was removed; {instead}"
+    hint = did_you_mean(key, names) or list_allowed("allowed are", names)
+    return f"unknown key {quote(key)}" + (f"; {hint}" if hint else "")
 
 
 def _unknown_kind(line: _Error) -> Complaint:
@@ -158,10 +158,10 @@ def _unknown_kind(line: _Error) -> Complaint:
 def not_among(value: Any, allowed: Sequence[Any]) -> str:
     """Return an error that a value is none of a closed list of words, and which one comes near."""
     if len(allowed) == 1:
-        return f"{described(value)} is not allowed here, only {described(allowed[0])} is"
+        return f"{describe_value(value)} is not allowed here, only {describe_value(allowed[0])} is"
     hint = did_you_mean(str(value), [str(item) for item in allowed])
-    reported = listed("one of", allowed) or "a known choice"
-    return f"{described(value)} is not {reported}" + (f"; {hint}" if hint else "")
+    reported = list_allowed("one of", allowed) or "a known choice"
+    return f"{describe_value(value)} is not {reported}" + (f"; {hint}" if hint else "")
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
@@ -172,12 +172,12 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     return f"did you mean {by_tidy[near[0]]!r}?" if near else ""
 
 
-def listed(words: str, items: Sequence[Any]) -> str:
+def list_allowed(words: str, items: Sequence[Any]) -> str:
     """Return ``allowed are a, b, c``, or nothing where that would be long."""
     return f"{words} {', '.join(str(item) for item in items)}" if 0 < len(items) <= MOST_LISTED else ""
 
 
-def _without_echoes(complaints: list[Complaint]) -> list[Complaint]:
+def _drop_echoes(complaints: list[Complaint]) -> list[Complaint]:
     """Drop missing keys that a misspelt key beside them explains."""
     hinted = {
         (complaint.path[:-1], match[1])
@@ -196,24 +196,24 @@ def _needs(line: _Error) -> str:
     """Return what is needed in place of what is there, in words."""
     value = line.trace.node
     if value is None:
-        return f"nothing is given here; {expected(line.trace.slots)} is needed"
+        return f"nothing is given here; {describe_expected(line.trace.slots)} is needed"
     choices = [str(choice) for slot in line.trace.slots for choice in slot.choices]
     hint = f"; write [{value}]" if line.kind == "tuple_type" and isinstance(value, str) and "," in value[:60] else ""
     hint = hint or (f"; {near}" if isinstance(value, str) and (near := did_you_mean(value, choices)) else "")
-    return f"{described(value)} does not fit here; {expected(line.trace.slots)} is needed{hint}"
+    return f"{describe_value(value)} does not fit here; {describe_expected(line.trace.slots)} is needed{hint}"
 
 
 def _no_text(line: _Error) -> str:
     value = line.trace.node
     if isinstance(value, bool | int | float):
-        return f"{described(value)} is not text; quote it, if text is meant"
+        return f"{describe_value(value)} is not text; quote it, if text is meant"
     return _needs(line)
 
 
 def _no_bool(line: _Error) -> str:
     value = line.trace.node
     hint = _OLD_BOOLS.get(value.lower()) if isinstance(value, str) else None
-    return f"{described(value)} is not true or false" + (f"; write {hint}" if hint else "")
+    return f"{describe_value(value)} is not true or false" + (f"; write {hint}" if hint else "")
 
 
 def _no_number(line: _Error) -> str:
@@ -221,18 +221,18 @@ def _no_number(line: _Error) -> str:
     kind = "a whole number" if line.kind.startswith("int") else "a number"
     if isinstance(value, str):
         unit = "; a plain number without a unit is needed" if re.match("[-+.0-9]", value) else ""
-        return f"{described(value)} is not {kind}{unit}"
-    return f"{described(value)} is not {kind}" if isinstance(value, bool | float) else _needs(line)
+        return f"{describe_value(value)} is not {kind}{unit}"
+    return f"{describe_value(value)} is not {kind}" if isinstance(value, bool | float) else _needs(line)
 
 
 def _no_choice(line: _Error) -> str:
     choices = [choice for slot in line.trace.slots for choice in slot.choices]
     if not choices:
-        return f"{described(line.trace.node)} is not allowed; allowed are {line.context.get('expected', '')}"
+        return f"{describe_value(line.trace.node)} is not allowed; allowed are {line.context.get('expected', '')}"
     return not_among(line.trace.node, choices)
 
 
-def _out_of_bounds(line: _Error) -> str:
+def _explain_bounds(line: _Error) -> str:
     """Name the value and all its bounds, with units where it has some."""
     slot = next((slot for slot in line.trace.slots if slot.bounds), None)
     given = line.trace.node
@@ -242,7 +242,7 @@ def _out_of_bounds(line: _Error) -> str:
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
     bounds = slot.bounds if slot else {name: line.context[name] for name in signs if name in line.context}
     limits = " and ".join(f"{signs[name]} {bound}" for name, bound in bounds.items())
-    return f"{described(given).strip(chr(39))} is not allowed: must be {limits}"
+    return f"{describe_value(given).strip(chr(39))} is not allowed: must be {limits}"
 
 
 def _too_few_or_many(line: _Error) -> str:
@@ -261,7 +261,7 @@ def _own_words(line: _Error) -> str:
 
 
 def _in_pydantics_words(line: _Error) -> str:
-    return line.text.replace("Input should", f"{described(line.trace.node)} should").replace("Value error, ", "")
+    return line.text.replace("Input should", f"{describe_value(line.trace.node)} should").replace("Value error, ", "")
 
 
 _EXPLAINERS: dict[str, Callable[[_Error], str]] = {
@@ -281,7 +281,7 @@ _EXPLAINERS: dict[str, Callable[[_Error], str]] = {
     "too_long": _too_few_or_many,
     "string_too_short": _too_few_or_many,
     "string_too_long": _too_few_or_many,
-    **dict.fromkeys(("greater_than", "greater_than_equal", "less_than", "less_than_equal"), _out_of_bounds),
+    **dict.fromkeys(("greater_than", "greater_than_equal", "less_than", "less_than_equal"), _explain_bounds),
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), _needs),
     **dict.fromkeys(("tuple_type", "list_type", "union"), _needs),
 }

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 
 Path = tuple[str | int, ...]
 
 
-def typed(path: tuple[str, ...], tree: Any) -> Path:
+def parse_indices(path: tuple[str, ...], tree: Any) -> Path:
     """Return a path with list indices as numbers, as far as the tree has lists there."""
     result: list[str | int] = []
     for part in path:
@@ -21,7 +21,7 @@ def typed(path: tuple[str, ...], tree: Any) -> Path:
     return tuple(result)
 
 
-def dotted(path: Path) -> str:
+def to_dotted(path: Path) -> str:
     """Return a path as ``requirements.0.max``; odd keys are quoted."""
     return ".".join(
         part if isinstance(part, str) and re.fullmatch(r"[\w-]{1,60}", part) else _odd(part) for part in path
@@ -29,4 +29,4 @@ def dotted(path: Path) -> str:
 
 
 def _odd(part: str | int) -> str:
-    return str(part) if isinstance(part, int) else shown(part)
+    return str(part) if isinstance(part, int) else quote(part)

@@ -63,7 +63,7 @@ def decode(data: bytes | str) -> str:
         raise Unreadable(Fault(*_position(before, len(before)), (), what)) from None
 
 
-def without_odd_characters(text: str) -> tuple[str, list[Fault]]:
+def replace_odd_characters(text: str) -> tuple[str, list[Fault]]:
     """Return the text with a space for every character that is refused, and a fault for each kind of them."""
     kinds = {char: found[1] for char in set(text) if (found := odd_character(char))}
     first = sorted((text.index(char), char) for char in sorted(kinds)[:MOST_KINDS])

@@ -23,9 +23,9 @@ from yaml.events import (
 )
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.scalars import check_text, read_plain
-from cfmkit.specs.yamlio.text_decoding import Fault, Unreadable, decode, without_odd_characters
+from cfmkit.specs.yamlio.text_decoding import Fault, Unreadable, decode, replace_odd_characters
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,19 +62,19 @@ class Reading:
     unparsed: bool = False
 
 
-def read(data: bytes | str) -> Reading:
+def read_text(data: bytes | str) -> Reading:
     """Return what a source says, with every fault found in it."""
     try:
-        text, faults = without_odd_characters(decode(data))
+        text, faults = replace_odd_characters(decode(data))
     except Unreadable as stop:
         return Reading(faults=[stop.fault], broken=True)
-    reading = _parsed(text)
+    reading = _parse(text)
     # An odd character may well be the reason why the rest is no YAML.
     reading.faults = faults if reading.unparsed and faults else faults + reading.faults
     return reading
 
 
-def _parsed(text: str) -> Reading:
+def _parse(text: str) -> Reading:
     """Return the reading of clean text, by the fast parser, or in the words of the one that is everywhere."""
     for loader in _LOADERS:
         reading = Reading()
@@ -141,7 +141,7 @@ class _Builder:
             self._complain(event, path, f"'&{anchor}' (an anchor) is not read; remove it")
         if tag := getattr(event, "tag", None):
             reported = tag.replace("tag:yaml.org,2002:", "!!")
-            self._complain(event, path, f"the tag {shown(reported)} is not read; write the plain value")
+            self._complain(event, path, f"the tag {quote(reported)} is not read; write the plain value")
 
     def _scalar(self, event: ScalarEvent, path: Path) -> Any:
         try:
@@ -181,7 +181,7 @@ class _Builder:
             key = self._key(event, path)
             here = (*path, key)
             if first := self.reading.keys.get(here):
-                reported = f"the key {shown(key)} was given in line {first[0]} already; keep one"
+                reported = f"the key {quote(key)} was given in line {first[0]} already; keep one"
                 self._complain(event, here, reported, spoils=False)
             self.reading.keys.setdefault(here, _place(event))
             last = next(self.events)
@@ -191,7 +191,7 @@ class _Builder:
     def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
         """Complain about a number that YAML ended at its decimal comma, as in ``{pivot: 28,303 N*mm/rad}``."""
         before, after = getattr(whole, "value", ""), getattr(rest, "value", "")
-        reported = f"{shown(f'{before},{after}')} has a decimal comma; write {before}.{after}"
+        reported = f"{quote(f'{before},{after}')} has a decimal comma; write {before}.{after}"
         if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
             self._complain(whole, path, reported)
 
@@ -204,7 +204,7 @@ class _Builder:
             return ""
         key = self._scalar(event, path)
         if not isinstance(key, str):
-            self._complain(event, path, f"the key {shown(event.value)} is not a name; keys start with a letter")
+            self._complain(event, path, f"the key {quote(event.value)} is not a name; keys start with a letter")
         elif key == "<<" and not event.style:
             self._complain(event, path, "'<<' (a merge key) is not read; write the keys out")
         return event.value
@@ -282,7 +282,7 @@ _PLAIN_WORDS = (
 def fault_of(error: YAMLError) -> Fault:
     """Return the fault that a YAML error tells, where it is and in plain words."""
     problem = f"{getattr(error, 'context', None) or ''}: {getattr(error, 'problem', None) or error}"
-    message = next(filter(None, (_translated(problem, *entry) for entry in _PLAIN_WORDS)), None)
+    message = next(filter(None, (_translate(problem, *entry) for entry in _PLAIN_WORDS)), None)
     mark: Mark | None = getattr(error, "problem_mark", None)
     if message and "never closed" in message:
         mark = getattr(error, "context_mark", None) or mark
@@ -293,6 +293,6 @@ def fault_of(error: YAMLError) -> Fault:
     return Fault(line, column, (), message or "this is not YAML: " + " ".join(problem.strip(": ").split()))
 
 
-def _translated(problem: str, pattern: str, words: str) -> str | None:
+def _translate(problem: str, pattern: str, words: str) -> str | None:
     match = re.search(pattern, problem)
     return match.expand(words.replace("\\'", "\\\\'")) if match else None

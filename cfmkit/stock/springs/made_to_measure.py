@@ -74,7 +74,7 @@ def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> W
     >>> torsion_spring(0.05, 1.0, 0.002) is None
     True
     """
-    springs = _on_pin(_candidates("torsion", rate, turn), turn, pin)
+    springs = _fit_over_pin(_candidates("torsion", rate, turn), turn, pin)
     fitting = [spring for spring in springs if spring.body_length_wound_up(turn) <= room]
     return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
@@ -84,7 +84,7 @@ def shortest_torsion_spring(rate: float, turn: float, widest: float, pin: float 
 
     None if there is none: the coil would be wider, or too narrow for a pin of that diameter [m].
     """
-    springs = _on_pin(_candidates("torsion", rate, turn), turn, pin)
+    springs = _fit_over_pin(_candidates("torsion", rate, turn), turn, pin)
     fitting = [spring for spring in springs if spring.outer_diameter <= widest]
     return min(fitting, key=lambda spring: spring.body_length, default=None)
 
@@ -138,16 +138,16 @@ def loaded_length(spring: Wound) -> float:
 
 def _candidates(kind: Kind, rate: float, deflection: float) -> list[Wound]:
     """Return the spring of each index whose wire is drawn so thick."""
-    springs = [_wound(kind, index, rate, deflection) for index in INDICES]
+    springs = [_size_spring(kind, index, rate, deflection) for index in INDICES]
     return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
 
 
-def _on_pin(springs: list[Wound], turn: float, pin: float) -> list[Wound]:
+def _fit_over_pin(springs: list[Wound], turn: float, pin: float) -> list[Wound]:
     """Return the torsion springs that fit over a pin [m] when they are wound up by an angle [rad]."""
     return [spring for spring in springs if PIN_SHARE * spring.inner_diameter_wound_up(turn) >= pin]
 
 
-def _wound(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
+def _size_spring(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
     """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
     unit = Wound(kind, 1e-3, index * 1e-3, FEWEST)
     # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls

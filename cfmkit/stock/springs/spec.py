@@ -21,7 +21,7 @@ from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, g
 from cfmkit.stock.springs.support_spec import SpringSupport
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES, WireName, WireOutOfRange
 from cfmkit.tables.lab_columns import split_header
-from cfmkit.tables.lab_file import decoded, lines_of
+from cfmkit.tables.lab_file import decode_file, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -338,7 +338,7 @@ def check_names(springs: Sequence[CatalogueSpring]) -> None:
             raise ValueError(f"there are two springs {one.name!r} with different values: a name stands for one spring")
 
 
-def _named(value: Any, handler: Any, info: ValidationInfo) -> Any:
+def _resolve_file(value: Any, handler: Any, info: ValidationInfo) -> Any:
     """Return a file's name as a file beside the specification; lists and the generic series' word as they are."""
     found = handler(value)
     if not isinstance(found, str):
@@ -377,7 +377,7 @@ def support_of(offer: Offer) -> dict[str, Any]:
     return {"seats": seats, "guide_rod": offer.guide_rod, "guide_tube": offer.guide_tube}
 
 
-Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_named)]
+Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_resolve_file)]
 """The type of a key that lists springs: blocks, a CSV file beside the specification, or ``generic``."""
 
 
@@ -445,7 +445,7 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
 def _lines(source: DataSource) -> list[str]:
     """Return the lines of a file, without the empty ones before the header."""
     try:
-        text, _ = decoded(source.path.read_bytes(), str(source))
+        text, _ = decode_file(source.path.read_bytes(), str(source))
     except OSError as error:
         raise DataError(f"{source}: cannot be read: {reason_of(error)}") from None
     return "\n".join(lines_of(text)).lstrip("\n ;,|\t\ufeff").splitlines(keepends=True)

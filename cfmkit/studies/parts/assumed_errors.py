@@ -46,7 +46,7 @@ class Assumed:
         return {path: getattr(self.process, kind) for path, kind in self.kinds.items()}
 
 
-def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
+def assume_errors(spec: Spec, process: str | None = None) -> Assumed | None:
     """Return what is assumed of a part, by a process, the one that the specification names, or the usual one.
 
     None of what is no part.
@@ -77,7 +77,7 @@ def accuracy_of(spec: Spec, process: str | None = None) -> ProcessAccuracy:
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:
     """Return the same in the words of `design.tolerances`; nothing of no part."""
-    found = assumed(spec, process)
+    found = assume_errors(spec, process)
     if found is None:
         return {}
     stated: dict[str, Any] = {

@@ -123,7 +123,7 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     if shared:
         still = parts.without(values, shared)
         frozen = analyze_parts(parts, still, design, run.part(0.4, 0.7), "parts without common errors").share()
-    before, why = _before(given, block, run.part(0.7, 1.0))
+    before, why = _yield_before(given, block, run.part(0.7, 1.0))
     each = tuple(found.share(found.met[:, [k]]) for k in range(found.met.shape[1]))
     paths = tuple(parts.paths[k] for k in shared)
     return Yields(parts, found.share(), found.share(found.trimmed), frozen, paths, each, before, why, found.lacking)
@@ -135,7 +135,7 @@ def no_yields(given: Spec) -> dict[str, Quantity]:
     return {name: Quantity(None, "ratio", OF_MANY_PARTS[name], NO_TOLERANCE) for name in asked}
 
 
-def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[Share | None, str]:
+def _yield_before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[Share | None, str]:
     """Return the yield of the specification as given, or why there is none."""
     if given is None:
         return None, "nothing was given to begin with"

@@ -55,8 +55,8 @@ def expected_forces(result: Result, run: Run) -> str:
     make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
     verb = "displace to" if curve.motion_dimension == "length" else "turn to"
     return (
-        f"{make}, {_to_measure(parts, weight)}, {verb} {_listed(at)}, and expect {_listed(expected)}: each range "
-        f"holds for {100 * SHARE:.0f} % of parts {whence} (linear estimate)"
+        f"{make}, {_to_measure(parts, weight)}, {verb} {_list_names(at)}, and expect {_list_names(expected)}: "
+        f"each range holds for {100 * SHARE:.0f} % of parts {whence} (linear estimate)"
     )
 
 
@@ -68,9 +68,9 @@ def _to_measure(parts: Parts, weight: FloatArray) -> str:
     order = [int(k) for k in np.argsort(-weight) if weight[k] > 0]
     sizes = [k for k in order if parts.parameters[k].dimension in SIZES][:DIMENSIONS]
     others = [k for k in order[:DIMENSIONS] if parts.parameters[k].dimension not in SIZES]
-    reported = [f"measure {_listed([_dimension(parts, k) for k in sizes])}"] if sizes else []
+    reported = [f"measure {_list_names([_dimension(parts, k) for k in sizes])}"] if sizes else []
     if others:
-        reported.append(f"determine {_listed([_named(parts, k) + ' in the design)' for k in others])}")
+        reported.append(f"determine {_list_names([_name_parameter(parts, k) + ' in the design)' for k in others])}")
     return ", ".join(reported)
 
 
@@ -79,20 +79,20 @@ def _dimension(parts: Parts, k: int) -> str:
     parent, _, last = parts.paths[k].rpartition(".")
     thickness = getattr(parts.spec.at(parent), "thickness", None)
     if last != "offset" or thickness is None:
-        return f"{_named(parts, k)} as drawn)"
+        return f"{_name_parameter(parts, k)} as drawn)"
     # an error of all thicknesses is nothing that is drawn
     ends = (min(thickness), max(thickness)) if isinstance(thickness, tuple) else (thickness,)
     reported = " to ".join(format_short(end, "length") for end in ends)
     return f"{parent.removeprefix('mechanism.')}.thickness ({reported} as drawn)"
 
 
-def _named(parts: Parts, k: int) -> str:
+def _name_parameter(parts: Parts, k: int) -> str:
     """Return the name and the value of a parameter, the bracket still open."""
     value = format_short(float(parts.nominal[k]), parts.parameters[k].dimension)
     return f"{parts.paths[k].removeprefix('mechanism.')} ({value}"
 
 
-def _listed(items: list[str]) -> str:
+def _list_names(items: list[str]) -> str:
     return ", ".join(items[:-1]) + (" and " if len(items) > 1 else "") + items[-1]
 
 

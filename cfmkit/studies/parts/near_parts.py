@@ -18,7 +18,7 @@ from cfmkit.metrics import window_of
 from cfmkit.specs.units import format_short
 from cfmkit.stock.processes import SPRING_RATE
 from cfmkit.studies.parts import requirement_rows as rr
-from cfmkit.studies.parts.assumed_errors import MODULUS, assumed
+from cfmkit.studies.parts.assumed_errors import MODULUS, assume_errors
 from cfmkit.studies.parts.outcomes import SCALED
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.share import Share
@@ -152,7 +152,7 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
         known = np.array([rr.numbers_in(exact[path]) for path in parts.paths]).T
     if rows.metrics or known is None:
         _refuse_many(parts, quick=not rows.metrics)
-    if rows.metrics and (thin := _thinned(result)) is not None:
+    if rows.metrics and (thin := _thin_curve(result)) is not None:
         count, numbers = len(rows.metrics), _finite(lambda part: _numbers(part, rows, run, quick is None), thin)
         if np.allclose(numbers[-count:], middle[-count:], rtol=SAME_RTOL, atol=0.0):
             parts, middle = replace(parts, spec=thin), np.concatenate([middle[: len(middle) - len(numbers)], numbers])
@@ -170,7 +170,7 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
         kept = rows.limits(numbers) >= -1e-9 * np.abs(rows.constant)  # a design on its limit keeps it
         return Share(int(kept.all(axis=1).sum()), 0, len(numbers))
 
-    measured, trimmed = near.numbers(still - parts.nominal), _trimmed(result, rows, middle, made)
+    measured, trimmed = near.numbers(still - parts.nominal), _trim_parts(result, rows, middle, made)
     return ExpectedShares(share(made), share(measured), share(trimmed), proportional)
 
 
@@ -179,7 +179,7 @@ def _numbers(part: Spec, rows: RequirementRows, run: Run, whole: bool) -> FloatA
     return rr.numbers_of(part, rows, run, rr.stated_places(part)) if whole else rr.metrics_of_part(part, rows, run)
 
 
-def _thinned(result: Result) -> Spec | None:
+def _thin_curve(result: Result) -> Spec | None:
     """Return a design whose curve has fewer points; None if metrics are taken from points, or are few already.
 
     Where the model knows the curve between its points, metrics are those of the whole curve.
@@ -190,7 +190,7 @@ def _thinned(result: Result) -> Spec | None:
     return result.spec.replace({"analysis.points": FEW_POINTS})
 
 
-def _trimmed(result: Result, rows: RequirementRows, middle: FloatArray, parts: FloatArray) -> FloatArray:
+def _trim_parts(result: Result, rows: RequirementRows, middle: FloatArray, parts: FloatArray) -> FloatArray:
     """Return the numbers of parts after a trim, (n, q): the mean effort of each on the first branch is the design's.
 
     Efforts and the metrics that go with them are scaled, stresses stay: as of parts that are analysed.
@@ -210,7 +210,7 @@ def _trimmed(result: Result, rows: RequirementRows, middle: FloatArray, parts: F
 def expected_yield(result: Result, run: Run) -> str:
     """Return in a sentence how many parts of a design would be good, or why that is not known; empty of no part."""
     spec = result.spec
-    found = assumed(spec)
+    found = assume_errors(spec)
     if found is None or not spec.part_requirements or not result.curves:
         return ""
     name = found.process.name
@@ -221,11 +221,11 @@ def expected_yield(result: Result, run: Run) -> str:
         return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
-        return f"{_reported(found, shares)}; margins need 'design.free' to name values that may change"
-    return f"{_reported(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
+        return f"{_yield_sentence(found, shares)}; margins need 'design.free' to name values that may change"
+    return f"{_yield_sentence(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
 
 
-def _reported(found: Assumed, shares: ExpectedShares) -> str:
+def _yield_sentence(found: Assumed, shares: ExpectedShares) -> str:
     process = found.process
     used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
     reported = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
@@ -237,13 +237,13 @@ def _reported(found: Assumed, shares: ExpectedShares) -> str:
     if found.as_stated:
         reported.append("moduli of beams' own materials as stated")
     reason = f": {process.reason}" if "thickness" in used else ""
-    text = f"{_about(shares.good)} ({process.name}, assumed tolerances)"
+    text = f"{_format_share(shares.good)} ({process.name}, assumed tolerances)"
     if found.modulus is not None:
-        text += f", {_about(shares.measured)} once the modulus is measured"
+        text += f", {_format_share(shares.measured)} once the modulus is measured"
     return f"{text}: {', '.join(reported)}{reason}; linear estimate"
 
 
-def _about(share: Share) -> str:
+def _format_share(share: Share) -> str:
     """Return a share of drawn parts to two digits, and never as all of them or none."""
     if 100.0 * share.value >= 99.5:
         return "over 99 %"

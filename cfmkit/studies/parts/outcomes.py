@@ -69,7 +69,7 @@ class _Progress(Silent):
 def analyze_parts(parts: Parts, values: FloatArray, nominal: Result, run: Run, what: str = "parts") -> Outcomes:
     """Return what becomes of parts with values (n, d) [SI]; `nominal`: the result of the perfect part."""
     spec = parts.spec
-    metrics = _noted(spec, nominal)
+    metrics = _metrics_to_note(spec, nominal)
     study = Study(spec, parts.paths, metrics, seed=run.seed, findings=False, made=True)
     work = Work(study, plan_of(parts.parameters, values))
     journal = run.notes if isinstance(run.notes, Journal) else None
@@ -85,7 +85,7 @@ def analyze_parts(parts: Parts, values: FloatArray, nominal: Result, run: Run, w
     lacking = np.flatnonzero(np.isnan(found[:, 1:]).any(axis=1) & ~failed)
     reason = _why_lacking(parts.part(values[lacking[0]]), run) if len(lacking) else ""
     level = Study(nominal.spec, (), metrics[:1]).quantities(nominal)[0].value
-    trimmed = _trimmed(spec, nominal, metrics, found, met, np.nan if level is None else level)
+    trimmed = _judge_trimmed(spec, nominal, metrics, found, met, np.nan if level is None else level)
     return Outcomes(met, trimmed, failed, why, (len(lacking), reason))
 
 
@@ -98,7 +98,7 @@ def _why_lacking(part: Spec, run: Run) -> str:
     return next((one.message for one in result.warnings if one.name == "window_outside"), "")
 
 
-def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
+def _metrics_to_note(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
     """Return what a trim needs to know of each part: the mean force, then each requirement's metric and its ends."""
     curve = nominal.curve
     prefix = "torque" if curve.kind == "torque" else "force"
@@ -118,7 +118,7 @@ def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
     )
 
 
-def _trimmed(
+def _judge_trimmed(
     spec: Spec,
     nominal: Result,
     metrics: Sequence[Metric],

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.errors import SpecError
 from cfmkit.specs.spec import DesignKeys, Sensitivity
-from cfmkit.studies.parts.assumed_errors import assumed, process_of_part, tolerances
+from cfmkit.studies.parts.assumed_errors import assume_errors, process_of_part, tolerances
 from cfmkit.studies.parts.distributions import draw, values_at
 from cfmkit.studies.parts.uncertain_values import correlations, groups, parameters_of
 from cfmkit.studies.variable_paths import CannotVary, leaf
@@ -70,7 +70,7 @@ class Parts:
         try:
             return cls.of_block(spec, _block(stated, design.correlated), *_count_and_seed(spec, design, seed))
         except SpecError as error:
-            raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
+            raise SpecError([replace(one, path=_rename_fault(one.path)) for one in error.problems]) from None
 
     @classmethod
     def expected(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
@@ -80,7 +80,7 @@ class Parts:
             return None, ""
         if design.tolerances_of(spec)[0]:
             return cls.of_design(spec, design, seed), "within design.tolerances"
-        found = assumed(spec, process)
+        found = assume_errors(spec, process)
         if found is None:
             return None, ""
         return cls.assumed(spec, seed, process), f"made by {found.process.name} (assumed tolerances)"
@@ -161,7 +161,7 @@ def errs_nowhere(spec: Spec, design: DesignBlock) -> bool:
     return spec.fidelity != "solid" and not stated_tolerances(spec, design)
 
 
-def _renamed(path: str) -> str:
+def _rename_fault(path: str) -> str:
     """Return where a fault of a block `sensitivity` stands in a block `design`."""
     head, _, rest = path.partition(".parameters.")
     return f"design.tolerances.{rest}" if rest else head.replace("sensitivity", "design", 1)

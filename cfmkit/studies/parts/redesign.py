@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import searched
+from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.designing.robust_design import (
     NoPart,
     PartSlopes,
     RobustProblem,
     RobustResult,
     costliest,
-    drawn,
+    optimise_on_samples,
     with_margins,
 )
 from cfmkit.designing.run_many_starts import Clock
@@ -246,7 +246,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
         Seed, progress, time budget.
     """
     others, clock = design.next_best[:OTHER_SPRINGS], Clock.of(run.time_budget)
-    good, found = _moved(given, design, run, clock, not others)
+    good, found = _move_design(given, design, run, clock, not others)
     if not others or design.spec is None or found.spec is not None:
         return found
     tried = [(good, design)]
@@ -256,17 +256,17 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
         other = make()
         if other.spec is None:
             continue
-        good, found = _moved(given, other, run, clock, False)
+        good, found = _move_design(given, other, run, clock, False)
         if found.spec is not None and good:  # without a part that was solved nothing is known of its yield
             reported = f"{len(tried)} with a smaller deviation miss the yield that is requested"
             return replace(found, notes=(*found.notes, ("springs", f"other springs of the catalogue: {reported}")))
         tried.append((good, other))
-    _, found = _moved(given, max(tried, key=lambda one: one[0])[1], run, clock, True)
+    _, found = _move_design(given, max(tried, key=lambda one: one[0])[1], run, clock, True)
     reported = f"the best {len(tried)} choices of the catalogue's springs were tried"
     return replace(found, message=f"{found.message}; {reported}") if len(tried) > 1 else found
 
 
-def _moved(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -> tuple[int, Design]:
+def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -> tuple[int, Design]:
     """Return how many of `CHECKED` parts are good, where some were solved, and the design moved for its yield.
 
     `largest`: whether the largest yield is looked for where the requested one is not found.
@@ -290,14 +290,14 @@ def _moved(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -
     try:
         found, good = _with_margins(problem, numbers, numbers.start, largest)
         if block.robust is not None and free:
-            again = drawn(problem, found, DRAWN, block.robust == "worst")
+            again = optimise_on_samples(problem, found, DRAWN, block.robust == "worst")
             better = numbers.checked(again.x)
             found, good = (again, better) if better >= good else (found, good)
     except NoPart:
         return 0, replace(
             design, notes=(*design.notes, ("margins", "a neighbour of the design has no curve: no margins"))
         )
-    return good, _designed(design, numbers, found, good, problem)
+    return good, _finish_design(design, numbers, found, good, problem)
 
 
 def _with_margins(
@@ -348,7 +348,7 @@ def _largest(
     return best
 
 
-def _designed(design: Design, part: PartNumbers, found: RobustResult, good: int, problem: RobustProblem) -> Design:
+def _finish_design(design: Design, part: PartNumbers, found: RobustResult, good: int, problem: RobustProblem) -> Design:
     """Return the design with its values moved, or why there is none, and what the search says of it."""
     x, spec, worst = found.x, part.written(found, problem), part.costliest(found, problem)
     if _misses(good, problem):
@@ -367,7 +367,7 @@ def _designed(design: Design, part: PartNumbers, found: RobustResult, good: int,
     }
     places = part.rows.places
     motion = part.parts.spec.motion
-    about = searched(numbers, part.parts.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
+    about = search_values(numbers, part.parts.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
     return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", reported)))
 
 

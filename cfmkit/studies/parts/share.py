@@ -59,12 +59,14 @@ class Share:
 
     def as_json(self) -> dict[str, Any]:
         """Return what metrics.json says of it, with both intervals; null for what cannot be stated."""
-        intervals = {name: [_stated(end) for end in getattr(self, name)] for name in ("wilson", "clopper_pearson")}
+        intervals = {
+            name: [_finite_or_none(end) for end in getattr(self, name)] for name in ("wilson", "clopper_pearson")
+        }
         counts = {"good": self.good, "failed": self.failed, "parts": self.count}
-        return {"value": _stated(self.value), **intervals, "level": LEVEL, **counts}
+        return {"value": _finite_or_none(self.value), **intervals, "level": LEVEL, **counts}
 
 
-def _stated(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return None if isnan(value) else value
 
 

@@ -50,7 +50,7 @@ def parameters_of(spec: Spec, block: Sensitivity) -> tuple[Parameter, ...]:
     found = list(faults(spec, block))
     if found:
         raise SpecError([Problem("", 0, 0, ".".join(map(str, place)), message) for place, message in found])
-    return tuple(one for path, stated in block.parameters.items() for one in _expanded(spec, path, stated))
+    return tuple(one for path, stated in block.parameters.items() for one in _expand(spec, path, stated))
 
 
 def faults(spec: Spec, block: Sensitivity) -> Iterator[tuple[Place, str]]:
@@ -59,7 +59,7 @@ def faults(spec: Spec, block: Sensitivity) -> Iterator[tuple[Place, str]]:
     spoilt = False
     for path, stated in block.parameters.items():
         try:
-            expanded = _expanded(spec, path, stated)
+            expanded = _expand(spec, path, stated)
         except CannotVary as problem:
             yield ("sensitivity", "parameters", path), str(problem)
             spoilt = True
@@ -128,7 +128,7 @@ def together(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[int, ...],
     return tuple(dict.fromkeys(tuple(sorted(part)) for part in parts.values()))
 
 
-def _expanded(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[Parameter]:
+def _expand(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[Parameter]:
     return [_parameter(spec, one, stated) for one in _items(spec, path)]
 
 
@@ -171,7 +171,7 @@ def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
 
 
 def _range(found: Leaf, stated: tuple[str, str], nominal: float) -> ParameterSpread:
-    low, high = (_read(found, text) for text in stated)
+    low, high = (_read_value(found, text) for text in stated)
     if not low < high:
         raise CannotVary(f"[{stated[0]}, {stated[1]}] is not a range: the first must be smaller than the second")
     return ParameterSpread("uniform", nominal, low, high)
@@ -196,7 +196,7 @@ def _width(found: Leaf, key: str, text: str, nominal: float) -> float:
         if not nominal:
             raise CannotVary(f"{key}: {text} of zero is zero; give it in the unit of the value")
     else:
-        width = _read(found, text, key)
+        width = _read_value(found, text, key)
         share = found.quantity is not None and found.quantity.dimensions == ("ratio",) and abs(nominal) <= 1
         if share and (meant := meant_as_percent(text)):
             raise CannotVary(f"{key}: {text} is more than the value itself; did you mean {meant}?")
@@ -212,7 +212,7 @@ def _percent(key: str, text: str) -> float:
         raise CannotVary(f"{key}: {problem}") from None
 
 
-def _read(found: Leaf, text: str, key: str = "") -> float:
+def _read_value(found: Leaf, text: str, key: str = "") -> float:
     """Return the SI value of text in the unit of a value."""
     try:
         given: Any = read_number(text) if found.kind == "number" else text

@@ -77,15 +77,15 @@ def slope(up: FloatArray, down: FloatArray, at_nominal: float, half_width: float
     scale = float(np.nanmax(np.abs([*up, *down, at_nominal]))) if both.any() or np.isfinite(at_nominal) else 0.0
     noise = 4.0 * np.finfo(np.float64).eps * scale / size
     if both.sum() >= 2:
-        return _extrapolated(((up - down) / (2.0 * size))[both], noise[both], 4.0)
+        return _extrapolate(((up - down) / (2.0 * size))[both], noise[both], 4.0)
     for side, sign in ((up, 1.0), (down, -1.0)):
         there = ~np.isnan(side)
         if there.sum() >= 2 and np.isfinite(at_nominal):
-            return _extrapolated((sign * (side - at_nominal) / size)[there], noise[there], 2.0)
+            return _extrapolate((sign * (side - at_nominal) / size)[there], noise[there], 2.0)
     return UNKNOWN
 
 
-def _extrapolated(differences: FloatArray, noise: FloatArray, factor: float) -> Slope:
+def _extrapolate(differences: FloatArray, noise: FloatArray, factor: float) -> Slope:
     """Return Ridders' value: `factor` is by how much halving the step reduces the leading error."""
     best = UNKNOWN
     row = list(differences[:1])
@@ -100,6 +100,6 @@ def _extrapolated(differences: FloatArray, noise: FloatArray, factor: float) -> 
     return best
 
 
-def normalised(derivative: float, nominal: float, at_nominal: float) -> float:
+def normalise(derivative: float, nominal: float, at_nominal: float) -> float:
     """Return the relative change of the output for a relative change of the parameter; NaN about zero."""
     return derivative * nominal / at_nominal if nominal and at_nominal else float("nan")

@@ -11,7 +11,7 @@ from cfmkit.metrics import metrics_json
 from cfmkit.results import Finding, Quantity, Status
 from cfmkit.studies.sensitivity.setup import MADE
 from cfmkit.studies.tables import results_table
-from cfmkit.studies.varied_axes import written
+from cfmkit.studies.varied_axes import write_value
 from cfmkit.tables import Table, TableColumn, csv_chunks, to_csv
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def as_json(found: Findings) -> dict[str, Any]:
         "yield": found.all_met and found.all_met.as_json(),
         "samples": _samples(found),
         "parameters": [_parameter(one) for one in setup.parameters],
-        "correlated": _correlated(setup),
+        "correlated": _correlated_pairs(setup),
         "indices": [vars(line) for line in found.lines],
     }
 
@@ -172,7 +172,7 @@ def _metrics(found: Findings) -> dict[str, Quantity]:
         for one, value in zip(study.metrics, values, strict=True)
     }
     if found.all_met is not None:
-        noted["yield"] = Quantity(_known(found.all_met.value), "ratio", YIELD, "no parts were drawn")
+        noted["yield"] = Quantity(_finite_or_none(found.all_met.value), "ratio", YIELD, "no parts were drawn")
     return noted
 
 
@@ -183,7 +183,7 @@ def _requirements(found: Findings) -> list[dict[str, Any]]:
     wanted = found.setup.block.min_yield
     if wanted is None or found.all_met is None:
         return each
-    value, good = _known(found.all_met.value), yield_ok(found)
+    value, good = _finite_or_none(found.all_met.value), yield_ok(found)
     shown = "no value" if value is None else f"{100 * value:.4g} %"
     if value is not None and found.all_met.failed:
         shown += f" ({found.all_met.failed} of {found.all_met.count} parts failed)"
@@ -193,7 +193,7 @@ def _requirements(found: Findings) -> list[dict[str, Any]]:
     return [*each, {"metric": "yield", **bounds, "ok": good, "sentence": sentence}]
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return None if isnan(value) else value
 
 
@@ -212,12 +212,12 @@ def _samples(found: Findings) -> dict[str, Any]:
 def _parameter(one: Parameter) -> dict[str, Any]:
     spread = one.spread
     low, high = spread.ends
-    about = {"path": one.path, "distribution": spread.kind, "nominal": written(spread.nominal, one.dimension)}
+    about = {"path": one.path, "distribution": spread.kind, "nominal": write_value(spread.nominal, one.dimension)}
     if spread.kind == "normal":
-        about["deviation"] = written(spread.deviation, one.dimension)
-    return about | {"range": [written(low, one.dimension), written(high, one.dimension)]}
+        about["deviation"] = write_value(spread.deviation, one.dimension)
+    return about | {"range": [write_value(low, one.dimension), write_value(high, one.dimension)]}
 
 
-def _correlated(setup: Setup) -> list[dict[str, Any]]:
+def _correlated_pairs(setup: Setup) -> list[dict[str, Any]]:
     pairs = setup.parts.correlated if setup.method in MADE else ()
     return [{"parameters": [setup.paths[k] for k in members], "correlation": value} for members, value in pairs]

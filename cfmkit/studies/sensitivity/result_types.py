@@ -86,11 +86,11 @@ def lines_of(metric: Metric, names: tuple[str, ...], analysis: Analysis, samples
         for index in analysis:
             amount = index.name in IN_UNITS
             ends = (index.value[k], index.low[k], index.high[k])
-            value, low, high = (stated(float(one), metric.dimension if amount else "ratio") for one in ends)
+            value, low, high = (to_stated_value(float(one), metric.dimension if amount else "ratio") for one in ends)
             unit = border_unit(metric.dimension) if amount else "1"
             yield IndexLine(metric.label, name, index.name, value, low, high, unit, samples)
 
 
-def stated(value: float, dimension: str) -> float | None:
+def to_stated_value(value: float, dimension: str) -> float | None:
     """Return an SI value in border units; None if it is not finite."""
     return float(to_border(value, dimension)) if isfinite(value) else None

@@ -18,7 +18,7 @@ from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, so
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.indices import analyze_complete
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
-from cfmkit.studies.sensitivity.result_types import stated as reported
+from cfmkit.studies.sensitivity.result_types import to_stated_value as reported
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -110,14 +110,16 @@ def _gradient_lines(metric: Metric, one: Parameter, slope: local.Slope, at_nomin
     above, below = border_unit(metric.dimension), border_unit(one.dimension)
     scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
     unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
-    value, low, high = (reported(end * scale, "ratio") for end in _around(slope.value, slope.error))
+    value, low, high = (reported(end * scale, "ratio") for end in _neighbours(slope.value, slope.error))
     yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, local.LEVELS)
-    relative = local.normalised(1.0, one.spread.nominal, at_nominal)
-    value, low, high = (reported(end, "ratio") for end in _around(slope.value * relative, slope.error * abs(relative)))
+    relative = local.normalise(1.0, one.spread.nominal, at_nominal)
+    value, low, high = (
+        reported(end, "ratio") for end in _neighbours(slope.value * relative, slope.error * abs(relative))
+    )
     yield IndexLine(metric.label, one.path, oat.SLOPE, value, low, high, "1", local.LEVELS)
 
 
-def _around(value: float, reach: float) -> tuple[float, float, float]:
+def _neighbours(value: float, reach: float) -> tuple[float, float, float]:
     return value, value - reach, value + reach
 
 
@@ -188,7 +190,7 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     points = values_at(tight, setup.parts.unit(setup.samples, setup.seed))[:, None, :]
     outputs = evaluator.outputs(points, [DRAWN])
     plain = Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
-    return _with_shares(plain, *_judged(setup, outputs))
+    return _with_shares(plain, *_judge_samples(setup, outputs))
 
 
 def _tolerance_lines(setup: Setup, answer: ToleranceFactors) -> Iterator[IndexLine]:
@@ -203,7 +205,7 @@ def _tolerance_lines(setup: Setup, answer: ToleranceFactors) -> Iterator[IndexLi
             yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, ESTIMATED)
 
 
-def _judged(setup: Setup, outputs: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _judge_samples(setup: Setup, outputs: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which samples meet which requirement (b, s, r), and of which that is not known (b, s)."""
     met = outputs[..., len(setup.study.metrics) :]
     return np.asarray(~np.isnan(met) & (met > 0.5)), np.asarray(np.isnan(met).any(axis=-1))
@@ -220,7 +222,7 @@ def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     setup, outputs = found.setup, found.outputs
     if outputs is None:
         return found
-    met, failed = _judged(setup, outputs)
+    met, failed = _judge_samples(setup, outputs)
     gains = monte_carlo_yield.yield_gains(np.asarray(met.all(axis=-1)), failed)
     lines = (*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines)
     return replace(_with_shares(found, met, failed), lines=lines)

@@ -15,7 +15,7 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
 from cfmkit.specs.units import TravelShare, border_unit, format_short, to_border
 from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.design_with_margins_and_verification import delivered
+from cfmkit.studies.design_with_margins_and_verification import run_design
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.uncertain_values import together
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
@@ -104,7 +104,7 @@ class Setup:
 
     def limits(self, metric: Metric) -> tuple[Bounds, ...]:
         """Return the requirements on a metric over its window, as bounds."""
-        mine = [one for one in self.study.spec.part_requirements if _noted(one) == (metric.name, metric.over)]
+        mine = [one for one in self.study.spec.part_requirements if _note_ends(one) == (metric.name, metric.over)]
         return tuple(Bounds.of(one, metric.dimension) for one in mine)
 
 
@@ -140,8 +140,8 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     groups = together(block, paths)
     refuse_too_many(points_of(block.method, samples, len(paths), len(groups)), most)
     made = block.method in ("tolerance", "inverse")
-    study = Study(spec, paths, (), block.design, seed=chosen, deliver=delivered, made=made)
-    result = _solved(study)
+    study = Study(spec, paths, (), block.design, seed=chosen, deliver=run_design, made=made)
+    result = _solve_nominal(study)
     study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
     study, nominal, unvalued = _with_nominal(study, result)
     warnings = (*unvalued, *_cautions(spec, block, parameters, samples))
@@ -179,7 +179,7 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
         raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", reported) for one in outside])
 
 
-def _noted(one: Requirement) -> tuple[str, Ends | None]:
+def _note_ends(one: Requirement) -> tuple[str, Ends | None]:
     return one.metric, one.over
 
 
@@ -187,7 +187,7 @@ def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metr
     """Return the metrics that are requested; else those of the requirements, over their windows; else all."""
     if block.metrics or not spec.part_requirements:
         return _numeric(metrics_of(spec, block.metrics, sample), block)
-    wanted = dict.fromkeys(map(_noted, spec.part_requirements))
+    wanted = dict.fromkeys(map(_note_ends, spec.part_requirements))
     plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted], sample)}
     motion = sample.motion_dimension if sample is not None else "length"
     labels = {one: _label(plain[one[0]].label, one[1], motion) for one in wanted}
@@ -213,7 +213,7 @@ def _label(name: str, over: Ends | None, motion: str) -> str:
     return f"{name} over {low} ... {high} {border_unit(motion)}"
 
 
-def _solved(study: Study) -> Result:
+def _solve_nominal(study: Study) -> Result:
     """Return the result without any deviation."""
     result = study.solve(study.spec)
     if not result.status.usable:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.plots.style import BAND, GREY, NORMAL, SMALL, axes_mm, new_figure, styled
+from cfmkit.plots.style import BAND, GREY, NORMAL, SMALL, apply_style, axes_mm, new_figure
 from cfmkit.studies.suggest.proposal_making_and_judging import by_own_model
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def named(number: int, proposal: Proposal) -> str:
     return f"{number} {proposal.family}, {proposal.variant}" + (" (not judged in full)" if proposal.open else "")
 
 
-@styled
+@apply_style
 def to_one_scale(proposals: Sequence[Proposal], request: Request, links: Sequence[str] = ()) -> Figure:
     """Return every proposal as it is made, to one scale, in the envelope.
 

@@ -71,7 +71,7 @@ def raised_out(request: Request, force: float, share: float) -> list[str]:
     return [f"wide_beam: the {request.kind} is between {texts[0]} and {texts[1]}, allowed <= {texts[2]}"]
 
 
-def outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
+def sides_outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
     """Yield by which sides a mechanism leaves the envelope; one that turns may lie either way in the plane."""
     if space is None:
         yield "the envelope that it needs is not known"

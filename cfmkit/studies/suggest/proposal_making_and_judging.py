@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.designing.run_many_starts import NEVER, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE, function_named, sized
+from cfmkit.families.base import ENVELOPE, add_size, function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
@@ -26,12 +26,12 @@ from cfmkit.stock.processes import PROCESSES
 from cfmkit.studies.suggest.misses_in_words import (
     disqualifying,
     largest_force,
-    outside,
     raised_out,
+    sides_outside,
     too_short,
     topic_of,
 )
-from cfmkit.studies.suggest.requirements_of_request import LIVES, demanded, unjudged, windows_of
+from cfmkit.studies.suggest.requirements_of_request import LIVES, list_requirements, list_unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
     MovedForYield,
@@ -167,7 +167,7 @@ def spec_of(name: str, text: str) -> Spec:
     return read_document(text, "design.yaml").bind(family(name).spec_type)
 
 
-def made(job: ProposalJob) -> Proposal:
+def make_proposal(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; what its design or model refuses is its message, a bug is raised."""
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
@@ -175,15 +175,15 @@ def made(job: ProposalJob) -> Proposal:
             return _by_finest(job, job.near, clock)
         if job.near is not None:
             return _with_margins(job, job.near, clock)
-        spec, reported = _designed(job, clock)
+        spec, reported = _design_candidate(job, clock)
         if spec is None:
             return Proposal(job.family, candidate.variant, message=reported)
-        return judged(job.family, candidate.variant, spec, job.request, job.seed, clock)
+        return judge_proposal(job.family, candidate.variant, spec, job.request, job.seed, clock)
     except (CfmError, np.linalg.LinAlgError) as problem:  # a shape no solver was made for is no proposal
         return Proposal(job.family, candidate.variant, message=" ".join(str(problem).split())[:300])
 
 
-def _designed(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
+def _design_candidate(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
     """Return the candidate's specification, designed and finished; else None with the reason."""
     record, spec = family(job.family), job.candidate.spec
     if clock.late():
@@ -234,7 +234,7 @@ def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
         made = function_named(correct)(spec, job.request) if correct else spec.replace({FIDELITY: near.pending})
         if clock.late():
             break
-        found = judged(job.family, near.variant, made, job.request, job.seed, clock, near)
+        found = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)
         if best is None or (found.text and len(found.missed) <= len(best.missed)):
             best = found
         if found.passes or not found.text:
@@ -249,13 +249,13 @@ def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
         return Proposal(job.family, near.variant, message=OUT_OF_TIME)
 
     def judge(spec: Spec) -> Proposal:
-        return judged(job.family, near.variant, spec, job.request, job.seed, clock)
+        return judge_proposal(job.family, near.variant, spec, job.request, job.seed, clock)
 
-    found = redesigned(near, job.candidate, job.request, Run(job.seed, time_budget=clock.left()), judge)
+    found = redesign_for_yield(near, job.candidate, job.request, Run(job.seed, time_budget=clock.left()), judge)
     return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
 
 
-def redesigned(
+def redesign_for_yield(
     near: Proposal, candidate: Candidate, request: Request, run: Run, judge: Callable[[Spec], Proposal]
 ) -> Proposal:
     """Return a proposal of the required yield, else the best found, with what is missing of it.
@@ -293,7 +293,7 @@ def redesigned(
         if moved.share < asked or asked >= MOST_ASKED:
             break
         asked, spec = min(MOST_ASKED, max(moved.share, asked) + 0.5 * (wanted - share)), there.spec
-    return replace(best, missed=(f"{best.missed[0]}; {_tried(last, obstacle)}",), movable=False)
+    return replace(best, missed=(f"{best.missed[0]}; {_explain_margins(last, obstacle)}",), movable=False)
 
 
 def _note(moved: MovedForYield) -> str:
@@ -301,7 +301,7 @@ def _note(moved: MovedForYield) -> str:
     return f"designed with margins: yield {before} before, {now} now (linear estimate)"
 
 
-def _tried(moved: MovedForYield | None, obstacle: str) -> str:
+def _explain_margins(moved: MovedForYield | None, obstacle: str) -> str:
     """Return why margins did not help."""
     if moved is None:
         return "no value of the design may change to improve it"
@@ -315,7 +315,7 @@ def _seconds(clock: Clock) -> float:
     return LONGEST if left is None else min(LONGEST, max(left, 0.1))
 
 
-def judged(
+def judge_proposal(
     name: str,
     variant: str,
     spec: Spec,
@@ -354,14 +354,14 @@ def judged(
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
     space: BoundingBox | None = record.envelope(result)
-    result, values = sized(result, space), values_of_family(record.values)
-    required = plain.replace({"requirements": demanded(request, result, space, values)})
+    result, values = add_size(result, space), values_of_family(record.values)
+    required = plain.replace({"requirements": list_requirements(request, result, space, values)})
     text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
     misses = [
         *((topic_of(one.metric), one.sentence) for one in outcomes if not one.ok and one.metric not in ENVELOPE),
-        *(("size", text) for text in outside(request, space)),
+        *(("size", text) for text in sides_outside(request, space)),
         *(("travel", text) for text in too_short(request, result)),
         *disqualifying(result),
     ]
@@ -390,7 +390,7 @@ def judged(
     return Proposal(
         name, variant, text,
         missed=tuple(text for _, text in misses), fails=tuple(topic for topic, _ in misses), numbers=numbers,
-        notes=tuple(_notes(space, result)), movable=movable, unjudged=tuple(unjudged(request, result)),
+        notes=tuple(_notes(space, result)), movable=movable, unjudged=tuple(list_unjudged(request, result)),
         model=model_of(name, written), pending=pending, warnings=tuple(warnings.values()), seconds=seconds,
         own=near.model if near else "",
     )  # fmt: skip

@@ -14,7 +14,7 @@ from cfmkit.families.base import function_named
 from cfmkit.families.findings import percent
 from cfmkit.families.run_control import Run
 from cfmkit.specs.units import format_short, read_quantity
-from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, made
+from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -53,7 +53,7 @@ def nearest(request: Request, name: str, seed: int, clock: Clock) -> dict[str, s
             edges.append((factor, key, relaxation))
     found: dict[str, str] = {}
     for factor, key, relaxation in sorted(edges, key=lambda one: one[0]):
-        reported = None if len(found) == NAMED else _met(request, name, (relaxation, factor), seed, clock)
+        reported = None if len(found) == NAMED else _find_met(request, name, (relaxation, factor), seed, clock)
         if reported is not None:
             found[key] = reported
     return found
@@ -63,7 +63,7 @@ def _relaxations(request: Request) -> dict[str, Relaxation]:
     """Return what may be relaxed of a request, by key."""
     found: dict[str, Relaxation] = {"envelope": _larger, request.kind: _weaker}
     found["travel" if request.kind == "force" else "angle"] = _shorter
-    found["ripple"] = _rippled
+    found["ripple"] = _relax_ripple
     if request.safety > 1.0:
         found["safety"] = _less_safe
     if request.hysteresis is not None:
@@ -73,7 +73,7 @@ def _relaxations(request: Request) -> dict[str, Relaxation]:
     return found
 
 
-def _offered(request: Request, name: str, seed: int) -> Sequence[Candidate]:
+def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     propose = family(name).propose
     if not propose:
         return ()
@@ -87,7 +87,7 @@ def _first_offer(request: Request, asked: tuple[str, int], relaxation: Relaxatio
 
     def offers(factor: float) -> bool:
         relaxed = relaxation(request, factor)
-        return relaxed is not None and bool(_offered(relaxed[0], *asked))
+        return relaxed is not None and bool(_offer(relaxed[0], *asked))
 
     below = 1.0
     for factor in STEPS:
@@ -104,7 +104,7 @@ def _first_offer(request: Request, asked: tuple[str, int], relaxation: Relaxatio
     return factor
 
 
-def _met(request: Request, name: str, relaxed_by: tuple[Relaxation, float], seed: int, clock: Clock) -> str | None:
+def _find_met(request: Request, name: str, relaxed_by: tuple[Relaxation, float], seed: int, clock: Clock) -> str | None:
     """Return the value of a key with which one of a family's first candidates is good; None if none is."""
     relaxation, first = relaxed_by
     for more in FURTHER:
@@ -114,10 +114,10 @@ def _met(request: Request, name: str, relaxed_by: tuple[Relaxation, float], seed
         # the sides that were just enough by the laws may be too little: then all of them
         choices = [_only_needed(request, (name, seed), relaxed), relaxed] if relaxation is _larger else [relaxed]
         for asked, reported in {text: (one, text) for one, text in choices}.values():
-            for candidate in _offered(asked, name, seed)[:TRIED]:
+            for candidate in _offer(asked, name, seed)[:TRIED]:
                 if clock.late():
                     return None
-                if made(ProposalJob(name, candidate, asked, seed, clock.deadline)).passes:
+                if make_proposal(ProposalJob(name, candidate, asked, seed, clock.deadline)).passes:
                     return reported
     return None
 
@@ -132,12 +132,12 @@ def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> 
         if request.travel >= sides[1] and request.kind == "force":
             continue
         fewer = _in_envelope(request, sides)
-        if _offered(fewer[0], *asked):
+        if _offer(fewer[0], *asked):
             relaxed = fewer
     return relaxed
 
 
-def _written(value: float, dimension: str, digits: int = 3) -> tuple[float, str]:
+def _round_written(value: float, dimension: str, digits: int = 3) -> tuple[float, str]:
     """Return a value as a reader of its text has it, and the text."""
     text = format_short(value, dimension, digits)
     return read_quantity(text, dimension), text
@@ -146,7 +146,8 @@ def _written(value: float, dimension: str, digits: int = 3) -> tuple[float, str]
 def _in_envelope(request: Request, sides: Sequence[float]) -> Relaxed:
     # a side that stays is as it was, to its last digit
     pairs = [
-        _written(side, "length", 12 if side == old else 4) for side, old in zip(sides, request.envelope, strict=True)
+        _round_written(side, "length", 12 if side == old else 4)
+        for side, old in zip(sides, request.envelope, strict=True)
     ]
     return replace(request, envelope=tuple(side for side, _ in pairs)), " x ".join(text for _, text in pairs)
 
@@ -159,7 +160,9 @@ def _weaker(request: Request, factor: float) -> Relaxed | None:
     if request.adjustable is not None:
         return None
     digits = 6 if request.banded else 3
-    pairs = [_written(value / factor, request.kind, digits) for value in (request.low, request.target, request.high)]
+    pairs = [
+        _round_written(value / factor, request.kind, digits) for value in (request.low, request.target, request.high)
+    ]
     (low, first), (target, middle), (high, last) = pairs
     if request.banded:
         return replace(request, low=low, target=request.target * low / request.low, high=high), f"[{first}, {last}]"
@@ -168,11 +171,11 @@ def _weaker(request: Request, factor: float) -> Relaxed | None:
 
 
 def _shorter(request: Request, factor: float) -> Relaxed:
-    travel, text = _written(request.travel / factor, "length" if request.kind == "force" else "angle")
+    travel, text = _round_written(request.travel / factor, "length" if request.kind == "force" else "angle")
     return replace(request, travel=travel), text
 
 
-def _rippled(request: Request, factor: float) -> Relaxed | None:
+def _relax_ripple(request: Request, factor: float) -> Relaxed | None:
     text = percent(factor * request.ripple)
     return (replace(request, ripple=share), text) if (share := read_quantity(text, "ratio")) < LARGEST else None
 
@@ -189,6 +192,6 @@ def _lossy(request: Request, factor: float) -> Relaxed | None:
 
 def _less_adjustable(request: Request, factor: float) -> Relaxed | None:
     assert request.adjustable is not None
-    pairs = [_written(request.target + (end - request.target) / factor, "force", 4) for end in request.adjustable]
+    pairs = [_round_written(request.target + (end - request.target) / factor, "force", 4) for end in request.adjustable]
     (low, first), (high, last) = pairs
     return (replace(request, adjustable=(low, high)), f"[{first}, {last}]") if low < high else None

@@ -38,10 +38,10 @@ def windows_of(spec: Spec, request: Request) -> tuple[dict[str, Any], ...]:
 
     Solids are solved at the ends of the windows of all requirements: with this one they are those of the finished file.
     """
-    return ({"metric": "safety_factor", "min": f"{request.safety:.12g}", "over": pressed(request, spec)},)
+    return ({"metric": "safety_factor", "min": f"{request.safety:.12g}", "over": stressed_motion(request, spec)},)
 
 
-def demanded(
+def list_requirements(
     request: Request, result: Result, space: BoundingBox | None, values: Iterable[Definition]
 ) -> tuple[dict[str, Any], ...]:
     """Return the requirements that say what is required of a mechanism, over the window of its analysis.
@@ -67,7 +67,7 @@ def demanded(
     )
 
 
-def unjudged(request: Request, result: Result) -> Iterator[str]:
+def list_unjudged(request: Request, result: Result) -> Iterator[str]:
     """Yield what is required and no model here can judge, each with the reason."""
     found = evaluate(result)
     if request.hysteresis is not None and "unload" not in result.curve.branches:
@@ -88,7 +88,7 @@ def unjudged(request: Request, result: Result) -> Iterator[str]:
         yield f"contact pressure not judged: no strength is known of {_material(result)}"
 
 
-def pressed(request: Request, spec: Spec) -> tuple[str, str]:
+def stressed_motion(request: Request, spec: Spec) -> tuple[str, str]:
     """Return over what a mechanism has to bear its stress: all it does; of made parts from half of the run-in on.
 
     A made part begins and ends a little before or after the perfect one: a metric over all that this does has no value.
@@ -103,7 +103,7 @@ def _share(value: float) -> str:
     return f"{100.0 * value:.12g} %"
 
 
-def _known(found: Mapping[str, Quantity], name: str) -> float | None:
+def _value_of(found: Mapping[str, Quantity], name: str) -> float | None:
     return found[name].value if name in found else None
 
 
@@ -119,9 +119,9 @@ def _of_effort(request: Request) -> Iterator[dict[str, Any]]:
 
 def _of_stress(request: Request, result: Result, found: Mapping[str, Quantity]) -> Iterator[dict[str, Any]]:
     least = f"{request.safety:.12g}"
-    if _known(found, "safety_factor") is not None:
-        yield {"metric": "safety_factor", "min": least, "over": pressed(request, result.spec)}
-    if _known(found, "link_safety_factor") is not None:
+    if _value_of(found, "safety_factor") is not None:
+        yield {"metric": "safety_factor", "min": least, "over": stressed_motion(request, result.spec)}
+    if _value_of(found, "link_safety_factor") is not None:
         yield {"metric": "link_safety_factor", "min": least}
         yield {"metric": "link_turn_share_max", "max": STRAIGHT_LINKS}
 
@@ -149,8 +149,8 @@ def _of_lives(request: Request, result: Result, found: Mapping[str, Quantity]) -
     if request.cycles is None:
         return
     if _bends(result) and "fatigue_life" in found and getattr(_block(result.spec), "fatigue", None) is not None:
-        yield {"metric": "fatigue_life", "min": f"{request.cycles}", "over": pressed(request, result.spec)}
-    if _known(found, "spring_life") is not None:
+        yield {"metric": "fatigue_life", "min": f"{request.cycles}", "over": stressed_motion(request, result.spec)}
+    if _value_of(found, "spring_life") is not None:
         yield {"metric": "spring_life", "min": f"{request.cycles}"}
 
 
@@ -161,7 +161,7 @@ def _unknown_lives(result: Result, found: Mapping[str, Quantity]) -> Iterator[st
         yield f"life not judged: no S-N data for {_material(result)}"
     elif _bends(result) and "fatigue_life" not in found:
         yield "life not judged: no model of the fatigue of its contact"
-    if wired and _known(found, "spring_life") is None:
+    if wired and _value_of(found, "spring_life") is None:
         yield "life not judged: no S-N data for the wire of its springs"
     if not (_bends(result) or links or wired):
         yield "life not judged: no stress of its parts is modelled"

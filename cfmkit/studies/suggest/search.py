@@ -27,9 +27,15 @@ from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
-from cfmkit.studies.pool import until
+from cfmkit.studies.pool import give_up_at
 from cfmkit.studies.serial_and_cluster_executors import Lost, surviving
-from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.proposal_making_and_judging import (
+    ENDED_EARLY,
+    OUT_OF_TIME,
+    Proposal,
+    ProposalJob,
+    make_proposal,
+)
 from cfmkit.studies.suggest.relaxed_requests import nearest
 
 if TYPE_CHECKING:
@@ -157,14 +163,14 @@ def suggest(
     passing = distinct([one for one in done if one.passes])
     return Suggestions(
         request,
-        tuple(ordered([one for one in passing if one.good], prefer)),
+        tuple(order_proposals([one for one in passing if one.good], prefer)),
         tuple(_near(done, request)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
         making.reused,
         tuple(bugs),
-        tuple(ordered([one for one in passing if not one.good], prefer)),
+        tuple(order_proposals([one for one in passing if not one.good], prefer)),
     )
 
 
@@ -173,7 +179,7 @@ def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Execut
 
     The processes of a pool behave like that by themselves, this process does not. Tracebacks are added to `bugs`.
     """
-    executor = until(run.executor, deadline)
+    executor = give_up_at(run.executor, deadline)
 
     def watched(work: Work, jobs: Iterator[Any], stopping: Stopping) -> Iterator[tuple[Any, Any]]:
         for job, outcome in executor(partial(surviving, work), jobs, stopping):
@@ -219,7 +225,7 @@ class _Making:
         work = partial(_made_of, tuple(jobs))
         executor = surviving_until(run, self._times.without, self._bugs)
         for index, outcome in executor(work, iter(left), self.late):
-            proposal = _survived(jobs[index], outcome)
+            proposal = _proposal_or_loss(jobs[index], outcome)
             if proposal.message != OUT_OF_TIME:
                 self._known[index] = proposal
                 # What ended early, crashed, or lost its process is not kept: it may succeed next time.
@@ -292,10 +298,10 @@ def _nearest_of(request: Request, seed: int, clock: Clock, name: str) -> dict[st
 
 
 def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
-    return made(jobs[index])
+    return make_proposal(jobs[index])
 
 
-def _survived(job: ProposalJob, outcome: Proposal | Lost) -> Proposal:
+def _proposal_or_loss(job: ProposalJob, outcome: Proposal | Lost) -> Proposal:
     """Return a proposal, or what is said of one whose process died or was given up."""
     if isinstance(outcome, Proposal):
         return outcome
@@ -309,7 +315,7 @@ def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]
     asked = list(names())
     plain = Run(run.seed)
     executor = surviving_until(run, deadline, bugs)
-    found = dict(executor(partial(_asked, request, plain), iter(asked), lambda: False))
+    found = dict(executor(partial(_ask_family, request, plain), iter(asked), lambda: False))
     answers, late = [], False
     for name in asked:
         outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED)
@@ -321,7 +327,7 @@ def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]
     return [one for one in answers if one.offer.candidates or one.offer.reason], late
 
 
-def _asked(request: Request, run: Run, name: str) -> FamilyOffer:
+def _ask_family(request: Request, run: Run, name: str) -> FamilyOffer:
     try:
         record = family(name)
     except Unusable:  # of another package; `families.skipped` says why
@@ -389,7 +395,7 @@ def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
     ['2 springs, 34 x 51 mm', '2 springs, 69 x 23 mm']
     """
     count = Counter((one.family, one.variant) for one in proposals)
-    sized = [_sized(one) if count[one.family, one.variant] > 1 else one for one in proposals]
+    sized = [_add_size_to_name(one) if count[one.family, one.variant] > 1 else one for one in proposals]
     count, seen = Counter((one.family, one.variant) for one in sized), Counter[tuple[str, str]]()
     found = []
     for one in sized:
@@ -398,7 +404,7 @@ def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
     return found
 
 
-def _sized(one: Proposal) -> Proposal:
+def _add_size_to_name(one: Proposal) -> Proposal:
     across, along = (1e3 * float(one.numbers.get(side) or 0.0) for side in ("across", "along"))
     return replace(one, variant=f"{one.variant}, {across:.3g} x {along:.3g} mm")
 
@@ -407,7 +413,7 @@ EQUAL = 1e-3
 """Numbers that differ by less than this share are equal: searches leave as much in them, and nobody sees it."""
 
 
-def ordered(proposals: Sequence[Proposal], prefer: Sequence[str]) -> list[Proposal]:
+def order_proposals(proposals: Sequence[Proposal], prefer: Sequence[str]) -> list[Proposal]:
     """Return proposals, the best first: each preference counts half as much as the one before it.
 
     Of equal ones, as two sizes of one shape are in their ripple, the one that was made first is the first.

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.designing.robust_design import NoPart, with_margins
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import family
@@ -25,7 +25,7 @@ from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
-from cfmkit.studies.parts.assumed_errors import assumed, tolerances
+from cfmkit.studies.parts.assumed_errors import assume_errors, tolerances
 from cfmkit.studies.parts.near_parts import Unknown, expected_shares
 from cfmkit.studies.parts.outcomes import analyze_parts
 from cfmkit.studies.parts.parts import Parts
@@ -108,7 +108,7 @@ def good_parts(result: Result, request: Request, clock: Clock, draw: bool) -> Go
         Whether to draw parts where the estimate of first order is good enough; else that is the answer.
     """
     wanted = float(request.good_parts or 0.0)
-    found = assumed(result.spec, request.process)
+    found = assume_errors(result.spec, request.process)
     if found is None or result.spec.sensitivity is None:
         return GoodParts(
             None, "its yield is not known: the errors that the process causes in its dimensions are not known"
@@ -117,11 +117,11 @@ def good_parts(result: Result, request: Request, clock: Clock, draw: bool) -> Go
     first = _first_order(result, parts)
     most = 1.0 if first is None else _most(first, found, request)
     if first is not None and first.good.value < wanted:
-        text = _reported(first.good.value, f"made by {found.process.name}, linear estimate", wanted)
+        text = _report_yield(first.good.value, f"made by {found.process.name}, linear estimate", wanted)
         return GoodParts(first.good.value, text + _cures(first, found, most, wanted), movable=most >= wanted)
     if not draw:
         return GoodParts(None if first is None else first.good.value)
-    drawn = _drawn(result, parts, found, wanted, clock)
+    drawn = _draw_parts(result, parts, found, wanted, clock)
     return replace(drawn, movable=first is not None and bool(drawn.missed) and most >= wanted)
 
 
@@ -161,28 +161,28 @@ def _first_order(result: Result, parts: Parts) -> ExpectedShares | None:
         return None
 
 
-def _drawn(result: Result, parts: Parts, found: Assumed, wanted: float, clock: Clock) -> GoodParts:
+def _draw_parts(result: Result, parts: Parts, found: Assumed, wanted: float, clock: Clock) -> GoodParts:
     """Return how many drawn parts are good; the first that are too many bad ones end it."""
     good, looked, most_bad = 0, 0, (1.0 - wanted) * N_DRAWN + 1e-9
-    for met in _met(result, parts):
+    for met in _judge_parts(result, parts):
         if clock.late():
             return GoodParts(None, OUT_OF_TIME, late=True)
         looked += len(met)
         good += int(met.sum())
         if looked - good > most_bad:
             made = f"of {looked} parts made by {found.process.name}"
-            return GoodParts(good / looked, _reported(good / looked, made, wanted))
+            return GoodParts(good / looked, _report_yield(good / looked, made, wanted))
     return GoodParts(good / looked)
 
 
-def _met(result: Result, parts: Parts) -> Iterator[NDArray[np.bool_]]:
+def _judge_parts(result: Result, parts: Parts) -> Iterator[NDArray[np.bool_]]:
     """Yield which of the next parts are good, (n,) of bool."""
     values = parts.draw()
     for begin in range(0, len(values), AT_ONCE):
         yield np.asarray(analyze_parts(parts, values[begin : begin + AT_ONCE], result, Run()).met.all(axis=1))
 
 
-def _reported(share: float, made: str, wanted: float) -> str:
+def _report_yield(share: float, made: str, wanted: float) -> str:
     return f"yield {percent(share)} {made}, wanted at least {percent(wanted)}"
 
 
@@ -236,7 +236,9 @@ def _free(candidate: Candidate, spec: Spec, request: Request) -> dict[str, tuple
         value: Any = spec.at(path)
         if isinstance(value, float):
             thin = path.endswith("thickness")
-            found[path] = around(value, low=request.thinnest if thin else None, high=None if thin else request.depth)
+            found[path] = range_about(
+                value, low=request.thinnest if thin else None, high=None if thin else request.depth
+            )
     # a value at the end of its range, as a leaf as thin as can be made, may still move away from it
     at = {path: float(spec.at(path)) for path in found}
     inside = {path: (min(low, at[path]), max(high, at[path])) for path, (low, high) in found.items()}

@@ -9,7 +9,7 @@ It grows with g: the largest g within the tolerance has the shortest springs. g 
 
 from math import hypot, sqrt
 
-from cfmkit.families.findings import at_least, at_most, mm
+from cfmkit.families.findings import format_at_least, format_at_most, mm
 from cfmkit.families.no_mechanism import Infeasible, refusals_answered
 from cfmkit.families.run_control import Run
 from cfmkit.numerics.roots import bracketed_root
@@ -57,7 +57,7 @@ def _ratio(request: ObliqueDesign, half_span: float) -> float:
         reported = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(request.height_max)}"
         flattest = half_span / hypot(half_span, request.height_max)
         nearer = {"design.range": _range(flattest, request, half_span)} if flattest <= MOST else {}
-        raise Infeasible(finding("no_room", reported), {"design.height_max": at_least(height)} | nearer)
+        raise Infeasible(finding("no_room", reported), {"design.height_max": format_at_least(height)} | nearer)
     return ratio
 
 
@@ -66,17 +66,19 @@ def _range(ratio: float, request: ObliqueDesign, half_span: float) -> str:
     # the departure at e is above e - 1 times this, which bounds the root
     factor = ratio / ((1.0 - ratio) * sqrt(1.0 - ratio**2))
     fits = bracketed_root(lambda e: departure(ratio, e) - request.tolerance, 0.0, 2.0 + request.tolerance / factor)
-    return at_most(2.0 * half_span * fits)
+    return format_at_most(2.0 * half_span * fits)
 
 
 def _coils_stay_apart(part: Mechanism, end: float) -> None:
     """Refuse springs that are solid before the range ends."""
     if part.oblique.solid_length > part.half_span:
         reported = f"the oblique springs are solid at {mm(part.oblique.solid_length)}, before they lie flat"
-        raise Infeasible(finding("coils_touch", reported), {"mechanism.oblique.solid_length": at_most(part.half_span)})
+        raise Infeasible(
+            finding("coils_touch", reported), {"mechanism.oblique.solid_length": format_at_most(part.half_span)}
+        )
     if (room := part.vertical.free_length - part.vertical.solid_length) < end:
         reported = f"the vertical spring can be compressed by {mm(room)}; the range ends at {mm(end)}"
-        longer = at_least(part.vertical.solid_length + end)
+        longer = format_at_least(part.vertical.solid_length + end)
         raise Infeasible(finding("coils_touch", reported), {"mechanism.vertical.free_length": longer})
 
 

@@ -10,7 +10,7 @@ from cfmkit.plots.axis_labels_and_headings import Heading, value_text
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.stacked_line_diagrams import Limit
-from cfmkit.plots.style import styled
+from cfmkit.plots.style import apply_style
 from cfmkit.results import Result
 from cfmkit_oblique.model import Solution
 
@@ -27,7 +27,7 @@ def loop(result: Result) -> Figure:
     return loop_figure(result, CurveLook(levels=(level,)), "force over travel of the slider")
 
 
-@styled
+@apply_style
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale: relaxed, with the oblique springs flat, and at the end."""
     solution: Solution = result.state

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing import objective_and_constraints as design_limits
-from cfmkit.designing.bounds_and_rounding import at_bounds
+from cfmkit.designing.bounds_and_rounding import find_active_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
-from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
-from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, finished, met, widened
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, tolerated
+from cfmkit.families.beam.shaping.multistart import Explored, explore, rank
+from cfmkit.families.beam.shaping.report import REISSNER, Judged, judge_design, notes_of, search_of, starts_table
+from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, polish, satisfy_limits, widen
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, scatter_within_tolerances
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
+def optimise_shape(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     """Return a specification with optimised nodes and shapes, or why there is none.
 
     Parameters
@@ -52,7 +52,7 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     spec = with_stretch_and_shear(spec)
     task = task_of(spec, wanted)
     plan = StartBudget(drawn=wanted.drawn, clock=Clock.of(wanted.time_budget, run.time_budget))
-    result = explored(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
+    result = explore(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
     tables = {"starts": lambda: starts_table(task, result)}
     best = _best(spec, task, result, plan)
     if isinstance(best, Design):
@@ -60,12 +60,12 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     spread = NetworkScatter(
         wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed
     )
-    drawn = tolerated(Variables(task, best.found.order), best.found, spread)
+    drawn = scatter_within_tolerances(Variables(task, best.found.order), best.found, spread)
     held = held_by(task, best.found)
     return Design(
         best.spec,
         Status.COMPLETE,
-        _reported(task, best, result),
+        _report_search(task, best, result),
         active_bounds=held,
         warnings=_warnings(task, best, result),
         search=search_of(task, best, drawn, result),
@@ -157,7 +157,7 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
 
 def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Judged | Design:
     """Return the best design that analysis and audit confirm, or why there is none."""
-    candidates = [(one, result.audits.get(index)) for index, one in ranked(task, result.found)]
+    candidates = [(one, result.audits.get(index)) for index, one in rank(task, result.found)]
     if not candidates:
         some = [one for one in result.found.values() if one is not None]
         if not some:
@@ -169,8 +169,8 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
             )
             return Design(None, Status.INFEASIBLE, said)
         free = replace(plan, clock=Clock())
-        why = blocked(task, some, free)
-        met = None if why.freed is None else widened(task, finished(task, why.freed, free), free)
+        why = find_blocking(task, some, free)
+        met = None if why.freed is None else widen(task, polish(task, why.freed, free), free)
         if met is None or not met.feasible:
             missed = "; ".join(f"{name} ({about})" for name, about in why.missed.items())
             said = f"no shape of {len(some)} starts meets all limits; the best misses {missed}"
@@ -186,7 +186,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
     fallback = None
     for one, audit in candidates:
-        design = judged(spec, task, one, audit)
+        design = judge_design(spec, task, one, audit)
         if not design.faults:
             return design
         fallback = fallback or design
@@ -211,7 +211,7 @@ def _nothing(result: Explored, plan: StartBudget) -> Design:
     return Design(None, Status.INFEASIBLE, said)
 
 
-def _reported(task: Task, design: Judged, result: Explored) -> str:
+def _report_search(task: Task, design: Judged, result: Explored) -> str:
     """Return what the search did, in one sentence; force and window in it are those of the analysis."""
     found, window = design.found, design.window
     some = [one for one in result.found.values() if one is not None]
@@ -278,13 +278,13 @@ class Blocked:
     freed: Found | None  # a design that meets all limits after all
 
 
-def blocked(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
+def find_blocking(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
     """Return what blocks, judged from the designs that miss the limits least."""
     best = sorted(found, key=lambda one: one.violation)[:MOST]
     missed = missed_by(task, best[0])
     nearest: dict[str, str] = {}
     for name in missed:
-        gives = [_given(task, one, plan, (name,)) for one in best]
+        gives = [_relax_limits(task, one, plan, (name,)) for one in best]
         for one in gives:
             if one.feasible:
                 return Blocked(missed, {}, one)
@@ -292,17 +292,19 @@ def blocked(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
         if slack is not None:
             nearest |= NEAREST[name](task, 1.02 * slack)
     if not nearest:  # none gives way alone: all that are missed together, by the same share
-        gives = [_given(task, one, plan, tuple(missed)) for one in best]
+        gives = [_relax_limits(task, one, plan, tuple(missed)) for one in best]
         slack = min((one.violation for one in gives if set(missed_by(task, one)) <= set(missed)), default=None)
         if slack is not None:
             nearest = {key: value for name in missed for key, value in NEAREST[name](task, 1.02 * slack).items()}
     return Blocked(missed, nearest, None)
 
 
-def _given(task: Task, found: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
+def _relax_limits(task: Task, found: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
     """Return a design that meets all limits but some, and misses those as little as possible."""
-    rest = [met(task, found, task.orders[-1], plan, tuple(set(missed_by(task, found)) - set(give)) or give, 0.9)]
-    return met(task, rest[0], task.orders[-1], plan, give, 0.98)
+    rest = [
+        satisfy_limits(task, found, task.orders[-1], plan, tuple(set(missed_by(task, found)) - set(give)) or give, 0.9)
+    ]
+    return satisfy_limits(task, rest[0], task.orders[-1], plan, give, 0.98)
 
 
 def missed_by(task: Task, found: Found) -> dict[str, str]:
@@ -311,7 +313,7 @@ def missed_by(task: Task, found: Found) -> dict[str, str]:
     view = program.view(found.x)
     if view is None:
         return {}
-    rows = design_limits.missed(program.limits(view), VIOLATION)
+    rows = design_limits.list_missed_limits(program.limits(view), VIOLATION)
     return {one.name: f"{one.about}: missed by {percent(one.by)}" for one in rows}
 
 
@@ -320,9 +322,9 @@ def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
     variables = Variables(task, found.order)
     program = Shaping(variables, found.start, Flattest())
     view = program.view(found.x, sloped=True)
-    at_bound = at_bounds(found.x, variables.bounds, AT_BOUND)
+    at_bound = find_active_bounds(found.x, variables.bounds, AT_BOUND)
     held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
-    return tuple(held) if view is None else (*held, *design_limits.held(program.limits(view), close))
+    return tuple(held) if view is None else (*held, *design_limits.list_active_rows(program.limits(view), close))
 
 
 def _stress(task: Task, slack: float) -> dict[str, str]:
@@ -353,7 +355,7 @@ def _box(key: str) -> Callable[[Task, float], dict[str, str]]:
     return nearest
 
 
-def _scaled(
+def _scale_limit(
     key: str, value: Callable[[TaskLimits, float], float], sense: str, dimension: str
 ) -> Callable[..., dict[str, str]]:
     def nearest(task: Task, slack: float) -> dict[str, str]:
@@ -366,13 +368,13 @@ NEAREST: dict[str, Callable[[Task, float], dict[str, str]]] = {
     "stress": _stress,
     "envelope": _box("envelope"),
     "deformed_envelope": _box("deformed_envelope"),
-    "max_length_ratio": _scaled(
+    "max_length_ratio": _scale_limit(
         "max_length_ratio", lambda one, s: 1 / max(1e-3, 1 / (one.length_ratio or 1.0) - s), "at least", "count"
     ),
-    "min_slenderness": _scaled(
+    "min_slenderness": _scale_limit(
         "min_slenderness", lambda one, s: (one.slenderness or 0.0) * (1 - s), "at most", "count"
     ),
-    "min_radius": _scaled("min_radius", lambda one, s: (one.radius or 0.0) * (1 - s), "at most", "length"),
+    "min_radius": _scale_limit("min_radius", lambda one, s: (one.radius or 0.0) * (1 - s), "at most", "length"),
     "clearance": _clearance,
     "force": _force,
 }

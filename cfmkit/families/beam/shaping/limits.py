@@ -70,15 +70,17 @@ def stress(view: View) -> list[PendingRows]:
 
 def envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines before loading."""
-    return _inside(view, "envelope", view.response.variables.task.limits.envelope, slice(0, 1))
+    return _keep_inside(view, "envelope", view.response.variables.task.limits.envelope, slice(0, 1))
 
 
 def deformed_envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines at every pose."""
-    return _inside(view, "deformed_envelope", view.response.variables.task.limits.deformed_envelope, slice(None))
+    return _keep_inside(view, "deformed_envelope", view.response.variables.task.limits.deformed_envelope, slice(None))
 
 
-def _inside(view: View, name: str, box: tuple[float, float, float, float] | None, which: slice) -> list[PendingRows]:
+def _keep_inside(
+    view: View, name: str, box: tuple[float, float, float, float] | None, which: slice
+) -> list[PendingRows]:
     size = view.response.variables.task.size
     if box is None:
         return []
@@ -251,10 +253,10 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     lines = {name: _Thinned.of(view, name) for name in view.lengths}
     ways = [_way(view, pair, *(lines[name].place for name in pair.beams)) for pair in couples]
     way = np.stack([one.length for one in ways])
-    wanted = np.array([_wanted(view, pair) for pair in couples])[:, None, None]
+    wanted = np.array([_required_gap(view, pair) for pair in couples])[:, None, None]
     near = opening * way < wanted
     required = np.where(near, opening * way, wanted)
-    required[~np.stack([_compared(pair, one.length) for pair, one in zip(couples, ways, strict=True)])] = np.nan
+    required[~np.stack([_choose_pairs(pair, one.length) for pair, one in zip(couples, ways, strict=True)])] = np.nan
     first, second = ([lines[pair.beams[side]] for pair in couples] for side in (0, 1))
     dx = np.stack([one.x for one in first])[..., None] - np.stack([one.x for one in second])[:, :, None]
     dy = np.stack([one.y for one in first])[..., None] - np.stack([one.y for one in second])[:, :, None]
@@ -310,14 +312,14 @@ def _even(count: int) -> Any:
     return np.unique(np.linspace(0, count - 1, _PLACES + 1).round().astype(np.int64))
 
 
-def _compared(pair: Pair, way: FloatArray) -> Any:
+def _choose_pairs(pair: Pair, way: FloatArray) -> Any:
     """Return which places are compared: not a joint with itself, and no neighbours on one beam."""
     if pair.alone:
         return np.triu(np.ones(way.shape, dtype=bool), 2)
     return way > 1e-9
 
 
-def _wanted(view: View, pair: Pair) -> float:
+def _required_gap(view: View, pair: Pair) -> float:
     """Return the gap of the centre lines [m]: that of the surfaces and half the thickness of both beams."""
     thickness = sum(0.5 * thickest_of(view.section(name)) for name in pair.beams)
     return float((view.response.variables.task.limits.clearance or 0.0) + thickness)

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.run_many_starts import Done, OneStart, Stage, done, restored
+from cfmkit.designing.run_many_starts import Done, OneStart, Stage, from_record, run_stage
 from cfmkit.families.beam.shaping.search import (
     VIOLATION,
     Found,
     StartBudget,
     nearer,
-    refined,
+    refine,
     searched,
     searched_far,
-    widened,
+    widen,
 )
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
@@ -61,7 +61,7 @@ class Explored:
     audits: Mapping[int, Audit] = field(default_factory=dict)
 
 
-def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: str, run: Run) -> Explored:
+def explore(task: Task, plan: StartBudget, counts: tuple[int, int], identity: str, run: Run) -> Explored:
     """Return what all starts lead to, the best of them widened if that is the objective, as far as the time allows.
 
     Parameters
@@ -80,18 +80,18 @@ def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: s
     begun = jobs.done("starts", partial(searched, task.started, run.seed, plan=plan), range(starts))
     found, missing = _found_in(begun), starts - len(begun.records)
     if task.objective == "range":
-        best = dict(list(ranked(task, found))[:wide])
-        found |= _found_in(jobs.done("widenings", partial(_widened, task.started, best, plan), best))
+        best = dict(list(rank(task, found))[:wide])
+        found |= _found_in(jobs.done("widenings", partial(_widen, task.started, best, plan), best))
         distant = partial(searched_far, task.started, run.seed, plan=plan)
         far = _found_in(jobs.done("starts over a wider window", distant, range(starts)))
-        leaders = dict(sorted(_within_limits(far), key=lambda item: item[1].objective)[:_LEADERS])
+        leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_LEADERS])
         work = partial(_nearer, task.started, leaders, plan)
         led = _found_in(jobs.done("widenings of the flattest of these", work, leaders))
         found |= {index: one for index, one in led.items() if _better(task, one, found.get(index))}
     if task.orders != task.started.orders:
-        widest = dict(list(ranked(task, found))[:_REFINED])
-        found |= _found_in(jobs.done("refinements", partial(_refined, task, widest, plan), widest))
-    audits = {index: audited(Variables(task, one.order), one) for index, one in ranked(task, found)}
+        widest = dict(list(rank(task, found))[:_REFINED])
+        found |= _found_in(jobs.done("refinements", partial(_refine, task, widest, plan), widest))
+    audits = {index: audited(Variables(task, one.order), one) for index, one in rank(task, found)}
     return Explored(found, begun.reused, missing, tuple(jobs.lost), audits)
 
 
@@ -117,7 +117,7 @@ class _Jobs:
             text = f"{len(records)} of {len(numbers)} {what}, {feasible} meet all limits"
             self.run.progress(begun + (ended - begun) * len(records) / max(1, len(numbers)), text)
 
-        outcome = done(stage, self.run, self.plan.clock, tell)
+        outcome = run_stage(stage, self.run, self.plan.clock, tell)
         self.lost += outcome.lost
         return outcome
 
@@ -133,22 +133,22 @@ def _shares(task: Task) -> dict[str, tuple[float, float]]:
     return dict(zip(lasts, pairwise(ends.tolist()), strict=True))
 
 
-def _widened(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
-    return widened(task, designs[index], plan)
+def _widen(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+    return widen(task, designs[index], plan)
 
 
 def _nearer(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
     return nearer(task, designs[index], plan)
 
 
-def _refined(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
-    return refined(task, designs[index], plan)
+def _refine(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+    return refine(task, designs[index], plan)
 
 
 def _found_in(stage: Done) -> dict[int, Found | None]:
     """Return the designs of a stage by the number of the start; None if nothing could be followed."""
     records = {index: stage.records[index]["found"] for index in sorted(stage.records)}
-    return {index: restored(Found, record) if record else None for index, record in records.items()}
+    return {index: from_record(Found, record) if record else None for index, record in records.items()}
 
 
 def _better(task: Task, one: Found | None, other: Found | None) -> bool:
@@ -158,12 +158,12 @@ def _better(task: Task, one: Found | None, other: Found | None) -> bool:
     return other is None or not other.feasible or rank_of(task, one) < rank_of(task, other)
 
 
-def ranked(task: Task, found: Mapping[int, Found | None]) -> Iterator[tuple[int, Found]]:
+def rank(task: Task, found: Mapping[int, Found | None]) -> Iterator[tuple[int, Found]]:
     """Yield the designs that meet all limits, the best first."""
-    yield from sorted(_within_limits(found), key=lambda item: rank_of(task, item[1]))
+    yield from sorted(_keep_within_limits(found), key=lambda item: rank_of(task, item[1]))
 
 
-def _within_limits(found: Mapping[int, Found | None]) -> list[tuple[int, Found]]:
+def _keep_within_limits(found: Mapping[int, Found | None]) -> list[tuple[int, Found]]:
     return [(index, one) for index, one in found.items() if one is not None and one.feasible]
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import measured
+from cfmkit.designing.reported_values_of_finished_design import measure_metrics
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
@@ -53,7 +53,7 @@ class Judged:
         return float(window[0]), float(window[1])
 
 
-def judged(spec: BeamSpec, task: Task, found: Found, audit: Audit | None = None) -> Judged:
+def judge_design(spec: BeamSpec, task: Task, found: Found, audit: Audit | None = None) -> Judged:
     """Return a design as its own analysis finds it: the same curve, stress and metrics as of `cfmkit analyze`.
 
     Parameters
@@ -63,13 +63,13 @@ def judged(spec: BeamSpec, task: Task, found: Found, audit: Audit | None = None)
     audit : Audit, optional
         Of the design, where it is known already.
     """
-    new = written(spec, task, found)
+    new = write_design(spec, task, found)
     result = analyze(new, Run())
-    window = _confirmed_window(task, result, _window(spec, task, found), _asked(spec)[0])
+    window = _confirmed_window(task, result, _window(spec, task, found), _requested_window(spec)[0])
     new = new.replace({"analysis.window": window})
-    (band,) = measured(result, window, "half_band")
+    (band,) = measure_metrics(result, window, "half_band")
     audit = audit or audited(Variables(task, found.order), found)
-    (miss,) = (None,) if task.shape is None else measured(result, window, "deviation_from_curve")
+    (miss,) = (None,) if task.shape is None else measure_metrics(result, window, "deviation_from_curve")
     return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)), miss)
 
 
@@ -78,7 +78,7 @@ def _confirmed_window(task: Task, result: Result, window: tuple[float, float], a
     start, end = window
 
     def kept(micrometres: int) -> bool:
-        (band,) = measured(result, (1e-6 * micrometres, end), "half_band")
+        (band,) = measure_metrics(result, (1e-6 * micrometres, end), "half_band")
         return band is not None and band <= task.half_band
 
     if task.objective != "range" or start >= asked:
@@ -100,7 +100,10 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
         yield "it is not stable all the way"
     if audit.crossings:
         yield f"beams cross at {audit.crossings} of the poses"
-    (band,), (stress,) = measured(result, window, "half_band"), measured(result, (0.0, window[1]), "stress_max")
+    (band,), (stress,) = (
+        measure_metrics(result, window, "half_band"),
+        measure_metrics(result, (0.0, window[1]), "stress_max"),
+    )
     if band is None:
         yield f"the analysis ends before the window does: {result.message}"
     elif task.objective == "range" and band > task.half_band:
@@ -110,7 +113,7 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
         yield f"the stress reaches {format_short(stress, 'stress')}, {format_short(allowed, 'stress')} are allowed"
 
 
-def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
+def write_design(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
     """Return the specification with nodes and shapes written out, and the window of the design as its window."""
     variables = Variables(task, found.order)
     network = variables.build(found.x)
@@ -139,12 +142,12 @@ def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
 
 def _window(spec: BeamSpec, task: Task, found: Found) -> tuple[float, float]:
     """Return the window of a design [m]: the one requested, or the wider one, from a whole micrometre on."""
-    asked, end = _asked(spec)
+    asked, end = _requested_window(spec)
     start = float(np.ceil(found.start * task.layers * 1e6 - 1e-6)) / 1e6
     return asked if abs(start - asked) < 1e-6 else start, end
 
 
-def _asked(spec: BeamSpec) -> tuple[float, float]:
+def _requested_window(spec: BeamSpec) -> tuple[float, float]:
     """Return the window that was requested [m]."""
     assert spec.design is not None
     assert spec.design.optimise is not None
@@ -208,7 +211,9 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
     reported |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
     reported |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
     audit = design.audit
-    numbers = _counts(result) | {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)} | _drawn(drawn)
+    numbers = (
+        _counts(result) | {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)} | _drawn_values(drawn)
+    )
     if task.fidelity != REISSNER:  # else the metrics say it
         numbers |= _reissner(design)
     return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *reported[name]) for name in numbers}
@@ -217,7 +222,7 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
 def _reissner(design: Judged) -> dict[str, float | None]:
     """Return what the analysis says of the design with beams that stretch and shear."""
     result = analyze(design.spec.replace({"analysis.fidelity": REISSNER}), Run())
-    band, share = measured(result, design.window, "half_band", "strict_range_fraction")
+    band, share = measure_metrics(result, design.window, "half_band", "strict_range_fraction")
     return {"audit_half_band_reissner": band, "audit_strict_range_reissner": share}
 
 
@@ -230,7 +235,7 @@ def _counts(result: Explored) -> dict[str, float | None]:
     return {name: float(count) for name, count in counts.items()}
 
 
-def _drawn(drawn: Drawn) -> dict[str, float | None]:
+def _drawn_values(drawn: Drawn) -> dict[str, float | None]:
     bands, ranges = drawn.bands, drawn.ranges
     return {
         "tolerance_half_band_median": float(np.median(bands)) if len(bands) else None,
@@ -253,10 +258,10 @@ def notes_of(audit: Audit, spread: NetworkScatter, held: tuple[str, ...]) -> tup
             "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
         )
     )
-    return tuple(note for note in (("audit", sound), ("drawn", drawn), _held(held)) if note[1])
+    return tuple(note for note in (("audit", sound), ("drawn", drawn), _active_limit(held)) if note[1])
 
 
-def _held(held: tuple[str, ...]) -> tuple[str, str]:
+def _active_limit(held: tuple[str, ...]) -> tuple[str, str]:
     more = f" and {len(held) - 8} more" if len(held) > 8 else ""
     return "limits", "; ".join(held[:8]) + more
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import rounded as rounded_within
+from cfmkit.designing.bounds_and_rounding import round_within_bounds as rounded_within
 from cfmkit.designing.objective_and_constraints import worst
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families.beam.shaping.limits import LIMITS
@@ -118,18 +118,18 @@ def searched(task: Task, seed: int, index: int, plan: StartBudget) -> Found | No
         How much is tried.
     """
     first, rng = task.first, np.random.default_rng([seed, index])
-    begun = _begun(first, rng, plan)
+    begun = _begin_network(first, rng, plan)
     if begun is None and first is not task:  # straight beams that cannot stretch may not be able to move at all
-        first, begun = task, _begun(task, rng, plan)
+        first, begun = task, _begin_network(task, rng, plan)
     if begun is None:
         return None
     if first is task:
-        return finished(task, begun, plan)
+        return polish(task, begun, plan)
     enough = _ENOUGH * task.half_band if task.objective == "range" else -np.inf
-    found = modelled(task, improved(first, begun, plan, enough))
+    found = evaluate_in_model(task, flatten(first, begun, plan, enough))
     if found.violation > _HOPELESS or (task.objective == "range" and found.objective > _FAR * task.half_band):
         return found
-    return finished(task, found if found.feasible else met(task, found, found.order, plan), plan)
+    return polish(task, found if found.feasible else satisfy_limits(task, found, found.order, plan), plan)
 
 
 def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
@@ -145,30 +145,30 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     """
     task = replace(task, orders=task.orders[-1:], points=_FEW)
     first, far = task.first, _FAR_START * task.window[0]
-    begun = _begun(first, np.random.default_rng([seed, index]), replace(plan, tries=1))
+    begun = _begin_network(first, np.random.default_rng([seed, index]), replace(plan, tries=1))
     if begun is None:
         return None
-    found = improved(first, modelled(first, replace(begun, start=far)), plan)
+    found = flatten(first, evaluate_in_model(first, replace(begun, start=far)), plan)
     if first is task:
         return found
-    found = modelled(task, found)
+    found = evaluate_in_model(task, found)
     hopeless = found.violation > _HOPELESS or found.objective > _FAR * task.half_band
-    return found if hopeless else improved(task, found, plan)
+    return found if hopeless else flatten(task, found, plan)
 
 
 def nearer(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return a design that was flattened over a window that begins farther, flattened and widened as any other."""
-    far = modelled(task, found)
+    far = evaluate_in_model(task, found)
     flat = far.feasible and far.objective <= task.half_band
-    return widened(task, finished(task, far if flat else replace(far, start=task.window[0]), plan), plan)
+    return widen(task, polish(task, far if flat else replace(far, start=task.window[0]), plan), plan)
 
 
-def _begun(task: Task, rng: np.random.Generator, plan: StartBudget) -> Found | None:
+def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> Found | None:
     """Return a random network that was made to meet the limits, or that misses them least; None without any."""
     best: Found | None = None
     evaluations = plan.drawn
-    for first in drawn(task, rng, plan)[: plan.tries]:
-        found = met(task, replace(first, evaluations=evaluations), _coarse(task), plan)
+    for first in draw_networks(task, rng, plan)[: plan.tries]:
+        found = satisfy_limits(task, replace(first, evaluations=evaluations), _coarse(task), plan)
         evaluations = found.evaluations
         if best is None or found.violation < best.violation:
             best = found
@@ -177,10 +177,10 @@ def _begun(task: Task, rng: np.random.Generator, plan: StartBudget) -> Found | N
     if best is None:
         return None
     best = replace(best, evaluations=evaluations)
-    return best if best.feasible else met(task, best, task.orders[-1], plan)
+    return best if best.feasible else satisfy_limits(task, best, task.orders[-1], plan)
 
 
-def modelled(task: Task, found: Found) -> Found:
+def evaluate_in_model(task: Task, found: Found) -> Found:
     """Return a design that was found in another model with objective and limits as they are in that of the task."""
     program = Shaping(Variables(task, found.order), found.start, Flattest())
     view = program.view(found.x)
@@ -191,24 +191,24 @@ def modelled(task: Task, found: Found) -> Found:
     return replace(found, objective=objective, violation=violation, evaluations=found.evaluations + 1)
 
 
-def finished(task: Task, found: Found, plan: StartBudget) -> Found:
+def polish(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return a design flattened in every order from its own on, as it is at many poses."""
 
     def again(finer: Task, design: Found) -> Found:
-        return _flattened(finer, design, design.order, plan, plan.flattening)
+        return _minimise_objective(finer, design, design.order, plan, plan.flattening)
 
-    return confirmed(task, improved(task, found, plan), plan, again)
+    return verify(task, flatten(task, found, plan), plan, again)
 
 
-def improved(task: Task, found: Found, plan: StartBudget, enough: float = -np.inf) -> Found:
+def flatten(task: Task, found: Found, plan: StartBudget, enough: float = -np.inf) -> Found:
     """Return a design flattened in every order from its own on, in each until the half band is small enough."""
     for order in task.orders:
         if order >= found.order and not plan.late():
-            found = _flattened(task, found, order, plan, plan.flattening, enough)
+            found = _minimise_objective(task, found, order, plan, plan.flattening, enough)
     return found
 
 
-def confirmed(task: Task, found: Found, plan: StartBudget, again: Callable[[Task, Found], Found]) -> Found:
+def verify(task: Task, found: Found, plan: StartBudget, again: Callable[[Task, Found], Found]) -> Found:
     """Return a design with objective, window and limits as they are at many poses.
 
     Parameters
@@ -221,7 +221,7 @@ def confirmed(task: Task, found: Found, plan: StartBudget, again: Callable[[Task
     if not found.feasible:
         return found
     for points in (*(more for more in _FINER if more > task.points), None):
-        found = rounded(task, found)
+        found = round_design(task, found)
         view = looked_at(task, Variables(task, found.order).build(found.x))
         found = replace(found, evaluations=found.evaluations + 1)
         if points is None or plan.late() or _shows_all(task, found, view):
@@ -270,14 +270,14 @@ def _overstress(task: Task, view: CloseView) -> float:
     return 0.0 if allowed is None else max(0.0, float(view.stress.max()) / allowed - 1.0)
 
 
-def rounded(task: Task, found: Found) -> Found:
+def round_design(task: Task, found: Found) -> Found:
     """Return a design with coordinates and coefficients that print short."""
     places, bounds = len(task.coordinates), Variables(task, found.order).bounds
     coordinates = rounded_within(found.x[:places], bounds[:places], PLACES, task.size)
     return replace(found, x=np.append(coordinates, rounded_within(found.x[places:], bounds[places:], TURNS)))
 
 
-def drawn(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[Found]:
+def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[Found]:
     """Return random networks that can be followed over the window, the most promising first.
 
     Straight ones; curved ones too where those cannot move, as a single beam that does not stretch.
@@ -304,7 +304,7 @@ def _coarse(task: Task) -> int:
     return next((order for order in task.orders if order), task.orders[-1])
 
 
-def met(
+def satisfy_limits(
     task: Task, found: Found, order: int, plan: StartBudget, give: tuple[str, ...] = tuple(LIMITS), share: float = 0.5
 ) -> Found:
     """Return a design that misses some limits as little as possible, at a half band that is no larger or small enough.
@@ -327,7 +327,9 @@ def met(
     return found
 
 
-def _flattened(task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf) -> Found:
+def _minimise_objective(
+    task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf
+) -> Found:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
     variables, x = Variables(task, found.order).raised(found.x, order)
     goal = ForceRatio() if task.objective == "paper" else Flattest()
@@ -373,7 +375,7 @@ def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> flo
     return worst(program.limits(view))
 
 
-def widened(task: Task, found: Found, plan: StartBudget) -> Found:
+def widen(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return the design with the widest window in which the force stays in the wanted band.
 
     The start of the window is a variable like all others; the window grows from the last design, whose force is flatter
@@ -386,9 +388,9 @@ def widened(task: Task, found: Found, plan: StartBudget) -> Found:
 
     def again(finer: Task, design: Found) -> Found:
         refuted.append(design)
-        return _repaired(finer, design, replace(good, evaluations=design.evaluations), plan)
+        return _repair(finer, design, replace(good, evaluations=design.evaluations), plan)
 
-    wide = confirmed(task, _widest(task, good, plan), plan, again)
+    wide = verify(task, _widest(task, good, plan), plan, again)
     # what more poses refute keeps the band over a narrower window, which may be wider than what the repair came to
     narrower = (_as_seen(task, one, looked_at(task, Variables(task, one.order).build(one.x))) for one in refuted)
     kept = [one for one in (good, *narrower, wide) if one.feasible and one.objective <= task.half_band]
@@ -396,12 +398,12 @@ def widened(task: Task, found: Found, plan: StartBudget) -> Found:
     return replace(widest, evaluations=wide.evaluations + len(refuted))
 
 
-def refined(task: Task, found: Found, plan: StartBudget) -> Found:
+def refine(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return a widened design flattened and widened again in every finer order; never one with a narrower window."""
     for order in task.orders:
         if order > found.order and found.objective <= task.half_band and not plan.late():
-            flat = _flattened(task, found, order, plan, plan.flattening)
-            finer = widened(task, flat, plan)
+            flat = _minimise_objective(task, found, order, plan, plan.flattening)
+            finer = widen(task, flat, plan)
             wider = finer.feasible and finer.start < found.start
             found = finer if wider else replace(found, evaluations=finer.evaluations)
     return found
@@ -417,18 +419,18 @@ def _widest(task: Task, found: Found, plan: StartBudget) -> Found:
             return found
         effort = plan.effort(plan.widening, violation=_ALMOST)
         wide = found_of(program, minimize(program, z, program.bounds, effort), found.evaluations)
-        now = _repaired(task, wide, found, plan)
+        now = _repair(task, wide, found, plan)
         gain, found = found.start - now.start, now
         if not gain > _CLOSE * task.window[1]:
             break
     return found
 
 
-def _repaired(task: Task, wide: Found, good: Found, plan: StartBudget) -> Found:
+def _repair(task: Task, wide: Found, good: Found, plan: StartBudget) -> Found:
     """Return a design near one that all but meets the limits, that does, at nearly its window; else the good one."""
     start = wide.start
     while start < good.start and not plan.late():
-        now = _flattened(task, replace(wide, start=start), wide.order, plan, plan.meeting)
+        now = _minimise_objective(task, replace(wide, start=start), wide.order, plan, plan.meeting)
         if now.feasible and now.objective <= task.half_band:
             return now
         wide = replace(wide, evaluations=now.evaluations)

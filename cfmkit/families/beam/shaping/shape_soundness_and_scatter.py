@@ -101,7 +101,7 @@ def strict_share(at: FloatArray, force: FloatArray) -> float:
     return (count - 1) / (len(fine) - 1)
 
 
-def tolerated(variables: Variables, found: Found, spread: NetworkScatter) -> Drawn:
+def scatter_within_tolerances(variables: Variables, found: Found, spread: NetworkScatter) -> Drawn:
     """Return what is left of the constant force in networks within the tolerances."""
     task, rng = variables.task, np.random.default_rng([spread.seed, 1])
     places = len(task.coordinates)
@@ -163,14 +163,14 @@ def _gap(task: Task, path: Path, pair: Pair) -> float:
         distance = abs(p[:, None] - q[None, :])
         away = np.full(distance.shape, np.inf)
         for i, j in pair.joints:
-            away = np.minimum(away, _along(p, i)[:, None] + _along(q, j)[None, :])
+            away = np.minimum(away, _arc_lengths(p, i)[:, None] + _arc_lengths(q, j)[None, :])
         far = task.limits.opening * away >= wanted
         if far.any():
             least = min(least, float(distance[far].min()) - thickness)
     return least
 
 
-def _along(line: FloatArray, end: int) -> FloatArray:
+def _arc_lengths(line: FloatArray, end: int) -> FloatArray:
     """Return the way along a line from its first (0) or last (1) point."""
     way = np.append(0.0, np.cumsum(abs(np.diff(line))))
     return way[-1] - way if end else way

@@ -14,7 +14,7 @@ from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
+from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, apply_style
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -57,12 +57,12 @@ def motion(result: Result) -> Figure:
     level = Limit(constant, f"{name} = {value_text(constant, 'force')}")
     diagrams = [
         Diagram(times, TIME, Scale("force", "force"), forces, [level], found),
-        Diagram(times, TIME, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _unnamed(found)),
+        Diagram(times, TIME, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(found)),
     ]
     return diagram_figure(Heading.of(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
 
 
-@styled
+@apply_style
 def motion_force(result: Result) -> Figure:
     """Return the force over the displacement with the requirement bands, and the quasi-static one."""
     moved: MotionSolution = result.state
@@ -92,7 +92,7 @@ def motion_contact(result: Result) -> Figure:
     diagrams = [
         Diagram(history.times, TIME, Scale("contact force", "force"), contact, limits, found),
         Diagram(
-            history.times, TIME, Scale("force in a brace", "force"), [*roller_end, *slider_end], (), _unnamed(found)
+            history.times, TIME, Scale("force in a brace", "force"), [*roller_end, *slider_end], (), _drop_names(found)
         ),
     ]
     return diagram_figure(Heading.of(result, "forces of the cam on the rollers, and in the braces"), diagrams)
@@ -137,7 +137,7 @@ def _spans(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[M
         yield MarkedRange(float(times[first]), float(times[after - 1]), "" if index else text)
 
 
-def _unnamed(regions: list[MarkedRange]) -> list[MarkedRange]:
+def _drop_names(regions: list[MarkedRange]) -> list[MarkedRange]:
     return [MarkedRange(item.start, item.stop, "") for item in regions]
 
 

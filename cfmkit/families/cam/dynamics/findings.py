@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.cam.contact_pressure import worst
 from cfmkit.families.cam.dynamics.machine_from_spec import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure
-from cfmkit.families.cam.findings import finding, overstressed
+from cfmkit.families.cam.findings import find_overstress, finding
 from cfmkit.families.cam.mechanism_from_spec import directions
 from cfmkit.families.findings import mm, newton
 from cfmkit.specs.units import format_short
@@ -35,11 +35,11 @@ INVERSE = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
 
 def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
-    checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction, _sideways)
+    checks = (_pressure, _slack_cable, _find_held, _find_on_corner, _springs, _inertias, _friction, _sideways)
     return tuple(found for check in checks for found in check(moved))
 
 
-def outside(parts: Build, span: tuple[float, float]) -> Finding:
+def leaves_profile(parts: Build, span: tuple[float, float]) -> Finding:
     """Return what to say about a motion that leaves the profile."""
     ends = sorted((parts.motion.start, parts.motion.start + parts.motion.stroke))
     return finding(
@@ -65,7 +65,7 @@ def _pressure(moved: MotionSolution) -> Iterator[Finding]:
     pressed = contact_pressure(moved)
     top = worst(pressed)
     reported = (
-        None if top is None else overstressed(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
+        None if top is None else find_overstress(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
     )
     if reported:
         yield reported
@@ -82,7 +82,7 @@ def _slack_cable(moved: MotionSolution) -> Iterator[Finding]:
         )
 
 
-def _held(moved: MotionSolution) -> Iterator[Finding]:
+def _find_held(moved: MotionSolution) -> Iterator[Finding]:
     lost = ~np.isfinite(moved.history.force)
     if not lost.any():
         return
@@ -94,7 +94,7 @@ def _held(moved: MotionSolution) -> Iterator[Finding]:
         )
 
 
-def _on_corner(moved: MotionSolution) -> Iterator[Finding]:
+def _find_on_corner(moved: MotionSolution) -> Iterator[Finding]:
     corner = moved.history.on_corner
     if corner.any():
         yield finding("undercut", f"a roller pivots on the corner of its cam {_when(moved, corner)}")

@@ -23,7 +23,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.dynamics.findings import findings_of, outside, runs_on_corner
+from cfmkit.families.cam.dynamics.findings import findings_of, leaves_profile, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.machine_from_spec import build, stated_motion
@@ -66,11 +66,11 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     """
     try:
         parts = build(spec)
-        times, missing = _inside(parts, spec)
+        times, missing = _keep_inside(parts, spec)
         end = ending(parts, times, _displacement(parts, 0.0))
         if end:
-            times, missing = _until(end.time, times, spec), (end.finding, *missing)
-        moved = _moved(spec, parts, times)
+            times, missing = _times_until(end.time, times, spec), (end.finding, *missing)
+        moved = _solve_motion(spec, parts, times)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     lost = int((~np.isfinite(moved.history.force)).sum())
@@ -86,14 +86,14 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         curves=(_curve(moved),),
         values=values_of(moved),
         warnings=(*missing, *findings_of(moved), *rubbing_left_out(spec, "the dynamic model")),
-        travel=_requested(parts),
+        travel=_requested_ends(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
         allowable_stress=allowable_stress(spec.mechanism),
         state=moved,
     )
 
 
-def _inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...]]:
+def _keep_inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...]]:
     """Return the times at which the slider is where the flanks allow it, and what is said if those are not all."""
     dynamics, motion = stated_motion(spec), parts.motion
     times = motion.times(dynamics.points)
@@ -102,13 +102,13 @@ def _inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...
     inside = (position >= low - slack) & (position <= high + slack)
     if inside.all():
         return times, ()
-    found = outside(parts, (low, high))
+    found = leaves_profile(parts, (low, high))
     if inside[:2].sum() < 2:
         raise CannotBuild(found)
     return times[: int(np.argmin(inside))], (found,)
 
 
-def _until(end: float, times: FloatArray, spec: CamSpec) -> FloatArray:
+def _times_until(end: float, times: FloatArray, spec: CamSpec) -> FloatArray:
     """Return the times before a motion ends, and its end; the nine coordinates are known at even times only."""
     before = times[times < end]
     return before if stated_motion(spec).method == "multibody" else np.append(before, end)
@@ -119,7 +119,7 @@ def _displacement(parts: Build, position: Any) -> Any:
     return position + parts.lift - parts.right.track.start + displacement_origin(parts.right)
 
 
-def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> MotionSolution:
+def _solve_motion(spec: CamSpec, parts: Build, times: FloatArray) -> MotionSolution:
     low, high = parts.machine.span
     upward = parts.motion.stroke > 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -129,7 +129,7 @@ def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> MotionSolution:
     return MotionSolution(_as_run(spec, parts), parts, history, static, displacement)
 
 
-def _requested(parts: Build) -> tuple[float, float]:
+def _requested_ends(parts: Build) -> tuple[float, float]:
     """Return where the motion was to start and to end [m]."""
     start, end = _displacement(parts, parts.motion.at(parts.motion.times(2)).position).tolist()
     return start, end
@@ -161,7 +161,7 @@ def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     return resolved.model_copy(update=changes)
 
 
-def _over_slow(moved: MotionSolution) -> FloatArray:
+def _compare_with_slow(moved: MotionSolution) -> FloatArray:
     """Return the force over that of the same motion within one second [SS, Fig. 14]; NaN where that is zero."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = moved.history.force / slow_force(moved)
@@ -175,7 +175,7 @@ def _curve(moved: MotionSolution) -> Curve:
         "speed": Column(moment.speed, "velocity"),
         "acceleration": Column(moment.acceleration, "acceleration"),
         "static_force": Column(moved.static, "force"),
-        "force_over_slow": Column(_over_slow(moved), "ratio"),
+        "force_over_slow": Column(_compare_with_slow(moved), "ratio"),
     }
     sides = (
         ("contact_force", history.contact, "force"),
@@ -291,7 +291,7 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
         return None
     index, name = first
     if not index:
-        raise CannotBuild(_said(name, known, machine, "at the first point of the motion"))
+        raise CannotBuild(_describe_ending(name, known, machine, "at the first point of the motion"))
 
     def holds(time: float) -> bool:
         margin = _margins(machine, motion.at(np.array([time])))[name]
@@ -302,7 +302,7 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     place = float(motion.at(np.array([low])).position[0]) + origin
-    return MotionEnding(low, _said(name, known, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
+    return MotionEnding(low, _describe_ending(name, known, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
 
 
 def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]) -> Mapping[str, FloatArray]:
@@ -325,7 +325,7 @@ def _slack(name: str, margin: FloatArray, machine: Machine) -> float:
     return 1e-12 * max(machine.rest_length, 1.0)
 
 
-def _said(name: str, known: Mapping[str, FloatArray], machine: Machine, when: str) -> Finding:
+def _describe_ending(name: str, known: Mapping[str, FloatArray], machine: Machine, when: str) -> Finding:
     worst = float(np.nanmin(known[name]))
     reported: dict[str, Callable[[], Finding]] = {
         "flanks_collide": lambda: flanks_cross(worst),

@@ -27,12 +27,12 @@ SLOW = 1.0
 def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None if a value does not exist."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        numbers = _shared(moved) | _own(moved)
+        numbers = _shared_values(moved) | _own(moved)
     known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in known.items()}
 
 
-def _shared(moved: MotionSolution) -> dict[str, float]:
+def _shared_values(moved: MotionSolution) -> dict[str, float]:
     """Return the values that the quasi-static analysis has, too."""
     right, history = moved.build.right, moved.history
     return {

@@ -71,7 +71,7 @@ class WholeCamUndercut(ValueError):
     """The roller is so large that no part of the flank is left."""
 
 
-def cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
+def cut_cam(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     """Return the cam that a roller path gives, trimmed where the roller undercuts its start.
 
     Parameters

@@ -22,7 +22,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 from cfmkit.families.cam.geometry.path import RollerPath, ideal_position
 from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw, brace_tangent
-from cfmkit.families.rows import rows_of, stacked
+from cfmkit.families.rows import rows_of, stack
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ class Track:
         corner = self._corner_states(slider[on_corner])
         if on_corner.all():
             return TrackStates(*(field.reshape(slider.shape) for field in corner.fields()))
-        return _joined(on_corner, corner, self._flank_states(slider[~on_corner]))
+        return _join_states(on_corner, corner, self._flank_states(slider[~on_corner]))
 
     def _flank_states(self, slider: FloatArray) -> TrackStates:
         law, u = self.profile.path.law, self._flank_parameter(slider)
@@ -354,7 +354,7 @@ class Track:
         return zero, root, knots - ideal_position(self.profile.path.law, root * root)
 
 
-def _joined(on_corner: NDArray[np.bool_], corner: TrackStates, flank: TrackStates) -> TrackStates:
+def _join_states(on_corner: NDArray[np.bool_], corner: TrackStates, flank: TrackStates) -> TrackStates:
     """Return states of which some are on the corner; those on the flank are given where the others are not, or all."""
     found = []
     for some, rest in zip(corner.fields(), flank.fields(), strict=True):
@@ -380,12 +380,12 @@ class TrackRows(Track):
     def __init__(self, tracks: Sequence[Track]) -> None:
         """Set the numbers of all side by side."""
         first, profiles = tracks[0], [track.profile for track in tracks]
-        numbers = {name: stacked([getattr(track, name) for track in tracks]) for name in _NUMBERS}
+        numbers = {name: stack([getattr(track, name) for track in tracks]) for name in _NUMBERS}
         alike = {name: getattr(first, name) for name in ("_is_shifted", "_follows_law", "_is_ideal", "turns_back")}
         stretches = zip(
             *([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True
         )
-        parts = tuple(stacked(list(part)) for part in stretches)
+        parts = tuple(stack(list(part)) for part in stretches)
         self._set(profiles_in_rows(profiles), numbers | alike | {"_parts": parts})
 
     def _set(self, profile: CamProfile, numbers: Mapping[str, Any]) -> None:
@@ -406,7 +406,7 @@ class TrackRows(Track):
         if not on_corner.any():
             return self._flank_states(slider)
         few = self.of_rows(np.nonzero(on_corner)[0])._corner_states(slider[on_corner][:, None])
-        return _joined(on_corner, few, self._flank_states(np.maximum(slider, self.corner_end)))
+        return _join_states(on_corner, few, self._flank_states(np.maximum(slider, self.corner_end)))
 
     def stretches(self) -> Iterator[TrackStretch]:
         """Yield the parts of the tracks on which the slider rises; their ends are columns."""
@@ -422,7 +422,7 @@ class TrackRows(Track):
 
 def profiles_in_rows(profiles: Sequence[CamProfile]) -> CamProfile:
     """Return cut cams of one kind side by side, as one whose numbers are columns (m, 1)."""
-    return _profile(*stacked([(one.path.law, one.roller_radius, one.end, one.corner) for one in profiles]))
+    return _profile(*stack([(one.path.law, one.roller_radius, one.end, one.corner) for one in profiles]))
 
 
 def _profile(law: Any, radius: Any, end: Any, corner: CamCorner | None) -> CamProfile:

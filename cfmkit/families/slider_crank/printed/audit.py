@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import at_bounds
+from cfmkit.designing.bounds_and_rounding import find_active_bounds
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import strip_chain
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
@@ -86,7 +86,7 @@ def judge(
         (task.start, stroke),
         float(np.abs(ratio[inside]).max()),
         _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even(task.start, stroke))),
-        (*_at_bounds(found, values), *_held(solution, ratio, inside, limits)),
+        (*_find_at_bounds(found, values), *_find_active_limits(solution, ratio, inside, limits)),
         1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
     )
 
@@ -124,10 +124,10 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
     return tuple(tuple(float(v) for v in own[a:b]) for a, b in itertools.pairwise(ends))
 
 
-def _at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
+def _find_at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
     form, reported = found.form, []
-    ends = at_bounds(values, found.ranges.form, *AT_END)
+    ends = find_active_bounds(values, found.ranges.form, *AT_END)
     for k in np.flatnonzero(ends).tolist():
         value, side = float(values[k]), "smallest" if ends[k] < 0 else "largest"
         if k < form.count:
@@ -141,7 +141,9 @@ def _at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
     return reported
 
 
-def _held(solution: Solution, ratio: FloatArray, inside: Any, limits: tuple[float | None, float | None]) -> list[str]:
+def _find_active_limits(
+    solution: Solution, ratio: FloatArray, inside: Any, limits: tuple[float | None, float | None]
+) -> list[str]:
     """Return where the band and the stress hold the strip."""
     reported = []
     ripple, stress = limits

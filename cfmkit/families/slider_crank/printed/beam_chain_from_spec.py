@@ -14,9 +14,9 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     Flexure,
     Strip,
     flexure_ends,
+    flexure_network,
     joints,
     kink,
-    lumped,
     spread,
 )
 
@@ -110,7 +110,7 @@ def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Li
         place: FloatArray = ends[1] + np.array([dx + cosine * x - sine * y, dy + sine * x + cosine * y])
         return place
 
-    return Chain(ends, pins, lambda points: lumped(points, parts, made_of), travel_direction(linkage), knee)
+    return Chain(ends, pins, lambda points: flexure_network(points, parts, made_of), travel_direction(linkage), knee)
 
 
 def pins_of(printed: Printed, linkage: Linkage, unloaded: float) -> FloatArray:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.bounds_and_rounding import rounded
-from cfmkit.designing.reported_values_of_finished_design import measured, searched
+from cfmkit.designing.bounds_and_rounding import round_within_bounds
+from cfmkit.designing.reported_values_of_finished_design import measure_metrics, search_values
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent
@@ -115,7 +115,7 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     task = task_of(spec, linkage, unloaded)
     form, ranges = form_of(spec, wanted, task, linkage, unloaded)
     if wanted.shape == "uniform" and task.goal != "stroke":
-        return _closed(spec, wanted, task, ranges, run)
+        return _design_uniform_strip(spec, wanted, task, ranges, run)
     pins, allowed, limits = pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress, _limits(spec)
     identity, clock = identity_of(spec, run.seed), Clock.of(run.time_budget)
     kept: Design | None = None
@@ -127,23 +127,23 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
             return kept or found
         if not found.descent.feasible:
             return kept or infeasible(found)
-        judged = judge(rounded(found.values, ranges.form, DIGITS), found, limits, pins)
+        judged = judge(round_within_bounds(found.values, ranges.form, DIGITS), found, limits, pins)
         if judged is None:
             refused = _not_pressed(found)
             continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
-        reported = _reported(_written(spec, judged, wanted), judged.window, run)
+        reported = _report(_write_strip(spec, judged, wanted), judged.window, run)
         if not reported.keeps(*limits):
             refused = _not_kept(reported, judged.window, limits)
             continue
-        kept = _made(found, judged, reported)
+        kept = _make_design(found, judged, reported)
         if judged.window[1] > ENOUGH * found.program.stroke(found.descent.z) and allowed == made_of.allowable_stress:
             break
     return kept or refused
 
 
-def _made(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> Design:
+def _make_design(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> Design:
     """Return a strip that keeps its limits as a design."""
     return Design(
         reported.spec,
@@ -174,11 +174,11 @@ class Reported:
         )
 
 
-def _reported(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Reported:
+def _report(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Reported:
     result = analyze(spec, run)
     kind = "target" if spec.target_curve is None else "curve"
     names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max")
-    deviation, rms, stress = measured(result, window, *names)
+    deviation, rms, stress = measure_metrics(result, window, *names)
     return Reported(spec, deviation, rms, stress, result.message)
 
 
@@ -210,13 +210,13 @@ def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     numbers: dict[str, tuple[float | None, str, str]] = {
         "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
     }
-    if _compared(found):
+    if _has_uniform_strip(found):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
         numbers["one_thickness_travel"] = (_one_thickness(found), "length", text)
-    return searched(numbers, "beam", judged.window)
+    return search_values(numbers, "beam", judged.window)
 
 
-def _compared(found: FoundStrip) -> bool:
+def _has_uniform_strip(found: FoundStrip) -> bool:
     """Return whether a strip of one thickness is known to compare with."""
     return found.uniform is not None and found.uniform.feasible and found.form.count > 1 and found.task.goal == "stroke"
 
@@ -315,7 +315,9 @@ def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
     return (wanted.tolerance if wanted.beam.goal == "stroke" else None), stress
 
 
-def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges: Ranges, run: Run) -> Design:
+def _design_uniform_strip(
+    spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges: Ranges, run: Run
+) -> Design:
     """Return the uniform strip for a stroke: thickness from the stress, width from the force.
 
     Where the width is stated, the thickness follows from the force.
@@ -355,7 +357,7 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges:
         return no_design(finding("target_unreachable", text), nearest)
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"thickness {mm(thickness)} from the stress up to {mm(task.stroke)}, width {mm(width)} from the force"
-    return _analysed(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
+    return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
 
 
 def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
@@ -382,15 +384,15 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
     text = f"width {mm(width)} as stated, thickness {mm(thickness)} from the force"
     if allowed is not None:
         text += f", stress {mpa(stress)} up to {mm(task.stroke)}"
-    return _analysed(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
+    return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
 
 
-def _analysed(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
+def _analyse_strip(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
     """Return a uniform strip as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
     quick = {"points": min(spec.analysis.points, POINTS)}
     plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
-    reported = _reported(plain, window, run)
+    reported = _report(plain, window, run)
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
 
 
@@ -418,7 +420,7 @@ def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, floa
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 
-def _written(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:
+def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:
     strip = judged.strip
     values: FloatArray = np.asarray(strip.thickness)
     listed = tuple(round(float(value), DECIMALS) for value in values)
@@ -436,7 +438,7 @@ def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> st
     else:
         head = f"within {percent(reported.deviation or 0.0)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
     compared = ""
-    if _compared(found):
+    if _has_uniform_strip(found):
         within = percent(max(found.task.ripple, LOOSE))
         compared = f"; one thickness reaches {mm(_one_thickness(found))} within {within}"
     shown = judged.active[:TOLD]

@@ -21,9 +21,9 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.results.between_points import between_points
+from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.elastica.results.neighbour import neighbouring
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, kink, mirrored
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, kink, mirror_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -160,7 +160,7 @@ class Chain(ShortRepr):
             if path.status is PathStatus.COMPLETE:
                 return self._judged(path, wanted)
         other = clear and wanted != self.side
-        helper = mirrored(self.points, self.pins) if other else self._bowed(wanted)
+        helper = mirror_points(self.points, self.pins) if other else self._bowed(wanted)
         return self._from(helper, drive, wanted, tolerance, other)
 
     def _bowed(self, side: int) -> FloatArray:
@@ -265,7 +265,7 @@ def _from_its_limit(path: Path, missing: FloatArray) -> Path:
     free, drive = np.array([spot.free for spot in found[::-1]]), np.array([spot.way for spot in found[::-1]])
     back = path.with_states(np.zeros(len(found), np.int64), free, drive)
     longer = back.joined(path)
-    between, places = between_points(longer), missing[missing > longer.drive[0]]
+    between, places = interpolate_path(longer), missing[missing > longer.drive[0]]
     if between is None:
         return path
     number, more = len(missing) - len(places), between.at(places)
@@ -332,7 +332,7 @@ def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
         return pressed
     lines = [_line(pressed.path, at) for at in places]
     for number, line in enumerate(lines):
-        what = _met(line, lines[0][-1], thickness)
+        what = _find_contact(line, lines[0][-1], thickness)
         if what:
             at = pressed.path.drive[places[number]] * 1e3
             text = f"at {at:.4g} mm the chain {what}: no such part exists from there on; end 'analysis.travel' before"
@@ -348,7 +348,7 @@ def _line(path: Path, index: int) -> FloatArray:
     return line
 
 
-def _met(line: FloatArray, start: FloatArray, thickness: float) -> str:
+def _find_contact(line: FloatArray, start: FloatArray, thickness: float) -> str:
     """Return what a chain meets; nothing while it is clear."""
     anchor, end = line[0], line[-1]
     way = end - start

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.fem_results import numbered
+from cfmkit.families.fem_results import number_fillets
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
-from cfmkit.families.slider_crank.printed.part import bodies, chosen
+from cfmkit.families.slider_crank.printed.part import bodies, choose_points
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving
-from cfmkit.plots.poses_in_one_svg import chosen as film_poses
+from cfmkit.plots.poses_in_one_svg import choose_poses as film_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
-from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, apply_style, axes_mm, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -47,7 +47,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     return {maker.__name__: partial(maker, result) for maker in (curve, stress, guide, part)}
 
 
-@styled
+@apply_style
 def curve(result: Result) -> Figure:
     """Return the force over the slider's travel, the band that it should keep enlarged."""
     reported = {"lumped": "flexures and rigid links", "beam": "a strip", "solid": "the part as drawn"}
@@ -59,11 +59,11 @@ def stress_map(result: Result) -> Figure:
     """Return the stress of the part as drawn half way, where it is largest and at the end of its travel."""
     travel = result.state.fine.course.travel
     middle = int(np.abs(travel - 0.5 * travel[-1]).argmin())
-    views = stress_views(result.state.fine, middle, numbered(result.state.fillets), result.curve.motion_dimension)
+    views = stress_views(result.state.fine, middle, number_fillets(result.state.fillets), result.curve.motion_dimension)
     return stress_map_figure(result, views, "stress of the part as drawn")
 
 
-@styled
+@apply_style
 def stress(result: Result) -> Figure:
     """Return the largest stress over the travel, with the allowable one, and where it is."""
     solution: Solution = result.state
@@ -77,7 +77,7 @@ def stress(result: Result) -> Figure:
     return diagram_figure(Heading.of(result, "largest stress, and where it is"), [upper, lower])
 
 
-@styled
+@apply_style
 def guide(result: Result) -> Figure:
     """Return what the slider's guide carries beside the force."""
     solution: Solution = result.state
@@ -89,11 +89,11 @@ def guide(result: Result) -> Figure:
     return diagram_figure(Heading.of(result, "force and moment on the slider's guide"), [upper, lower])
 
 
-@styled
+@apply_style
 def part(result: Result) -> Figure:
     """Return the part to scale at some travels, with the place of the largest stress at the end."""
     solution: Solution = result.state
-    points = chosen(solution, POSES)
+    points = choose_points(solution, POSES)
     shown, view, room = _in_view(result, points)
     figure = new_figure(160.0, 120.0)
     heading = Heading.of(result, "the part to scale while it is pressed")

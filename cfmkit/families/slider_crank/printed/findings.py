@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import hindered_curling
-from cfmkit.families.findings import at_most, mm, mpa, newton, stiffer, too_soft
+from cfmkit.families.findings import format_at_most, mm, mpa, newton, stiffer, too_soft
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
@@ -60,7 +60,7 @@ def _too_large_stress(solution: Solution) -> Sentence:
         f"beyond {mm(place)} of travel the stress exceeds the allowable {mpa(limit)}; it reaches "
         f"{mpa(float(solution.stress[worst]))} at {mm(float(solution.travel[worst]))}, "
         f"{mm(float(solution.place[worst]))} along the part from its clamped end",
-        f"analysis.travel=[{mm(float(solution.travel[0]))}, {at_most(place)}]",
+        f"analysis.travel=[{mm(float(solution.travel[0]))}, {format_at_most(place)}]",
     )
 
 
@@ -134,7 +134,7 @@ def _narrow_part(solution: Solution) -> Sentence:
     )
 
 
-def _hindered(solution: Solution) -> tuple[float, str]:
+def _hindered_share(solution: Solution) -> tuple[float, str]:
     """Return by what share of its energy a part that is solved as a narrow one is too soft, and where."""
     if _mechanism(solution).wide_beams:
         return 0.0, ""
@@ -194,9 +194,9 @@ RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("lateral_buckling", lambda solution: solution.width_ratio < THINNEST_RATIO, _narrow_part),
     FindingRule(
         "wide_beam",
-        lambda solution: bool(too_soft(*_hindered(solution))),
-        lambda solution: (too_soft(*_hindered(solution)), "mechanism.wide_beams=true"),
-        lambda solution: stiffer(_hindered(solution)[0]),
+        lambda solution: bool(too_soft(*_hindered_share(solution))),
+        lambda solution: (too_soft(*_hindered_share(solution)), "mechanism.wide_beams=true"),
+        lambda solution: stiffer(_hindered_share(solution)[0]),
     ),
     FindingRule("side_force", _burdens_guide, _burdened_guide, _burden),
     FindingRule(

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.reported_values_of_finished_design import searched
+from cfmkit.designing.reported_values_of_finished_design import search_values
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import no_design
@@ -32,7 +32,7 @@ from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Flexure
 from cfmkit.families.slider_crank.printed.spec import Flexures, FlexureSpec
-from cfmkit.families.slider_crank.unit_springs import along_slider
+from cfmkit.families.slider_crank.unit_springs import curves_along_slider
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -73,7 +73,7 @@ def width_from_stiffness(rate: float, length: float, youngs_modulus: float, thic
     return 12.0 * rate * length / (youngs_modulus * thickness**3)
 
 
-def sized(rate: float, length: float, youngs_modulus: float, stress: float, rotation: float) -> Flexure:
+def size_flexure(rate: float, length: float, youngs_modulus: float, stress: float, rotation: float) -> Flexure:
     """Return the flexure that turns by `rotation` [rad] within `stress` [Pa] and has the rate [N m/rad].
 
     Its width grows with the third power of the rotation: b = 3 K E^2 psi^3 / (2 sigma^3 L^2).
@@ -88,7 +88,7 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int =
     `side`: 1 or -1, as `linkage_from_spec.side_of` says it; 0: that of the kink.
     """
     bent = side or (-1 if linkage.knee(unloaded) < 0 else 1)
-    return along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
+    return curves_along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
 
 
 _ROUNDS = 8
@@ -165,10 +165,12 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         cure = "make the flexures longer ('design.flexures.length'), or increase the stroke ('design.travel')"
         return no_design(finding("target_unreachable", f"{text}: too stubby for a flexure; {cure}"))
     travel = np.linspace(0.1 * stroke, stroke, _POINTS)
-    springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
+    springs_force = rates @ curves_along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
     bent = 0 if spec.analysis.side is None else side
-    found = corrected(first, made_of, (linkage, unloaded, bent), travel, springs_force, wanted.flexures.exact, kept)
+    found = correct_flexures(
+        first, made_of, (linkage, unloaded, bent), travel, springs_force, wanted.flexures.exact, kept
+    )
     if found is None:
         return no_design(
             finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
@@ -189,10 +191,10 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         "closed_form_stress": (found.stress_factor, "factor", f"largest stress {over[1]}"),
     }
     return Design(
-        _written(spec, found.flexures, stroke),
+        _write_flexures(spec, found.flexures, stroke),
         Status.COMPLETE,
         _message(found, wanted.flexures.exact),
-        search=searched(factors, "lumped", (0.1 * stroke, stroke)),
+        search=search_values(factors, "lumped", (0.1 * stroke, stroke)),
     )
 
 
@@ -206,7 +208,7 @@ def one_width(
     stress = (made_of.allowable_stress or np.inf) / PEAK_FACTOR
     young = made_of.youngs_modulus
     widest = max(
-        sized(float(rate), length, young, stress, float(psi)).width
+        size_flexure(float(rate), length, young, stress, float(psi)).width
         for rate, length, psi in zip(rates, lengths, turn, strict=True)
     )
     thickness = [
@@ -233,7 +235,7 @@ def of_width(
     return tuple(found)
 
 
-def corrected(
+def correct_flexures(
     flexures: Sequence[Flexure],
     made_of: Elasticity,
     built_in: tuple[Linkage, float, int],
@@ -285,7 +287,7 @@ def corrected(
     return Sized(parts, *factors, by_stress)
 
 
-def _written(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
+def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
     blocks = [
         FlexureSpec(
             length=round(one.length, 9),

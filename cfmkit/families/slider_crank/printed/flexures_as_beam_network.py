@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, guided
+from cfmkit.elastica import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, slider_support
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class Strip:
 
     def network(self, material: Elasticity) -> Network:
         """Return the strip as a beam network."""
-        nodes = {"ground": _node(self.corners[0], CLAMPED), SLIDER: _node(self.corners[-1], guided(0.0))}
+        nodes = {"ground": _node(self.corners[0], CLAMPED), SLIDER: _node(self.corners[-1], slider_support(0.0))}
         section = material.section(self.width, Taper(self.places, np.asarray(self.thickness)))
         return Network(nodes, {STRIP: Beam("ground", SLIDER, section, Polyline(self.corners))})
 
@@ -148,7 +148,7 @@ def flexure_ends(places: FloatArray, lengths: Sequence[float], before: Sequence[
     return np.array(ends)
 
 
-def mirrored(points: FloatArray, places: FloatArray) -> FloatArray:
+def mirror_points(points: FloatArray, places: FloatArray) -> FloatArray:
     """Return points mirrored about the line from the pivot to the slider pin: the chain with its kink the other way."""
     axis = (places[2] - places[0]) / np.hypot(*(places[2] - places[0]))
     relative = points - places[0]
@@ -156,10 +156,10 @@ def mirrored(points: FloatArray, places: FloatArray) -> FloatArray:
     return found
 
 
-def lumped(ends: FloatArray, flexures: Sequence[Flexure], material: Elasticity) -> Network:
+def flexure_network(ends: FloatArray, flexures: Sequence[Flexure], material: Elasticity) -> Network:
     """Return three flexures and two rigid links as a beam network."""
     names = ("ground", "crank", "crank end", "coupler", "coupler end", SLIDER)
-    supports = {"ground": CLAMPED, SLIDER: guided(0.0)}
+    supports = {"ground": CLAMPED, SLIDER: slider_support(0.0)}
     nodes = {name: _node(place, supports.get(name, FREE)) for name, place in zip(names, ends, strict=True)}
     beams = {
         name: Beam(names[2 * k], names[2 * k + 1], material.section(flexure.width, flexure.thickness))

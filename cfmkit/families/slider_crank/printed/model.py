@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import LazyMapping, LazySequence
 from cfmkit.curves import Column, Curve
-from cfmkit.elastica.results.between_points import between_points
+from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import findings_of_one, values_of_one
@@ -32,7 +32,7 @@ from cfmkit.families.slider_crank.printed.findings import RULES
 from cfmkit.families.slider_crank.printed.scalar_results import QUANTITIES
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.results import Result, Status
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -93,7 +93,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     if not usable:
         return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=reported)
     whole = (float(pressed.travel[0]), float(pressed.travel[-1]))
-    window = whole if spec.analysis.window is None else between(spec.analysis.window, (low, high))
+    window = whole if spec.analysis.window is None else window_places(spec.analysis.window, (low, high))
     solution = Solution(
         "lumped" if spec.fidelity == "lumped" else "beam",
         chain,
@@ -119,7 +119,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         allowable_stress=solution.material.allowable_stress,
         effort_error=solution.effort_error,
         closed=solution.course
-        or between_points(pressed.path, float(solution.legs), allowed=solution.material.allowable_stress),
+        or interpolate_path(pressed.path, float(solution.legs), allowed=solution.material.allowable_stress),
         state=solution,
     )
 

@@ -10,10 +10,10 @@ import numpy as np
 from cfmkit.export.arc_outlines import check_simple
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
 from cfmkit.export.drawn_as_specified import check_outline
-from cfmkit.export.fillets import filleted, sharp_notes
+from cfmkit.export.fillets import round_inside_corners, sharp_notes
 from cfmkit.export.posed_part import PosedBody, swept
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
-from cfmkit.families.slider_crank.printed.part import STRAIGHT, Leg, bodies, chosen
+from cfmkit.families.slider_crank.printed.part import STRAIGHT, Leg, bodies, choose_points
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import PaddedPart
 
@@ -31,10 +31,10 @@ SWEPT = 25
 
 def drawing(spec: SliderCrankSpec) -> Drawing:
     """Return the outline of one leg, with a table of its sections."""
-    return _drawn(spec, Leg.of(spec))
+    return _draw_leg(spec, Leg.of(spec))
 
 
-def _drawn(spec: SliderCrankSpec, leg: Leg) -> Drawing:
+def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     """Return a leg with its inside corners rounded, its fixing holes, and the frame around it.
 
     Raises
@@ -42,24 +42,26 @@ def _drawn(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     cfmkit.errors.GeometryError
         If a flexure or the strip, or the area of the leg, is not that of the specification.
     """
-    from cfmkit.export.union import SAGITTA, OutlinePiece, merged
+    from cfmkit.export.union import SAGITTA, OutlinePiece, merge_pieces
 
     part, fillet = spec.mechanism.part or PaddedPart(), spec.mechanism.fillet
     outline, path = leg.contours
-    rounded, sharp = filleted(outline, fillet)
+    rounded, sharp = round_inside_corners(outline, fillet)
     sections = check_outline((rounded,), tuple(leg.specified_pieces()), leg.thinnest, fillet)
     frame = _frame(spec, leg)
     made: tuple[Contour, ...] = (rounded,)
     if frame:
         check_simple(rounded.points(SAGITTA * leg.thinnest), "the outline of the leg")  # the union would hide it
-        made = merged([OutlinePiece.within(rounded), *map(OutlinePiece.polygon, frame)], leg.thinnest, fillet)
+        made = merge_pieces([OutlinePiece.within(rounded), *map(OutlinePiece.polygon, frame)], leg.thinnest, fillet)
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(leg.pads, (False, True), strict=True)]
     marks += [mark(one, driven=False) for one in frame]
     widest = float(leg.width.max())
     thin = [one for one in leg.pieces if one.name and leg.width[one.start] < widest]
     regions = [
-        Region(_around(leg.points[one.start], leg.points[one.start + 1], leg.widest), float(leg.width[one.start]))
+        Region(
+            _rectangle_around(leg.points[one.start], leg.points[one.start + 1], leg.widest), float(leg.width[one.start])
+        )
         for one in thin
     ]
     return Drawing(
@@ -108,19 +110,19 @@ def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
     frame: tuple[FloatArray, ...] = ()
     if part is not None and part.frame is not None and part.frame.ground is not None:
         frame = _frame(spec, Leg.of(spec))
-        spec = _without_frame(spec, part, leg.pads, frame)
-    drawn = _drawn(spec, leg)
+        spec = _remove_frame(spec, part, leg.pads, frame)
+    drawn = _draw_leg(spec, leg)
     outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
     return SolvedPiece(outline, tuple(others), leg.pads, drawn.sheet, leg.thinnest, drawn.sections, frame, drawn.notes)
 
 
-def _without_frame(
+def _remove_frame(
     spec: SliderCrankSpec, part: PaddedPart, pads: tuple[FloatArray, ...], frame: tuple[FloatArray, ...]
 ) -> SliderCrankSpec:
     """Return what bends: without the frame, which stands, and the holes in it."""
-    from cfmkit.export.ground_frame import outside
+    from cfmkit.export.ground_frame import find_outside
 
-    kept = outside([one.at for one in part.holes], frame, pads)
+    kept = find_outside([one.at for one in part.holes], frame, pads)
     holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
     around = part.frame and part.frame.model_copy(update={"ground": None})
     alone = part.model_copy(update={"frame": around, "holes": holes})
@@ -150,7 +152,7 @@ def _moving(spec: SliderCrankSpec, leg: Leg) -> Iterator[PosedBody]:
     fidelity = {"analysis.fidelity": None} if spec.analysis.fidelity == "solid" else {}
     solution: Any = analyze(spec.replace(fidelity), Run()).state
     if solution is not None:
-        _, slider, *found = bodies(spec, solution, chosen(solution, SWEPT))
+        _, slider, *found = bodies(spec, solution, choose_points(solution, SWEPT))
         yield slider
         yield PosedBody.line("leg", "free", np.concatenate([one.core for one in found], axis=1), leg.widest)
 
@@ -171,7 +173,7 @@ def _facts(spec: SliderCrankSpec, leg: Leg) -> Iterator[tuple[str, str]]:
     yield "thickness", " ... ".join(limits) + " along the centre line"
 
 
-def _around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:
+def _rectangle_around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:
     """Return the rectangle with a straight line as its middle and a half height [m]."""
     along = (end - start) / np.hypot(*(end - start))
     side = half * np.array([-along[1], along[0]])

@@ -184,7 +184,7 @@ def part_over_motion(result: Result) -> PosedPart:
     """Return one leg as it moves; legs lie above each other."""
     spec: Any = result.spec
     depth = spec.mechanism.legs * float(Leg.of(spec).width.max())
-    moving = bodies(spec, result.state, chosen(result.state, N_POSES))
+    moving = bodies(spec, result.state, choose_points(result.state, N_POSES))
     return PosedPart(moving, direction=0.0, depth=depth, pieces=spec.mechanism.sets)
 
 
@@ -217,7 +217,7 @@ def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> t
     )
 
 
-def chosen(solution: Solution, count: int) -> NDArray[np.intp]:
+def choose_points(solution: Solution, count: int) -> NDArray[np.intp]:
     """Return so many points of the travel, evenly, its ends included."""
     return np.unique(np.linspace(0, len(solution.travel) - 1, count).astype(int))
 

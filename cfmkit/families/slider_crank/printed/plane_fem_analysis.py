@@ -31,7 +31,7 @@ from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.results import Quantity, Result, Status
-from cfmkit.specs.units import between, format_short
+from cfmkit.specs.units import format_short, window_places
 from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class SolidSolution(ShortRepr):
     def window(self) -> tuple[float, float]:
         """Window in which metrics are taken [m]."""
         ends = self.spec.analysis.travel or (0.0, 0.0)
-        return ends if self.spec.analysis.window is None else between(self.spec.analysis.window, ends)
+        return ends if self.spec.analysis.window is None else window_places(self.spec.analysis.window, ends)
 
     @cached_property
     def level(self) -> float:
@@ -209,7 +209,7 @@ def _stops(spec: SliderCrankSpec) -> list[float]:
     low, high = spec.analysis.travel or (0.0, 0.0)
     own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** GATHERED
     windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
-    ends = [low, *(place for window in windows if window is not None for place in between(window, (low, high)))]
+    ends = [low, *(place for window in windows if window is not None for place in window_places(window, (low, high)))]
     found = np.unique(np.concatenate([own, [place for place in ends if 0.0 < place < high]]))
     return [float(place) for place in np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * high) + 1)]
 

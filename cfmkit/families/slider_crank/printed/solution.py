@@ -19,7 +19,7 @@ from cfmkit.elastica.results.member_efforts import effort_error
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
 from cfmkit.metrics.continuous_means_and_extremes import mean
-from cfmkit.numerics.chebyshev_panels import nodes_of, resolved
+from cfmkit.numerics.chebyshev_panels import nodes_of, resolve_panels
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def course(
         return np.full((2, len(places)), np.nan) if found is None else np.array(found)
 
     borders = np.linspace(low, high, int(np.ceil((high - low) / WIDE)) + 1)
-    force, stress = resolved(values, borders, CLOSE, HALVINGS)
+    force, stress = resolve_panels(values, borders, CLOSE, HALVINGS)
     whole = np.isfinite(force.coefficients).all() and np.isfinite(stress.coefficients).all()
     return ChainCurve(ends, first, (force, stress)) if whole else None
 

@@ -217,7 +217,7 @@ class StripProgram(DesignProgram):
                 near = neighbouring(self.known, network, drive)
                 if near.status is PathStatus.COMPLETE:
                     return near
-        return _traced(network, drive)
+        return _trace(network, drive)
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the objective, the rows of the band, and those of the stress."""
@@ -317,7 +317,7 @@ class StripProgram(DesignProgram):
         try:
             paths += [(step, neighbouring(state.path, moved(step), drive)) for step in (-nudge, nudge)]
         except InputError:
-            beside = _traced(moved(nudge), drive)
+            beside = _trace(moved(nudge), drive)
             paths = []
             if beside is not None:
                 paths = [(nudge, beside), (2.0 * nudge, neighbouring(beside, moved(2.0 * nudge), drive))]
@@ -330,7 +330,7 @@ class StripProgram(DesignProgram):
 
     def _pressed(self, path: Path) -> State:
         """Return the strip that is pressed along a path."""
-        return State(path, path.effort[path.at_requested], watched(path, self.spots))
+        return State(path, path.effort[path.at_requested], stress_places(path, self.spots))
 
     def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
@@ -345,7 +345,7 @@ class StripProgram(DesignProgram):
         return 0.01 * drive_slope(state.path) * moves, 0.01 * stress
 
 
-def _traced(network: Network, drive: Displacement) -> Path | None:
+def _trace(network: Network, drive: Displacement) -> Path | None:
     """Return the equilibria that are reached from rest; None if one is not, or is not stable."""
     path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
     good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
@@ -383,7 +383,7 @@ class Watched:
         return np.tensordot(self.between, tops, 1).reshape(-1, *tops.shape[2:])
 
 
-def watched(path: Path, spots: FloatArray) -> Watched:
+def stress_places(path: Path, spots: FloatArray) -> Watched:
     """Return where the stress of a strip is looked at.
 
     Parameters

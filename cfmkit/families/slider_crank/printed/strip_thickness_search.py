@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
+from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, from_record, run_stage
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.run_control import Run
@@ -128,7 +128,7 @@ def uniform_thickness(task: StripTask, width: float, guess: float = GUESS) -> fl
         wanted = np.asarray(task.share(program.travel(np.array([thickness / SMALL, 1.0]))))
         return float((0.5 * task.force * (wanted.max() + wanted.min()) / _level(state)) ** (1.0 / 3.0))
 
-    found = _settled(step, guess)
+    found = _iterate_thickness(step, guess)
     return guess if found is None else found
 
 
@@ -152,7 +152,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
         width /= factor**3
         return factor
 
-    thickness = _settled(step, GUESS)
+    thickness = _iterate_thickness(step, GUESS)
     return None if thickness is None else (thickness, width)
 
 
@@ -171,11 +171,11 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
         worst = _peak(state)
         return float((task.force / _level(state)) ** (1.0 / 3.0))
 
-    thickness = _settled(step, GUESS)
+    thickness = _iterate_thickness(step, GUESS)
     return None if thickness is None else (thickness, worst)
 
 
-def _settled(step: Callable[[float], float | None], guess: float) -> float | None:
+def _iterate_thickness(step: Callable[[float], float | None], guess: float) -> float | None:
     """Return the thickness [m] that steps from a guess lead to, each by a factor; None if there is no factor."""
     thickness = guess
     for _ in range(_ROUNDS):
@@ -228,7 +228,7 @@ class StripStarts:
 
     def read(self, record: dict[str, Any]) -> FoundStrip:
         """Return the strip of a record."""
-        descent = restored(Optimum, record["found"] | {"ending": SearchEnding[record["found"]["ending"]]})
+        descent = from_record(Optimum, record["found"] | {"ending": SearchEnding[record["found"]["ending"]]})
         return FoundStrip(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
 
 
@@ -266,13 +266,13 @@ def search(
 
     work = StripStarts(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
     means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
-    outcome = done(Stage(OneStart(work.descended, clock), tuple(range(starts)), identity), means, clock, tell)
+    outcome = run_stage(Stage(OneStart(work.descended, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
         return _nothing(outcome.lost)
     found = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
     best = min(found, key=lambda one: _rank(one.descent))
     if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
-        best = min(filter(None, (best, _tightened(work))), key=lambda one: _rank(one.descent))
+        best = min(filter(None, (best, _tighten_band(work))), key=lambda one: _rank(one.descent))
     return replace(best, lost=outcome.lost)
 
 
@@ -324,7 +324,7 @@ def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | Non
     for count in steps:
         now = replace(form, count=count)
         own = len(x) - (form.size - form.count)
-        x = np.concatenate([_refined(x[:own], count), x[own:]])
+        x = np.concatenate([_refine_nodes(x[:own], count), x[own:]])
         coarse = count < steps[-1]
         goal = replace(task, ripple=max(task.ripple, LOOSE)) if coarse else task
         program = StripProgram(goal, now)
@@ -337,7 +337,7 @@ def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | Non
     return FoundStrip(task, form, ranges, program, descent, start.uniform)
 
 
-def _tightened(start: StripStarts) -> FoundStrip | None:
+def _tighten_band(start: StripStarts) -> FoundStrip | None:
     """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
 
     Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
@@ -357,7 +357,7 @@ def _tightened(start: StripStarts) -> FoundStrip | None:
     return FoundStrip(task, form, ranges, program, descent, uniform)
 
 
-def _refined(values: FloatArray, count: int) -> FloatArray:
+def _refine_nodes(values: FloatArray, count: int) -> FloatArray:
     """Return thicknesses on more nodes, the same strip."""
     old = np.linspace(0.0, 1.0, len(values))
     return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)

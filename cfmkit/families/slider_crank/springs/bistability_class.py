@@ -123,7 +123,7 @@ def _equilibria(curves: Monotone, start: FloatArray) -> tuple[NDArray[np.intp], 
     """Return the numbers of stable and unstable equilibria, those at the ends included."""
     sign = signs(curves, start)
     ends = sign[:, [0]] == 0, sign[:, [-1]] == 0
-    known = _filled(sign)
+    known = _fill_zeros(sign)
     ups = ((known[:, :-1] < 0) & (known[:, 1:] > 0)).sum(axis=1)
     downs = ((known[:, :-1] > 0) & (known[:, 1:] < 0)).sum(axis=1)
     first, last = known[:, 0], known[:, -1]
@@ -133,7 +133,7 @@ def _equilibria(curves: Monotone, start: FloatArray) -> tuple[NDArray[np.intp], 
     return ups, downs
 
 
-def _filled(sign: NDArray[np.int8]) -> NDArray[np.int8]:
+def _fill_zeros(sign: NDArray[np.int8]) -> NDArray[np.int8]:
     """Return signs with each 0 replaced by what comes before it, at the beginning by what follows."""
     index = np.where(sign != 0, np.arange(sign.shape[1]), 0)
     filled = np.take_along_axis(sign, np.maximum.accumulate(index, axis=1), axis=1)
@@ -163,7 +163,7 @@ def scale_factors(assembly: Assembly, low: Any, high: Any) -> Ends:
 
     def needed(unit: FloatArray, sign: FloatArray | float) -> FloatArray:
         unit = assembly.rates_over(unit) * unit
-        return _needed(unit[:3].sum(axis=0), unit[3], sign)
+        return _required_factor(unit[:3].sum(axis=0), unit[3], sign)
 
     with np.errstate(divide="ignore", invalid="ignore"):
         first = _highest(lambda motion: needed(assembly.forces(motion), motion - assembly.start), low, high)
@@ -171,7 +171,7 @@ def scale_factors(assembly: Assembly, low: Any, high: Any) -> Ends:
     return Several((np.where(none, np.nan, first), np.where(none, np.nan, second)))
 
 
-def _needed(torsion: FloatArray, slider: FloatArray, sign: FloatArray | float) -> FloatArray:
+def _required_factor(torsion: FloatArray, slider: FloatArray, sign: FloatArray | float) -> FloatArray:
     """Return the factor with which sign * (factor * torsion + slider) is not negative; infinite where none is."""
     torsion, slider = np.sign(sign) * torsion, np.sign(sign) * slider
     needed = np.where(torsion > 0.0, -slider / torsion, np.where(slider < 0.0, np.inf, 0.0))

@@ -134,7 +134,7 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
     best = _sets(goal, options, 1)
     if best and (tolerance is None or best[0].deviation <= tolerance * (1 + 1e-9)):
         return best[0]
-    misses = [_missed(one) for one in (_sets(goal, options, 3) if best else [])]
+    misses = [_miss_of(one) for one in (_sets(goal, options, 3) if best else [])]
     reported = nearest(misses) if misses else _none_together(task, refused)
     allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
     raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue keep the target: {reported}{allowed}"))
@@ -174,7 +174,7 @@ def _by_rate(options: list[SpringOption], joint: int, least: float) -> dict[floa
     return {one.rate if one else 0.0: one for one in found.values()}
 
 
-def _missed(one: Chosen) -> Miss:
+def _miss_of(one: Chosen) -> Miss:
     label = " + ".join(option.label for option in one.options) or "no spring"
     return Miss(label, one.deviation, f"off by {percent(one.deviation)}")
 

@@ -25,11 +25,11 @@ from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
 from cfmkit.families.slider_crank.springs.design_outcome import (
     Solved,
-    about_springs,
     active_bounds,
-    audited,
+    audit,
     cannot_hold,
     check_reach,
+    describe_springs,
     hopeless,
     message,
     not_proven,
@@ -37,7 +37,7 @@ from cfmkit.families.slider_crank.springs.design_outcome import (
     search_of,
     too_far,
 )
-from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import least_squares, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import choose_preferred, least_squares, minimax, ranges
 from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.springs.solution import EDGE
@@ -85,9 +85,9 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     wanted = spec.design
     if wanted is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
-    solved, search = _searched(spec, wanted, run)
-    solved = _compensated(solved)
-    found = _made(solved, search)
+    solved, search = _search_lengths(spec, wanted, run)
+    solved = _compensate_friction(solved)
+    found = _make_design(solved, search)
     others = range(NEXT if solved.bought else 0)
     return replace(found, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
 
@@ -102,18 +102,18 @@ def _with_next(solved: Solved, rank: int) -> Design:
     one = sets[rank]
     rms = goal.rms(one.rates)
     bought = replace(solved, rates=one.rates, deviation=one.deviation, rms=rms, bought=one.options, exact=False)
-    return _made(bought, None)
+    return _make_design(bought, None)
 
 
-def _made(solved: Solved, search: Lowest | None) -> Design:
+def _make_design(solved: Solved, search: Lowest | None) -> Design:
     """Return what was found as a design, audited."""
     wanted = solved.task.wanted
-    solved = _kept(audited(solved, _written(solved)))
-    warnings = (*about_springs(solved), *alternatives(solved, search))
+    solved = _keep_if_audited(audit(solved, _write_springs(solved)))
+    warnings = (*describe_springs(solved), *alternatives(solved, search))
     if wanted.window is None and (search is not None or not solved.proven):
         warnings = (*warnings, not_proven(solved, search is not None))
     return Design(
-        _written(solved),
+        _write_springs(solved),
         Status.COMPLETE,
         message(solved),
         active_bounds(solved, wanted),
@@ -126,7 +126,7 @@ ROUNDS = 40
 """Rounds in which springs and the friction that they cause are fitted to each other; some 10 are enough."""
 
 
-def _compensated(solved: Solved) -> Solved:
+def _compensate_friction(solved: Solved) -> Solved:
     """Return springs that hold the target with the friction that they cause, on the way that the design names."""
     task = solved.task
     if task.wanted.branch is None or not task.assembly.rubbing.there:
@@ -140,7 +140,7 @@ def _compensated(solved: Solved) -> Solved:
     return solved
 
 
-def _kept(solved: Solved) -> Solved:
+def _keep_if_audited(solved: Solved) -> Solved:
     """Return a design that keeps its tolerance where it was audited.
 
     A widest window whose springs are farther off between the places that the search looked at than its reserve allows
@@ -156,13 +156,13 @@ def _kept(solved: Solved) -> Solved:
         return solved
     if solved.task.wanted.window is None:
         again = solve(solved.task, tolerance * tolerance / solved.deviation)
-        again = audited(again, _written(again))
+        again = audit(again, _write_springs(again))
         if again.deviation <= tolerance * EDGE:
             return again
     raise Infeasible(*too_far(solved.task, solved.deviation))
 
 
-def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
+def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
     """Return the best design, and the search that led to its lengths."""
     given = {name: ends for name in FREE if (ends := getattr(wanted, name)) is not None}
     axes = {name: BoxAxis(low, high, log=name != "offset") for name, (low, high) in given.items()}
@@ -268,7 +268,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     return Solved(task, window, rates, deviation, goal.rms(rates), proven, len(goal.wanted))
 
 
-def _written(solved: Solved) -> SliderCrankSpec:
+def _write_springs(solved: Solved) -> SliderCrankSpec:
     """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
     spec, wanted = resolve(solved.task.spec), solved.task.wanted
     rates = dict(zip(JOINTS, solved.rates.tolist(), strict=True))
@@ -287,12 +287,12 @@ def _written(solved: Solved) -> SliderCrankSpec:
     written: dict[str, object] = {"drive": assembly.drive, f"reference_{assembly.motion_name}": _reference(solved)}
     if wanted.window is None or spec.analysis.window is None:
         written["window"] = tuple(Place(end, assembly.dimension) for end in solved.window)
-    written |= _seen(solved)
+    written |= _motion_to_show(solved)
     analysis = spec.analysis.model_copy(update=written)
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 
-def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
+def _motion_to_show(solved: Solved) -> dict[str, tuple[float, float]]:
     """Return the motion of the analysis, if it has to be another one to show all of the window, and nothing forbidden.
 
     Where none is requested, the joints' limits are those of the motion, too.
@@ -350,7 +350,7 @@ def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign, toleranc
     if wanted.prefer == "small-rotation":  # a matter of lengths only
         return best
     least, most = goal.deviation(best), math.inf if tolerance is None else tolerance
-    found = preferred(goal, min(least + wanted.slack, max(least, most * (1.0 - WITHIN))), wanted.prefer)
+    found = choose_preferred(goal, min(least + wanted.slack, max(least, most * (1.0 - WITHIN))), wanted.prefer)
     return best if found is None or goal.deviation(found) > max(least, most) else found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.reported_values_of_finished_design import measured, searched
+from cfmkit.designing.reported_values_of_finished_design import measure_metrics, search_values
 from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.run_control import Run
@@ -46,7 +46,7 @@ class Solved:
         return float(places[0]), float(places[-1])
 
 
-def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
+def audit(solved: Solved, spec: SliderCrankSpec) -> Solved:
     """Return a design with the deviations that the analysis of its specification measures.
 
     Those from a line that is not level are none of its metrics: they stay what the search found at its places.
@@ -64,8 +64,8 @@ def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
             return solved
         way = f"[{way}]"
     (largest,), (rms,) = (
-        measured(result, solved.judged, f"{names[0]}{way}"),
-        measured(result, solved.window, f"{names[1]}{way}"),
+        measure_metrics(result, solved.judged, f"{names[0]}{way}"),
+        measure_metrics(result, solved.window, f"{names[1]}{way}"),
     )
     if largest is None or rms is None:
         return solved
@@ -176,7 +176,7 @@ def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
     return tuple(active)
 
 
-def about_springs(solved: Solved) -> tuple[Finding, ...]:
+def describe_springs(solved: Solved) -> tuple[Finding, ...]:
     """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
     found, wanted = [], solved.task.wanted
     if solved.bought:
@@ -239,4 +239,4 @@ def search_of(solved: Solved) -> dict[str, Searched]:
             f"root mean square deviation from the target, relative to it, at the {solved.places} places searched",
         ),
     }
-    return searched(about, "prb", solved.window, solved.task.assembly.dimension)
+    return search_values(about, "prb", solved.window, solved.task.assembly.dimension)

@@ -22,9 +22,21 @@ from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
-from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, is_plain, new_figure, styled
+from cfmkit.plots.style import (
+    BLUE,
+    BROWN,
+    GREY,
+    INK,
+    OCHRE,
+    PURPLE,
+    VERMILLION,
+    apply_style,
+    axes_mm,
+    is_plain,
+    new_figure,
+)
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.stock.springs.made_to_measure import loaded_length
 
@@ -172,7 +184,7 @@ def assembly(result: Result) -> Figure:
     return assembly_figure(spec.name, outcome.drawn, outcome.parts, result.state.motion.shape[1] // 2)
 
 
-@styled
+@apply_style
 def curve(result: Result) -> Figure:
     """Return torque or force over the motion: the constant band named, equilibria marked."""
     solution: Solution = result.state
@@ -220,7 +232,7 @@ def _equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], f
         )  # fmt: skip
 
 
-@styled
+@apply_style
 def energy(result: Result) -> Figure:
     """Return the energy over the motion with its wells, and the share of each spring."""
     solution: Solution = result.state
@@ -249,7 +261,7 @@ def _name_wells(ax: Axes, solution: Solution) -> None:
     place_labels(ax, found)
 
 
-@styled
+@apply_style
 def springs(result: Result) -> Figure:
     """Return the effort of each spring over the motion, and the stiffness of all."""
     solution: Solution = result.state
@@ -269,7 +281,7 @@ def springs(result: Result) -> Figure:
     return diagram_figure(heading, [upper, lower])
 
 
-@styled
+@apply_style
 def joints(result: Result) -> Figure:
     """Return how far each joint turns, against its limit, and the forces inside."""
     solution: Solution = result.state
@@ -288,7 +300,7 @@ def joints(result: Result) -> Figure:
     return diagram_figure(Heading.of(result, "rotations of the joints, and forces inside"), diagrams)
 
 
-@styled
+@apply_style
 def linkage(result: Result) -> Figure:
     """Return the linkage to scale in its key positions, above each other if it is flat, with the curve they are on."""
     solution: Solution = result.state
@@ -332,7 +344,7 @@ def _key_curve(
     place_labels(ax, names)
 
 
-@styled
+@apply_style
 def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: PanelView) -> Axes:
     """Draw the linkage at one place of its motion; return the axes, which are in millimetres."""
     link, rates, size = solution.assembly.linkage, solution.assembly.rates, view.size
@@ -375,7 +387,7 @@ def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]
 def moving(result: Result) -> Moving:
     """Return the linkage over its motion, for a film."""
     solution: Solution = result.state
-    motion, view = solution.motion[0, chosen(solution.motion.shape[1])], scene(result)
+    motion, view = solution.motion[0, choose_poses(solution.motion.shape[1])], scene(result)
     poses = [key(solution, "", float(place)) for place in motion]
     return Moving(
         motion,

@@ -225,13 +225,13 @@ def _misses_reference(solution: Solution) -> Any:
     return (asked is not None) & ~_reaches_reference(solution)
 
 
-def _at_reference(solution: Solution) -> str:
+def _describe_reference(solution: Solution) -> str:
     return f"the reference {place(solution, float(solution.reference[0, 0]))}"
 
 
 def _no_level(solution: Solution) -> Sentence:
     return (
-        f"at {_at_reference(solution)} the {solution.drive} is zero, and a "
+        f"at {_describe_reference(solution)} the {solution.drive} is zero, and a "
         "band stated in per cent of zero has no width; choose another reference",
     )
 
@@ -335,7 +335,9 @@ RULES: tuple[Rule, ...] = (
     ),
     FindingRule("force_unbounded", _nears_pole, _pole),
     FindingRule(
-        "reference_outside", _misses_reference, lambda solution: (f"{_at_reference(solution)} is outside the motion",)
+        "reference_outside",
+        _misses_reference,
+        lambda solution: (f"{_describe_reference(solution)} is outside the motion",),
     ),
     FindingRule("reference_zero", lambda solution: _reaches_reference(solution) & ~solution.has_level, _no_level),
     FindingRule("effort_changes_sign", _changes_sign, _signs),

@@ -139,7 +139,7 @@ def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
     rates, unit = found[0], goal.deviation(found[0])
     if not 0.0 < unit < RESOLVED:
         return found
-    more = _smallest_deviation(_enlarged(goal, rates, unit))
+    more = _smallest_deviation(_enlarge_goal(goal, rates, unit))
     if more is not None:
         rates = rates + more[0] * unit
     return rates, goal.deviation(rates)
@@ -148,11 +148,11 @@ def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
 def _smallest_deviation(goal: RateGoal) -> tuple[FloatArray, float] | None:
     cost = np.zeros(goal.matrix.shape[1] + 1)
     cost[-1] = 1.0
-    solved = _solved(goal, cost, None)
+    solved = _solve_programme(goal, cost, None)
     return None if solved is None else (solved[:-1] / goal.scales(), float(solved[-1]))
 
 
-def _enlarged(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
+def _enlarge_goal(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
     """Return the goal for what is to be added to rates, in units of their deviation."""
     held, least = (
         None if row is None else (row[0], (row[1] - float(row[0] @ rates)) / unit) for row in (goal.held, goal.least)
@@ -168,7 +168,7 @@ def _enlarged(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
     )
 
 
-def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray | None:
+def _solve_programme(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray | None:
     """Return scaled rates, then the deviation, that minimise a cost; None if there are none.
 
     Parameters
@@ -192,11 +192,11 @@ def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray
     ]
     equal: dict[str, Any] = {}
     if goal.held is not None:
-        row, held = _normalised(goal.held[0] / scales, goal.held[1])
+        row, held = _normalise_row(goal.held[0] / scales, goal.held[1])
         equal = {"A_eq": np.append(row, 0.0)[None], "b_eq": [held]}
     limits = np.concatenate([goal.wanted, -goal.wanted])
     if goal.least is not None:
-        row, least = _normalised(goal.least[0] / scales, goal.least[1])
+        row, least = _normalise_row(goal.least[0] / scales, goal.least[1])
         rows = np.vstack([rows, np.append(-row, 0.0)[None]])
         limits = np.append(limits, -least)
     found = linprog(
@@ -211,7 +211,7 @@ def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray
     return None if found.status != 0 or found.x is None else np.maximum(found.x, lowest)
 
 
-def _normalised(row: FloatArray, value: float) -> tuple[FloatArray, float]:
+def _normalise_row(row: FloatArray, value: float) -> tuple[FloatArray, float]:
     """Return a row (m,) and its value with the largest entry of the row 1: a programme meets rows to 1e-7."""
     size = float(np.abs(row).max()) or 1.0
     return row / size, value / size
@@ -281,13 +281,13 @@ def ranges(goal: RateGoal, worst: float) -> FloatArray:
         for end, sign in enumerate((1.0, -1.0)):
             cost = np.zeros(count + 1)
             cost[k] = sign
-            solved = _solved(goal, cost, worst)
+            solved = _solve_programme(goal, cost, worst)
             if solved is not None:
                 found[k, end] = solved[k] / goal.scales()[k]
     return found
 
 
-def preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
+def choose_preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
     """Return one of the rates with no deviation above `worst`: the softest, or the most even ones.
 
     Parameters
@@ -302,7 +302,7 @@ def preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
     """
     count = goal.matrix.shape[1]
     if rule == "soft-springs":
-        solved = _solved(goal, np.append(np.ones(count), 0.0), worst)
+        solved = _solve_programme(goal, np.append(np.ones(count), 0.0), worst)
         return None if solved is None else solved[:-1] / goal.scales()
     return _most_even(goal, worst)
 
@@ -323,12 +323,12 @@ def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
         rows += [above, below]
         right += [0.0, 0.0]
     if goal.least is not None:
-        row, least = _normalised(goal.least[0] * unit, goal.least[1])
+        row, least = _normalise_row(goal.least[0] * unit, goal.least[1])
         rows.append(np.concatenate([-row, [0.0, 0.0]]))
         right.append(-least)
     equal: dict[str, Any] = {}
     if goal.held is not None:
-        row, held = _normalised(goal.held[0] * unit, goal.held[1])
+        row, held = _normalise_row(goal.held[0] * unit, goal.held[1])
         equal = {"A_eq": np.concatenate([row, [0.0, 0.0]])[None], "b_eq": [held]}
     cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
     own = [(low / unit, None if top is None else top / unit) for low, top in goal.bounds]

@@ -67,12 +67,12 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
         if torque:
             toward = np.sign(way * slider_rate)
             along, held = -turns[3] - toward * rubbing.guide.drag, rubbing.guide.friction * toward
-            rubbed = _pressed(held, along, (sine, cosine), on_coupler, signs, assembly)
+            rubbed = _pull_of_pressed_guide(held, along, (sine, cosine), on_coupler, signs, assembly)
         else:
             rows = (link.coupler * np.stack([-sine, cosine]), link.crank * np.stack([-np.sin(angle), np.cos(angle)]))
             straight = _balance(rows, -on_coupler, -on_crank)
             bent = _balance(rows, signs[1] + signs[2], signs[0] - signs[1])
-            rubbed = _through_pins(straight, bent, rubbing.pin)
+            rubbed = _pull_through_pins(straight, bent, rubbing.pin)
         pull, couple = rubbed
         across = -pull[1] * (0.0 if rubbing.mirrored else 1.0)
         if torque:
@@ -109,7 +109,7 @@ def _balance(rows: tuple[FloatArray, FloatArray], first: FloatArray, second: Flo
     return np.stack([(first * d - b * second) / size, (a * second - c * first) / size])
 
 
-def _through_pins(straight: FloatArray, bent: FloatArray, pin: float) -> tuple[FloatArray, FloatArray]:
+def _pull_through_pins(straight: FloatArray, bent: FloatArray, pin: float) -> tuple[FloatArray, FloatArray]:
     """Return the pull P0 + h P1 and h = pin |P0 + h P1|; NaN where no h fits."""
     if not np.any(pin):
         return straight, np.zeros(straight.shape[1:])
@@ -120,7 +120,7 @@ def _through_pins(straight: FloatArray, bent: FloatArray, pin: float) -> tuple[F
     return straight + couple * bent, couple
 
 
-def _pressed(
+def _pull_of_pressed_guide(
     friction: FloatArray,
     along: FloatArray,
     direction: tuple[FloatArray, FloatArray],
@@ -141,7 +141,7 @@ def _pressed(
         rows = (np.stack([np.ones_like(sine), rubs * np.ones_like(sine)]), length * np.stack([-sine, cosine]))
         straight = _balance(rows, along, -on_coupler)
         bent = _balance(rows, np.zeros_like(sine), signs[1] + signs[2])
-        pull, couple = _through_pins(straight, bent, assembly.rubbing.pin)
+        pull, couple = _pull_through_pins(straight, bent, assembly.rubbing.pin)
         if found is None:
             found = pull, couple
         else:

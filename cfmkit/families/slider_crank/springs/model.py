@@ -24,7 +24,7 @@ from cfmkit.arrays import LazySequence, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import ScalarQuantity, SolvedRows, findings_of_one, valid, values_of_one, without_numbers
+from cfmkit.families.rows import ScalarQuantity, SolvedRows, drop_numbers, findings_of_one, valid, values_of_one
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
@@ -35,7 +35,7 @@ from cfmkit.families.slider_crank.springs.scalar_results import QUANTITIES
 from cfmkit.families.slider_crank.springs.solution import ClosedFormEffort, Solution, target_of
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, asked_motion, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.metrics.branches_cut_to_window import between_ends
+from cfmkit.metrics.branches_cut_to_window import find_between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
@@ -83,7 +83,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         solution, shortfalls = solve(spec, assembly)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    stuck, model = _held(solution), ClosedFormEffort(solution)
+    stuck, model = _describe_locked(solution), ClosedFormEffort(solution)
     return Result(
         spec=_as_run(spec, assembly),
         status=Status.PARTIAL if shortfalls or stuck else Status.COMPLETE,
@@ -136,7 +136,7 @@ def _kind(spec: SliderCrankSpec, assembly: Assembly, asked: Ends) -> tuple[Any, 
     """Return what mechanisms that are solved together have in common: all but the values of numbers."""
     rubbing, blocks = assembly.rubbing, (spec.mechanism, spec.analysis, spec.design)
     rubs = rubbing.there, rubbing.guide.friction > 0, rubbing.pin > 0
-    return (*map(without_numbers, blocks), *rubs, spec.analysis.band, is_wide(assembly, *asked))
+    return (*map(drop_numbers, blocks), *rubs, spec.analysis.band, is_wide(assembly, *asked))
 
 
 def _solution(specs: Sequence[SliderCrankSpec], assemblies: Sequence[Assembly], motions: Sequence[Ends]) -> Solution:
@@ -191,7 +191,7 @@ def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]
             f"{mm(asked[1])} are requested; change 'analysis.travel'",
         )
     if poles:
-        yield unbounded(poles)
+        yield find_unbounded(poles)
 
 
 def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
@@ -205,7 +205,7 @@ def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
     )
 
 
-def unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
+def find_unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
     """Return that the force grows without bound at some travels, and where the curve ends before them [m]."""
     places = " and ".join(mm(pole) for pole, _end in poles)
     ends = " and ".join(mm(end) for _pole, end in poles)
@@ -254,7 +254,7 @@ def _curve(solution: Solution) -> Curve:
     return Curve(both(motion, motion), effort, names, np.isfinite(effort), columns, drive)
 
 
-def _held(solution: Solution) -> str:
+def _describe_locked(solution: Solution) -> str:
     """Return what to say of places where friction leaves no equilibrium; empty without any."""
     failed = sum(int((~np.isfinite(way.effort[0, 1:])).sum()) for way in solution.ways or ())
     points = 2 * solution.motion.shape[1]
@@ -291,12 +291,12 @@ def _slopes(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     drive, (assembly,) = solution.drive, solution.assemblies
     low, high = (float(end[0, 0]) for end in solution.window_or_motion)
     motion = solution.motion[0]
-    unit = assembly.forces(np.concatenate([[low], motion[between_ends(motion, low, high)], [high]]))
+    unit = assembly.forces(np.concatenate([[low], motion[find_between_ends(motion, low, high)], [high]]))
     effort = assembly.rates @ unit
     sign = -1.0 if effort.mean() < 0 else 1.0
     places = np.concatenate([motion, solution.curve.place[0]])
-    places = distinct(np.concatenate([[low, high], places[between_ends(places, low, high)]]))
-    most, least = (_at_extreme(assembly, places, toward) for toward in (sign, -sign))
+    places = distinct(np.concatenate([[low, high], places[find_between_ends(places, low, high)]]))
+    most, least = (_efforts_at_extreme(assembly, places, toward) for toward in (sign, -sign))
     top, bottom = float(assembly.rates @ most), float(assembly.rates @ least)
     yield f"{drive}_mean", unit.mean(axis=1)
     yield f"{drive}_max", most if sign > 0 else least
@@ -305,7 +305,7 @@ def _slopes(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
         yield f"{drive}_ripple", (bottom * most / top - least) / top
     if top + bottom != 0.0:
         yield "half_band", 2.0 * (bottom * most - top * least) / (top + bottom) ** 2
-    yield "energy_max", _at_largest_energy(solution)
+    yield "energy_max", _energies_at_maximum(solution)
     reference = solution.reference[0]
     if solution.low[0, 0] <= reference[0] <= solution.high[0, 0]:
         yield f"reference_{drive}", assembly.units(reference).effort[:, 0]
@@ -315,7 +315,7 @@ def _slopes(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
         yield "stretched_stiffness", at.stiffness[:, 0]
 
 
-def _at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> FloatArray:
+def _efforts_at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> FloatArray:
     """Return the unit efforts (4,) where the effort times a sign is largest, next to the places too.
 
     An extreme moves with the rates, but the effort does not change with its place there: its derivatives are these.
@@ -332,7 +332,7 @@ def _at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> FloatArr
     return np.asarray(assembly.units(np.array([at])).effort[:, 0])
 
 
-def _at_largest_energy(solution: Solution) -> FloatArray:
+def _energies_at_maximum(solution: Solution) -> FloatArray:
     """Return the energies of unit springs (4,) where the energy is largest: at an end, or where no effort is left."""
     (assembly,), (low, high) = solution.assemblies, solution.ends
     inner = [one.motion for one in solution.equilibria if low < one.motion < high]

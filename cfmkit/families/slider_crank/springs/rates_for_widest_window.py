@@ -79,11 +79,11 @@ def widest(task: SpringTask, tolerance: float) -> FittedWindow | None:
     tolerance *= KEPT
     width, middle = _first_guess(task, tolerance)
     width = min(width, last - first)
-    best = _grown(task, tolerance, width, middle, 0.6)
+    best = _grow_window(task, tolerance, width, middle, 0.6)
     if best is not None and best.width >= POOR * width:
         return best
     elsewhere = _flattest(task, width)
-    found = None if elsewhere is None else _grown(task, tolerance, width, elsewhere, NARROW)
+    found = None if elsewhere is None else _grow_window(task, tolerance, width, elsewhere, NARROW)
     return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
 
 
@@ -97,7 +97,7 @@ def widest_of_all(task: SpringTask, tolerance: float) -> tuple[FittedWindow | No
     if found is None:
         return widest(task, tolerance), search.finished
     low, high = found
-    return _grown(task, tolerance * KEPT, high - low, 0.5 * (low + high), NARROW), search.finished
+    return _grow_window(task, tolerance * KEPT, high - low, 0.5 * (low + high), NARROW), search.finished
 
 
 class _Everywhere:
@@ -156,12 +156,12 @@ def _flattest(task: SpringTask, width: float) -> float | None:
     """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
     first, last = task.searched
     places = (first + (last - width - first) * k / (PLACES - 1) for k in range(PLACES))
-    found = [item for item in (_solved(task, low, low + width, COARSE) for low in places) if item is not None]
+    found = [item for item in (_solve_window(task, low, low + width, COARSE) for low in places) if item is not None]
     best = min(found, key=lambda item: item.deviation, default=None)
     return None if best is None else 0.5 * (best.low + best.high)
 
 
-def _grown(task: SpringTask, tolerance: float, width: float, middle: float, look: float) -> FittedWindow | None:
+def _grow_window(task: SpringTask, tolerance: float, width: float, middle: float, look: float) -> FittedWindow | None:
     """Return the widest window found from a width and a middle on, looking aside by a share of the width."""
     first, last = task.searched
     best: FittedWindow | None = None
@@ -211,10 +211,10 @@ def _best_place(task: SpringTask, width: float, middle: float, look: float) -> F
     first, last = task.searched
     room = last - width
     if room <= first:
-        return judged(task, first, last)
+        return evaluate_window(task, first, last)
 
     def deviation(low: float) -> float:
-        found = _solved(task, low, low + width, COARSE)
+        found = _solve_window(task, low, low + width, COARSE)
         return found.deviation if found else 1e300
 
     start = min(max(middle - 0.5 * width, first), room)
@@ -224,15 +224,15 @@ def _best_place(task: SpringTask, width: float, middle: float, look: float) -> F
     low = min([float(found.x), *ends], key=deviation) if ends else float(found.x)
     if look < 0.5 and min(abs(low - bracket[0]), abs(low - bracket[1])) < 1e-3 * width and low not in ends:
         return _best_place(task, width, low + 0.5 * width, 0.6)
-    return judged(task, low, low + width)
+    return evaluate_window(task, low, low + width)
 
 
-def judged(task: SpringTask, low: float, high: float) -> FittedWindow | None:
+def evaluate_window(task: SpringTask, low: float, high: float) -> FittedWindow | None:
     """Return the best springs for a window, judged on many places; None if there are none."""
-    return _solved(task, low, high, DENSE)
+    return _solve_window(task, low, high, DENSE)
 
 
-def _solved(task: SpringTask, low: float, high: float, count: int) -> FittedWindow | None:
+def _solve_window(task: SpringTask, low: float, high: float, count: int) -> FittedWindow | None:
     goal = task.goal((low, high), count)
     rates = None if goal is None else minimax(goal)
     if goal is None or rates is None or not math.isfinite(goal.deviation(rates)):

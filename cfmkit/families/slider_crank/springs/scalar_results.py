@@ -109,7 +109,7 @@ def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any
     )
 
 
-def _lost(solution: Solution, kind: str) -> FloatArray:
+def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     """Return what pins or guide take over the window, back and forth, (m,) [J]."""
     assert solution.ways is not None
     (forth, back), motion = solution.ways, solution.for_all(solution.motion)
@@ -126,7 +126,7 @@ def _lost(solution: Solution, kind: str) -> FloatArray:
 
 def _of_loop(what: str, kind: str) -> Function:
     def read(solution: Solution) -> FloatArray:
-        lost = {name: _lost(solution, name) for name in ("pins", "guide")}
+        lost = {name: _lost_energy(solution, name) for name in ("pins", "guide")}
         area = lost["pins"] + lost["guide"]
         share = np.where(area > 0, lost[kind] / area, np.nan)
         return np.where(np.isfinite(area), lost[kind] if what == "energy" else share, np.nan)

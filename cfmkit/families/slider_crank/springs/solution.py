@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
-from cfmkit.families.rows import rows_of, stacked
+from cfmkit.families.rows import rows_of, stack
 from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, scale_factors, signs
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
@@ -149,7 +149,7 @@ class Solution(ShortRepr):
     @cached_property
     def assembly(self) -> Assembly:
         """The mechanisms as rows."""
-        return stacked(self.assemblies)
+        return stack(self.assemblies)
 
     @cached_property
     def legs(self) -> FloatArray:

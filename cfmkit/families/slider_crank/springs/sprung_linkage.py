@@ -24,16 +24,16 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FREE, GuideFriction
-from cfmkit.families.rows import stacked
+from cfmkit.families.rows import stack
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import (
     SliderPath,
     UnitCurves,
-    along_crank,
     crank_efforts,
+    curves_along_crank,
     path_of,
 )
-from cfmkit.specs.units import between
+from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,7 +92,7 @@ class Assembly(ShortRepr):
     def units(self, motion: FloatArray) -> UnitCurves:
         """Return what unit springs do along the motion of the drive."""
         is_turned = self.drive == "torque"
-        plain = along_crank(self.linkage, self.unloaded, motion) if is_turned else self.path.units(motion)
+        plain = curves_along_crank(self.linkage, self.unloaded, motion) if is_turned else self.path.units(motion)
         if not np.any(self.anchor):
             return plain
         first, second = self._slider_rates(motion)
@@ -304,7 +304,7 @@ def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, floa
 def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] | None:
     """Return the window in which the effort is wanted constant, if the analysis states one [rad or m]."""
     window = spec.analysis.window
-    return None if window is None else between(window, asked_motion(spec, assembly))
+    return None if window is None else window_places(window, asked_motion(spec, assembly))
 
 
 def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
@@ -368,7 +368,7 @@ PLACES = 201
 """Of the window, over which the change of the effort is averaged."""
 
 
-def turned(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
+def turn_unloaded(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
     """Return an assembly whose unloaded angle is turned by some angle [rad], and by how much its travel is less there.
 
     Travel is counted from the unloaded position: the same place has a travel smaller by the second value [m]; 0 where
@@ -395,8 +395,8 @@ def mean_effort_per_angle(assemblies: Sequence[Assembly], low: Any, high: Any) -
     places = np.linspace(np.reshape(low, -1), np.reshape(high, -1), PLACES, axis=1)
     rows = []
     for step in (STEP, -STEP):
-        others, less = zip(*(turned(one, step) for one in assemblies), strict=True)
-        rows.append(stacked(others).forces(places - np.reshape(less, (-1, 1))))
+        others, less = zip(*(turn_unloaded(one, step) for one in assemblies), strict=True)
+        rows.append(stack(others).forces(places - np.reshape(less, (-1, 1))))
     with np.errstate(invalid="ignore"):  # at the end of the reach some efforts are unbounded
         change = (rows[0] - rows[1]) / (2.0 * STEP)
     return np.asarray(change.mean(axis=-1))

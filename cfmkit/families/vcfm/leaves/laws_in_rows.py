@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def stacked(laws: Sequence[T]) -> T:
+def stack_laws(laws: Sequence[T]) -> T:
     """Return laws of one kind as one law with a row for each; one alone is returned as it is, with plain numbers.
 
     Examples
@@ -33,7 +33,7 @@ def stacked(laws: Sequence[T]) -> T:
         return LawsOneByOne(tuple(laws))  # type: ignore[return-value]
     if not is_dataclass(first):
         return np.array(laws, dtype=float)[:, None]  # type: ignore[return-value]
-    columns = {item.name: stacked([getattr(law, item.name) for law in laws]) for item in fields(first)}
+    columns = {item.name: stack_laws([getattr(law, item.name) for law in laws]) for item in fields(first)}
     return type(laws[0])(**columns)
 
 
@@ -62,7 +62,7 @@ class LawsOneByOne:
     @cached_property
     def strip(self) -> Any:
         """The leaves' dimensions, a row each."""
-        return stacked([law.strip for law in self.laws])
+        return stack_laws([law.strip for law in self.laws])
 
     def force(self, travel: FloatArray) -> FloatArray:
         """Return the force of each leaf along the motion [N]."""

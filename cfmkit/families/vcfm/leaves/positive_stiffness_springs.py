@@ -199,13 +199,13 @@ class UShape(LeafSpring):
 
     def chain(self, section: Section) -> SpringChain:
         """Return one chain: two legs and the bend."""
-        from cfmkit.elastica import CLAMPED, Beam, Network, Node, arc, guided
+        from cfmkit.elastica import CLAMPED, Beam, Network, Node, arc, slider_support
 
         nodes = {
             "wall": Node(0, 0, CLAMPED),
             "low": Node(self.strip.length, 0),
             "high": Node(self.strip.length, 2.0 * self.radius),
-            "end": Node(0, 2.0 * self.radius, guided(0.5 * np.pi)),
+            "end": Node(0, 2.0 * self.radius, slider_support(0.5 * np.pi)),
         }
         beams = {
             "lower": Beam("wall", "low", section),
@@ -297,9 +297,9 @@ class StraightSpring(LeafSpring):
 
     def chain(self, section: Section) -> SpringChain:
         """Return one leaf, whose end is guided."""
-        from cfmkit.elastica import guided
+        from cfmkit.elastica import slider_support
 
-        return leaf_chain(self.strip, section, guided(0.5 * np.pi), 1.0, 2.0 * self.share)
+        return leaf_chain(self.strip, section, slider_support(0.5 * np.pi), 1.0, 2.0 * self.share)
 
     def edges(self, block: float, _corner: float, _fillet: float, top: float) -> Edges:
         """Return the edge of the right half, with its end block, and its lowest point [m]."""

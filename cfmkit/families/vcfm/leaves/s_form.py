@@ -88,14 +88,14 @@ def compliance(z: FloatArray) -> tuple[FloatArray, FloatArray]:
         slope = 0.25 * inverse * inverse * (rate + 2.0 * top * inverse * (0.5 * s + ds))
     pulled = z < -SERIES
     if pulled.any():
-        e[pulled], slope[pulled] = _pulled(z[pulled])
+        e[pulled], slope[pulled] = _tension_compliance(z[pulled])
     near = np.abs(z) <= SERIES
     if near.any():
         e[near], slope[near] = _series(z[near], _E), _series(z[near], _SLOPE)
     return e, slope
 
 
-def _pulled(z: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _tension_compliance(z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return `compliance` for tension: in terms of t = tanh(r)/r, which never overflows."""
     r = np.sqrt(-z)
     t = np.tanh(r) / r
