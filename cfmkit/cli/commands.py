@@ -93,7 +93,7 @@ def _unwrap_paragraphs(text: str) -> str:
 
     Examples
     --------
-    >>> _unwrapped("What it does.\\n\\nMore of it,\\nand the end.")
+    >>> _unwrap_paragraphs("What it does.\\n\\nMore of it,\\nand the end.")
     'What it does.\\n\\nMore of it, and the end.'
     """
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
@@ -161,7 +161,7 @@ def _spell_out_empty_values(arguments: list[str]) -> list[str]:
 
     Examples
     --------
-    >>> _spelled(["show", "--figure", "--json"])
+    >>> _spell_out_empty_values(["show", "--figure", "--json"])
     ['show', '--figure=', '--json']
     """
     followed = zip(arguments, [*arguments[1:], "-"], strict=False)

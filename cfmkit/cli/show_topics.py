@@ -253,7 +253,7 @@ def _symbols(name: str) -> list[Record]:
 
 
 def names() -> list[str]:
-    """Return every name that `found` knows, but for the paths of keys and symbols."""
+    """Return every name that `find_page` knows, but for the paths of keys and symbols."""
     return [name for records, _ in KINDS.values() for name in records() if "." not in name]
 
 

@@ -17,7 +17,7 @@ def round_within_bounds(values: FloatArray, bounds: FloatArray, digits: int, uni
 
     Examples
     --------
-    >>> rounded(np.array([0.12345, 0.98765]), np.array([[0.0, 1.0], [0.0, 0.98]]), 2)
+    >>> round_within_bounds(np.array([0.12345, 0.98765]), np.array([[0.0, 1.0], [0.0, 0.98]]), 2)
     array([0.12, 0.98])
     """
     whole = np.round(values, digits) if unit == 1.0 else np.round(values * unit, digits) / unit
@@ -40,7 +40,7 @@ def find_active_bounds(values: FloatArray, bounds: FloatArray, close: float, sha
 
     Examples
     --------
-    >>> at_bounds(np.array([0.5, 1.2, 2.0]), np.array([[0.5, 2.0]] * 3), 1e-6)
+    >>> find_active_bounds(np.array([0.5, 1.2, 2.0]), np.array([[0.5, 2.0]] * 3), 1e-6)
     array([-1,  0,  1])
     """
     low, high = bounds.T
@@ -57,7 +57,7 @@ def range_about(value: float, low: float | None = None, high: float | None = Non
 
     Examples
     --------
-    >>> around(4.0), around(4.0, low=3.5, high=4.0)
+    >>> range_about(4.0), range_about(4.0, low=3.5, high=4.0)
     ((3.0, 5.0), (3.5, 4.0))
     """
     reach = AROUND * abs(value)

@@ -8,7 +8,8 @@ Derivatives are exact where the family has them, and central differences elsewhe
 A step minimises, over such parts, the mean of the worst share of them (the conditional value at risk of the row that is
 missed most, counted in standard deviations of that row) [RU]. That is a linear program. It is followed as far as the
 numbers are trusted to be linear, judged anew where it ends, and repeated until the share that was wanted is reached,
-or no step gains. Where first order does not do, a few drawn parts are solved themselves, at every step (`drawn`).
+or no step gains. Where first order does not do, a few drawn parts are solved themselves, at every step
+(`optimise_on_samples`).
 
 Reference
 ---------

@@ -57,7 +57,7 @@ _HOMES = {
         "SlideSpring",
         "Support",
         "TorsionSpring",
-        "guided",
+        "slider_support",
     ),
     "model.section": ("Section", "Taper"),
     "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),

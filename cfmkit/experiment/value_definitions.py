@@ -36,7 +36,7 @@ def define_recorded_values(kind: str) -> dict[str, tuple[str, str]]:
 
     Examples
     --------
-    >>> recorded("torque")["torque_repeatability"][0]
+    >>> define_recorded_values("torque")["torque_repeatability"][0]
     'torque'
     """
     return {

@@ -144,7 +144,7 @@ def examine_families() -> tuple[tuple[entry_point_plugins.InstalledFamily | None
 
 
 def records() -> tuple[Family, ...]:
-    """Return all families that can be used, in the order of `names`; `skipped` says which cannot."""
+    """Return all families that can be used, in the order of `names`; `list_skipped` says which cannot."""
     return tuple(found for _, found in examine_families() if not isinstance(found, str))
 
 

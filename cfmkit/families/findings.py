@@ -145,7 +145,7 @@ def format_at_least(length: float) -> str:
 
     Examples
     --------
-    >>> at_least(0.0144645), at_most(0.1693794)
+    >>> format_at_least(0.0144645), format_at_most(0.1693794)
     ('14.47 mm', '169.3 mm')
     """
     return _round_digits(length, math.ceil)

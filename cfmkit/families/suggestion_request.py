@@ -116,7 +116,7 @@ def name_variant(variant: str, request: Request, block: MaterialBlock) -> str:
     Examples
     --------
     >>> request = Request("force", 1.0, 1.0, 1.0, False, 1.0, 0.1, (1.0, 1.0), ({"name": "pla"}, {"name": "pom"}))
-    >>> called("2 Vs", request, request.materials[1])
+    >>> name_variant("2 Vs", request, request.materials[1])
     '2 Vs, pom'
     """
     name = block.get("name") if len(request.materials) > 1 else None

@@ -96,7 +96,7 @@ def resolve_panels(
 
     Examples
     --------
-    >>> (bow,) = resolved(lambda x: np.abs(x - 0.3)[None, :], np.array([0.0, 1.0]), (1e-6,), 12)
+    >>> (bow,) = resolve_panels(lambda x: np.abs(x - 0.3)[None, :], np.array([0.0, 1.0]), (1e-6,), 12)
     >>> float(bow.at(np.array([0.75]))[0].round(12)), len(bow.ends) > 4
     (0.45, True)
     """

@@ -25,9 +25,9 @@ def remove_rounding(values: FloatArray) -> FloatArray:
 
     Examples
     --------
-    >>> levelled(np.array([0.3, np.nan, 0.1 + 0.2])).tolist()
+    >>> remove_rounding(np.array([0.3, np.nan, 0.1 + 0.2])).tolist()
     [0.3, nan, 0.3]
-    >>> levelled(np.array([0.3, 0.31])).tolist()
+    >>> remove_rounding(np.array([0.3, 0.31])).tolist()
     [0.3, 0.31]
     """
     if not is_level(values):

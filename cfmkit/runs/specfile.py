@@ -78,7 +78,7 @@ def split_address(change: str) -> tuple[str | None, str]:
 
     Examples
     --------
-    >>> addressed("cam:analysis.points=51"), addressed("analysis.points=51")
+    >>> split_address("cam:analysis.points=51"), split_address("analysis.points=51")
     (('cam', 'analysis.points=51'), (None, 'analysis.points=51'))
     """
     path = change.partition("=")[0]

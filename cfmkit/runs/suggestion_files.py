@@ -315,9 +315,9 @@ def _list_in_words(pairs: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> _listed({"force": "10 N", "ripple": 0.03, "envelope": ["80 mm", "60 mm"], "adjustable": ["8 N", "12 N"]})
+    >>> _list_in_words({"force": "10 N", "ripple": 0.03, "envelope": ["80 mm", "60 mm"], "adjustable": ["8 N", "12 N"]})
     'force 10 N, ripple 3 %, envelope 80 mm x 60 mm, adjustable 8 N to 12 N'
-    >>> _listed({"material": [{"name": "pla"}, {"name": "pom"}], "prefer": ["size", "ripple"]})
+    >>> _list_in_words({"material": [{"name": "pla"}, {"name": "pom"}], "prefer": ["size", "ripple"]})
     'material pla or pom, prefer size, ripple'
     """
     return ", ".join(f"{key.replace('_', ' ')} {_words(key, value)}" for key, value in pairs.items())

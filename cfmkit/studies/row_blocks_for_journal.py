@@ -198,7 +198,7 @@ def squeeze(values: FloatArray) -> str:
 
 
 def unsqueeze(text: str, rows: int, columns: int) -> FloatArray:
-    """Return the table that `squeezed` made a text of."""
+    """Return the table that `squeeze` made a text of."""
     data = base64.b64decode(text)
     order = np.frombuffer(data[:columns], dtype=np.uint8)
     planes = np.frombuffer(decompress(data[columns:]), dtype=np.uint8).reshape(columns, 8, rows)

@@ -69,7 +69,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     Returns
     -------
     SampledSlopes or None
-        None if `sampled` is None, and where the tangent is singular at a place.
+        None if `sample_poses` is None, and where the tangent is singular at a place.
     """
     # other nodes of a chain follow from its beams, and other stages from the first, through numbers that stay real
     copies = spec.mechanism.copies

@@ -90,7 +90,7 @@ def curves_along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, ben
 
 
 def crank_efforts(linkage: Linkage, unloaded: float, angle: FloatArray) -> FloatArray:
-    """Return the efforts of `along_crank`, (4, n), to the last bit, without anything else."""
+    """Return the efforts of `curves_along_crank`, (4, n), to the last bit, without anything else."""
     angle = np.asarray(angle, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         turn, position = _turns(linkage, unloaded, angle)

@@ -23,7 +23,7 @@ def stack_laws(laws: Sequence[T]) -> T:
     Examples
     --------
     >>> from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-    >>> stacked([Coils(100.0), Coils(200.0)]).force(0.1).tolist()
+    >>> stack_laws([Coils(100.0), Coils(200.0)]).force(0.1).tolist()
     [[10.0], [20.0]]
     """
     first: Any = laws[0]

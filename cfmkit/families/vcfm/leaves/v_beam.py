@@ -169,7 +169,7 @@ class VBeam(LeafLaw):
 
     @property
     def overrating(self) -> Any:
-        """By what share the law overestimates the largest stress at most (`overrated`)."""
+        """By what share the law overestimates the largest stress at most (`stress_overestimate`)."""
         return stress_overestimate(self.strip.angle)
 
     def bent_line(self, travel: float) -> FloatArray:
