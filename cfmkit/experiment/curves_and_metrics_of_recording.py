@@ -161,7 +161,7 @@ def read_measured(
     units : str, optional
         Likewise.
     tare, zero, flip
-        As for `cfmkit.experiment.zeros_and_signs.corrected`.
+        As for `cfmkit.experiment.zeros_and_signs.correct_recording`.
     cycles : str, optional
         Which are measured: ``"2:5"``.
     group : str, optional

@@ -270,30 +270,14 @@ def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """Outcome of a batch.
+    """Outcome of a batch."""
 
-    Attributes
-    ----------
-    entries : tuple of Entry
-        One per specification, in their order.
-    exit_code : ExitCode
-        The worst of them: what the command would return.
-    folder : str
-        The output folder; each specification has one of its own below.
-    files : tuple of str
-        What was written there.
-    compared : BatchComparison or None
-        With an earlier batch.
-    accepted : str
-        The folder of the reference that has these results now; empty if none was to be replaced.
-    """
-
-    entries: tuple[Entry, ...]
-    exit_code: ExitCode
-    folder: str
-    files: tuple[str, ...]
-    compared: BatchComparison | None = None
-    accepted: str = ""
+    entries: tuple[Entry, ...]  # one per specification, in their order
+    exit_code: ExitCode  # the worst of them: what the command would return
+    folder: str  # the output folder; each specification has one of its own below
+    files: tuple[str, ...]  # what was written there
+    compared: BatchComparison | None = None  # with an earlier batch
+    accepted: str = ""  # the folder of the reference that has these results now; empty if none was to be replaced
 
     def __post_init__(self) -> None:
         """Keep the texts of what is inside short."""

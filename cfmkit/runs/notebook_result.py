@@ -121,7 +121,7 @@ class SuggestionsView(Suggestions):
 
     def __repr__(self) -> str:
         """Return the proposals in a line: family and variant of the first ten."""
-        from cfmkit.runs.suggestion_files import message
+        from cfmkit.runs.suggestion_record import message
 
         listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
         return f"<Suggestions: {'; '.join([message(self), *listed])}>"
@@ -130,7 +130,7 @@ class SuggestionsView(Suggestions):
         """Return what a notebook shows."""
         from cfmkit.documents.notebook import show_html
         from cfmkit.documents.suggestion_document import document_of
-        from cfmkit.runs.suggestion_files import as_json, exit_code
+        from cfmkit.runs.suggestion_record import as_json, exit_code
         from cfmkit.studies.suggest.figures import to_one_scale
 
         assert self.block is not None  # `of`

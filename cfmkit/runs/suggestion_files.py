@@ -1,4 +1,4 @@
-"""Output of `suggest`: a folder for each proposal, table, figures, page, metrics.json; the exit code."""
+"""Files of `suggest`: a folder for each proposal, table, figures, page, metrics.json."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.documents import html
 from cfmkit.documents.suggestion_document import document_of
-from cfmkit.errors import ExitCode
-from cfmkit.specs.units import format_short, to_border
+from cfmkit.runs.suggestion_record import COLUMNS, as_json, exit_code, folder_name, with_force
+from cfmkit.specs.units import format_short
 from cfmkit.studies.pool import give_up_at
-from cfmkit.studies.serial_and_cluster_executors import BUG
 from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
@@ -20,27 +19,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.designing.run_many_starts import Clock
+    from cfmkit.errors import ExitCode
     from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import SuggestBlock
-
-
-COLUMNS: Mapping[str, tuple[str, str]] = {
-    "mean": ("", ""),
-    "ripple": ("ratio", "1"),
-    "hysteresis": ("ratio", "1"),
-    "safety_factor": ("ratio", "1"),
-    "across": ("length", "mm"),
-    "along": ("length", "mm"),
-    "depth": ("length", "mm"),
-    "parts": ("count", ""),
-    "life": ("ratio", "1"),
-    "yield": ("ratio", "1"),
-    "stiffening": ("ratio", "1"),
-}
-"""What is reported of each proposal: its dimension and the unit of the files."""
 
 
 @dataclass(frozen=True)
@@ -49,125 +33,6 @@ class Deadlines:
 
     figures: Clock  # of the search and of proposals whose turn comes after it
     files: Clock  # of proposals, all but ``design.yaml``
-
-
-def numbers_in_border_units(proposal: Proposal) -> dict[str, Any]:
-    """Return a proposal's numbers in border units, by the name of its column."""
-    found: dict[str, Any] = {}
-    for name, value in proposal.numbers.items():
-        dimension = COLUMNS[name][0] or "ratio"
-        found[name] = (
-            None if value is None else float(to_border(value, dimension)) if dimension != "count" else int(value)
-        )
-    return found
-
-
-def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
-    """Return the same with the mean in N or N*mm."""
-    mean = proposal.numbers.get("mean")
-    return numbers_in_border_units(proposal) | {
-        "mean": None if mean is None else float(to_border(mean, found.request.kind))
-    }
-
-
-STATUSES = {
-    ExitCode.OK: "complete",
-    ExitCode.PARTIAL: "partial",
-    ExitCode.NO_SOLUTION: "infeasible",
-    ExitCode.BUG: "crashed",
-}
-"""What metrics.json says of each end."""
-
-
-def exit_code(found: Suggestions) -> ExitCode:
-    """Return 0 if a proposal does all that is required, 70 if a bug ended all, 6 if not all was judged, else 4."""
-    if found.proposals:
-        return ExitCode.OK
-    reasons = [one.offer.reason for one in found.answers if one.offer.reason]
-    reasons += [reason for each in found.failed.values() for reason in each]
-    if found.bugs and not found.near and all(reason.startswith(BUG) for reason in reasons):
-        return ExitCode.BUG
-    return ExitCode.PARTIAL if found.late or found.unjudged else ExitCode.NO_SOLUTION
-
-
-def folder_name(number: int, proposal: Proposal) -> str:
-    """Return the folder of a proposal: ``1-vcfm-2-vs``."""
-    words = "".join(letter if letter.isalnum() else "-" for letter in proposal.variant.lower())
-    return f"{number}-{proposal.family}-" + "-".join(word for word in words.split("-") if word)
-
-
-def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
-    """Return what metrics.json and ``--json`` say."""
-    code = exit_code(found)
-    return {
-        "status": STATUSES[code],
-        "message": message(found),
-        "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
-        "order": list(block.prefer),
-        "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
-        "unjudged": [
-            _record(found, one, number) for number, one in enumerate(found.unjudged, len(found.proposals) + 1)
-        ],
-        "near_misses": [_record(found, one) for one in found.near],
-        "families": [
-            {
-                "family": one.family,
-                "candidates": len(one.offer.candidates),
-                "made": one.made,
-                "proposals": sum(each.family == one.family for each in found.proposals),
-                "reason": _reason(found, one.family, one.offer.reason),
-                "nearest": dict(one.nearest),
-            }
-            for one in found.answers
-        ],
-        "warnings": list(_warnings(found)),
-    }
-
-
-def message(found: Suggestions) -> str:
-    """Return how it ended, in one sentence."""
-    if found.proposals:
-        late = "; the time budget ended the search before everything was tried" if found.late else ""
-        count = len(found.proposals)
-        more = f", {len(found.unjudged)} more not judged in full" if found.unjudged else ""
-        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the requirements{more}{late}"
-    if exit_code(found) is ExitCode.BUG:
-        return "bugs in cfmkit ended every candidate"
-    if found.unjudged:
-        count = len(found.unjudged)
-        late = "; increase the time budget (--time-budget)" if found.late else ""
-        were = "was" if count == 1 else "were"
-        return f"no mechanism is known to meet the requirements, {count} {were} not judged in full{late}"
-    if found.late:
-        return "the time budget ended the search before a mechanism met the requirements; increase it (--time-budget)"
-    return "no mechanism meets the requirements"
-
-
-def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
-    if out_of_reach or any(one.family == name for one in found.listed):
-        return out_of_reach
-    untried = sum(len(one.offer.candidates) for one in found.answers if one.family == name and not one.made)
-    if untried:
-        return f"none of its {untried} candidates was tried in the time"
-    near = [one.missed[0] for one in found.near if one.family == name]
-    return (near or list(found.failed.get(name, ())) or [""])[0]
-
-
-def _warnings(found: Suggestions) -> Iterator[dict[str, str]]:
-    if found.late and found.listed:
-        yield {
-            "name": "search_cut_short",
-            "message": "the time budget ended the search: increase it with --time-budget",
-        }
-
-
-def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
-    about = {"family": one.family, "variant": one.variant, **with_force(found, one)}
-    place = {} if number is None else {"folder": folder_name(number, one)}
-    judged = {
-        "verdict": one.verdict, "model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings),
-    }  # fmt: skip
-    return about | place | judged | {"misses": list(one.missed), "notes": list(one.notes)}
 
 
 def files(

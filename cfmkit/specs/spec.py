@@ -440,7 +440,11 @@ def _set_value(data: Any, parts: list[str], value: Any, path: str) -> Any:
         items[int(head)] = _set_value(items[int(head)], rest, value, path) if rest else frozen(value)
         return tuple(items)
     if isinstance(data, Model):
+        # a block that was filled in, as an assumed law of the material, is stated from now on
+        filled = getattr(data, head, None) if rest else None
         data = keys_of(data)
+        if head not in data and isinstance(filled, Model | tuple):
+            data = {**data, head: filled}
     if data is not None and not isinstance(data, Mapping):
         raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
     block = dict(data or {})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 from cfmkit.tables import Table, TableColumn, text_column
@@ -39,4 +40,8 @@ def parts_table(parts: Sequence[ListedPart]) -> Table:
 
 def parts_tables(parts: Callable[[], Iterable[ListedPart]]) -> dict[str, Callable[[], Table]]:
     """Return the list as a result carries it, computed when it is written."""
-    return {"parts": lambda: parts_table(tuple(parts()))}
+    return {"parts": partial(_parts_table_of, parts)}
+
+
+def _parts_table_of(parts: Callable[[], Iterable[ListedPart]]) -> Table:
+    return parts_table(tuple(parts()))

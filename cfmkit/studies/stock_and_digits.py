@@ -111,7 +111,7 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
     if not leaves or all(is_whole(size, nozzle) for size in leaves.values()):
         return outcome
     neighbours = [{path: _whole(size, nozzle, rank) for path, size in leaves.items()} for rank in (0, 1)]
-    before = _outcomes(outcome.spec, run)
+    before, _ = _outcomes(outcome.spec, run)
     words = "; ".join(strands_in_words(size, nozzle) for size in dict.fromkeys(leaves.values()))
     for changes in neighbours:
         try:
@@ -121,7 +121,7 @@ def with_whole_strands(original: Spec, outcome: Design, finish: Callable[[Spec],
             spec = None if again.spec is None else again.spec.replace({**changes, **stated})
         except SpecError:
             continue
-        if spec is None or any(was and not now for was, now in zip(before, _outcomes(spec, run), strict=True)):
+        if spec is None or any(was and not now for was, now in zip(before, _outcomes(spec, run)[0], strict=True)):
             continue
         means = [_mean(family(entry.family).analyze(entry, run)) or math.nan for entry in (outcome.spec, spec)]
         if not abs(means[1] / means[0] - 1.0) <= MOST_CHANGE:
@@ -200,7 +200,8 @@ def decimals_of(accuracy: ProcessAccuracy) -> int:
 def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
     """Return a design whose chosen lengths and angles have the digits that its process can hold.
 
-    Where the rounded design would miss a requirement that it meets unrounded, its digits are refined. Where rates of
+    Where the rounded design would miss a requirement that it meets unrounded, or warn of something new, its digits are
+    refined. Where rates of
     springs are chosen, they are chosen again for the rounded lengths: `finish` designs a specification.
     """
     if outcome.spec is None:
@@ -222,10 +223,11 @@ def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Sp
                 spec = again.spec.replace(changes)
         except SpecError:  # values that must agree with others to more digits
             continue
-        outcomes = _outcomes(spec, run)
-        if not all(outcomes):
-            before = _outcomes(outcome.spec, run) if before is None else before
-        if all(now or not then for now, then in zip(outcomes, before or outcomes, strict=True)):
+        met, warned = _outcomes(spec, run)
+        if before is None and not (all(met) and not warned):
+            before = _outcomes(outcome.spec, run)
+        was_met, was_warned = before or (met, warned)
+        if all(now or not then for now, then in zip(met, was_met, strict=True)) and warned <= was_warned:
             return replace(outcome, spec=spec)
     return outcome
 
@@ -262,11 +264,10 @@ def _in_digits(text: str, decimals: int) -> str:
     return text if float(short) == 0.0 else f"{short} {unit}"
 
 
-def _outcomes(spec: Spec, run: Run) -> list[bool]:
-    """Return whether a design is solved to its end, and meets each of its requirements on one part."""
-    if not spec.requirements:
-        return []
+def _outcomes(spec: Spec, run: Run) -> tuple[list[bool], set[str]]:
+    """Return whether a design is solved to its end and meets each requirement on one part; names of its warnings."""
     record = family(spec.family)
     result = record.analyze(spec, run)
     met = check(spec.part_requirements, result, values_of_family(record.values))
-    return [result.status is Status.COMPLETE, *(bool(entry.ok) for entry in met)]
+    reached = [result.status is Status.COMPLETE, *(bool(entry.ok) for entry in met)]
+    return reached, {entry.name for entry in result.warnings}

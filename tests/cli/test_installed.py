@@ -44,8 +44,8 @@ OWN = ("manifest.json", ".cfmkit-journal.sqlite")
 """Files that hold the time, the first, and the hash of such a file, the second."""
 
 
-ELSEWHERE = {"explore", "suggest"}
-"""Listens until it is stopped (tests/unit/test_explorer.py, tests/browser); searches for seconds."""
+ELSEWHERE = {"explore", "suggest", "correct"}
+"""Listens until it is stopped (tests/unit/test_explorer.py, tests/browser); searches for seconds; needs a recording."""
 
 
 def test_every_verb_is_tried():

@@ -86,7 +86,7 @@ def test_a_failed_point_is_a_row_without_values():
     [
         (lambda: cfmkit.sweep(CAM), cfmkit.UsageError, "nothing to vary"),
         (lambda: cfmkit.sweep(CAM, vary={RADIUS: [8.0]}), cfmkit.SpecError, "has no unit"),
-        (lambda: cfmkit.sweep(CAM, vary={RADIUS: "8 mm:9 mm:3"}, points=3), cfmkit.SpecError, "points"),
+        (lambda: cfmkit.sweep(CAM, vary={RADIUS: "8 mm:9 mm:3"}, points=3), TypeError, "points"),
         (lambda: cfmkit.sweep(CAM, seed=-1), cfmkit.UsageError, "seed"),
         (lambda: cfmkit.sweep(CAM, jobs=0, vary={RADIUS: "8 mm:9 mm:3"}), cfmkit.UsageError, "jobs"),
         (lambda: cfmkit.sensitivity(CAM), cfmkit.UsageError, "nothing to vary"),

@@ -106,3 +106,10 @@ def take_gravity_of_the_note(monkeypatch):
     """Compute with the 9.81 m/s^2 for which the reference note's numbers hold, not with the standard value."""
     for module in ("machine_from_spec", "scalar_results"):
         monkeypatch.setattr(f"cfmkit.families.cam.dynamics.{module}.GRAVITY", 9.81)
+
+
+def design_exactly(spec):
+    """Return the specification that the family designs, before its digits are those of the process."""
+    found = family(spec.family).design(spec, Run())
+    assert found.spec is not None, found.message
+    return found.spec

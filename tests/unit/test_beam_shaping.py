@@ -390,7 +390,7 @@ def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -
     flat = Found(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
     for name in ("searched", "searched_far"):
         monkeypatch.setattr(multistart, name, lambda _task, _seed, _index, plan: flat)
-    for name in ("widened", "nearer", "refined"):
+    for name in ("widen", "nearer", "refine"):
         monkeypatch.setattr(multistart, name, lambda _task, found, _plan: found)
     monkeypatch.setattr(multistart, "audited", lambda _variables, _found: None)
     told: list[float] = []

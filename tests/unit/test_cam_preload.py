@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cam_support import analyze, cam
+from cam_support import analyze, cam, design_exactly
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -17,7 +17,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 @pytest.fixture(scope="module")
 def tight():
     """Return the designed cam of the published springs, tight at the start."""
-    return cfmkit.design(cfmkit.load(CONFIGS / "cam_preloaded.yaml")).spec
+    return design_exactly(cfmkit.load(CONFIGS / "cam_preloaded.yaml"))
 
 
 def ends(spec, **changes):
@@ -70,7 +70,7 @@ def test_a_profile_cut_for_friction_is_exact_on_its_way(friction):
         {"design.friction": friction, "mechanism.rolling_friction": abs(friction)}
     )
     way = 0 if friction > 0 else 1
-    found = cfmkit.design(spec).spec
+    found = design_exactly(spec)
     assert found.mechanism.springs.preload > 0
     np.testing.assert_allclose(ends(found)[way], 50.0, rtol=1e-9)
 

@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, add_
 from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.runs.read_suggest_file import read_request
-from cfmkit.runs.suggestion_files import exit_code, message
+from cfmkit.runs.suggestion_record import exit_code, message
 from cfmkit.specs.units import TravelShare
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring

@@ -19,7 +19,8 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.read_suggest_file import read_request
-from cfmkit.runs.suggestion_files import as_json, exit_code, table
+from cfmkit.runs.suggestion_files import table
+from cfmkit.runs.suggestion_record import as_json, exit_code
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.studies.parts.assumed_errors import assume_errors
 from cfmkit.studies.parts.near_parts import expected_shares

@@ -131,7 +131,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     from cfmkit.documents import suggestion_document
     from cfmkit.documents.document import Written, with_skipped_families
     from cfmkit.families.run_control import Run
-    from cfmkit.runs import suggestion_files
+    from cfmkit.runs import suggestion_files, suggestion_record
     from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.runs.run import long_run
     from cfmkit.store import RunFolder
@@ -162,7 +162,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
                 found, block, working, not options.no_plots, deadlines, command
             ):
                 folder.write(name, content)
-        code = suggestion_files.exit_code(found)
+        code = suggestion_record.exit_code(found)
         manifest = folder.commit(
             {
                 "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,
@@ -171,7 +171,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
             }
         )  # fmt: skip
     written = Written(out, (*manifest.files, "manifest.json"), time.perf_counter() - start)
-    data = suggestion_files.as_json(found, block) | written.data | {"reused": found.reused}
+    data = suggestion_record.as_json(found, block) | written.data | {"reused": found.reused}
     complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
     document = replace(
         suggestion_document.document_of(data, code, written),

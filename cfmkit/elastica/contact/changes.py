@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.equations import with_closed
 from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
-from cfmkit.elastica.contact.side_gaps import Stage, carry
+from cfmkit.elastica.contact.side_gaps import LoadStage, carry
 from cfmkit.elastica.contact.terms import gaps, measure
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -109,7 +109,7 @@ class PieceOfPath:
     def carry(self, at: PathEquilibrium, beyond: PieceOfPath) -> PathEquilibrium:
         """Return an equilibrium in the unknowns of another piece, but for forces and places of sides."""
         z, old, new = self.whole.values(at.x, at.drive), self.whole.mesh, beyond.whole.mesh
-        moved = carry(old, z, Stage.from_problem(self.whole, np.array([at.drive])), new)
+        moved = carry(old, z, LoadStage.from_problem(self.whole, np.array([at.drive])), new)
         kept = {(contact.number, k): contact for k, contact in self._enumerate_contacts(old)}
         for k, contact in self._enumerate_contacts(new):
             same = kept.get((contact.number, k))
@@ -186,7 +186,7 @@ class PieceOfPath:
         spread_values = np.empty((len(mesh.contacts) + len(self.sides.all), len(z)))
         for number, contact in enumerate(mesh.contacts):
             spread_values[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
-        spread_values[len(mesh.contacts) :] = self.sides.values(z, Stage.from_problem(self.whole, drives))
+        spread_values[len(mesh.contacts) :] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
         return spread_values
 
     def row_value(self, at: PathEquilibrium, number: int) -> float:
@@ -195,7 +195,7 @@ class PieceOfPath:
         z = self.whole.values(at.x, at.drive)[None]
         if number >= len(mesh.contacts):
             condition = self.sides.all[number - len(mesh.contacts)]
-            return float(self.sides.value(condition, z, Stage.from_problem(self.whole, drives))[0])
+            return float(self.sides.value(condition, z, LoadStage.from_problem(self.whole, drives))[0])
         contact = mesh.contacts[number]
         return float(z[0, contact.unknown] if number in self.closed else gaps(mesh, contact, z)[0])
 

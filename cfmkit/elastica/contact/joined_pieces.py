@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.side_gaps import Stage, carry
+from cfmkit.elastica.contact.side_gaps import LoadStage, carry
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.march import equations
@@ -65,7 +65,7 @@ def join_pieces(
         used = _match_slots(sequence, slots)
         before = [contact for contact in piece.mesh.contacts if contact.slide >= 0]
         for z, drive in zip(piece.z, piece.drive.tolist(), strict=True):
-            joined = carry(piece.mesh, z, Stage(np.array([drive])), mesh, places[count])
+            joined = carry(piece.mesh, z, LoadStage(np.array([drive])), mesh, places[count])
             for contact, slot in zip(before, used, strict=True):
                 joined[sides[slot].unknown] = max(float(z[contact.unknown]), 0.0)
                 joined[sides[slot].flag] = contact.laid

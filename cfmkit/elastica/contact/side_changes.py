@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween, describe
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
 from cfmkit.elastica.contact.side_conditions import NEW_PLACE
-from cfmkit.elastica.contact.side_gaps import Stage
+from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import NodeOnObstacle
@@ -99,7 +99,7 @@ def _locate_touch(
     if _is_parallel(piece, condition, guess):
         return PathStop(WhyStopped.LOST, guess.drive, MEETS_WHOLE.format(names=describe(condition.item)))
     for _ in range(2):
-        stage = Stage.from_problem(piece.whole, np.array([guess.drive]))
+        stage = LoadStage.from_problem(piece.whole, np.array([guess.drive]))
         least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
         between = _contact_around(piece, condition, least.parameter)
         if between is not None:
@@ -131,7 +131,7 @@ def _locate_touch(
 
 
 def _is_parallel(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> bool:
-    stage = Stage.from_problem(piece.whole, np.array([at.drive]))
+    stage = LoadStage.from_problem(piece.whole, np.array([at.drive]))
     return piece.sides.gaps_of(condition.item).is_parallel(piece.whole.values(at.x, at.drive), stage)
 
 

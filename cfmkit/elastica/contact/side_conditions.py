@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.side_gaps import SideGaps, Stage
+from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
 from cfmkit.elastica.mechanics.polynomials import shape_functions
@@ -157,11 +157,11 @@ class SideConditions:
         """By how much each may be negative."""
         return np.array([ROUNDING_OF_KIND[condition.kind] for condition in self.all])
 
-    def values(self, z: FloatArray, stage: Stage) -> FloatArray:
+    def values(self, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of all conditions in n states (n, size), (conditions, n)."""
         return np.array([self.value(condition, z, stage) for condition in self.all]).reshape(len(self.all), len(z))
 
-    def value(self, condition: SideCondition, z: FloatArray, stage: Stage) -> FloatArray:
+    def value(self, condition: SideCondition, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of a condition in n states, (n,)."""
         if condition.kind == "touch":
             return self.gaps_of(condition.item).least(z, stage)

@@ -43,23 +43,25 @@ class SideStates(NamedTuple):
     parameter: Any
 
 
-class Stage(NamedTuple):
+class LoadStage(NamedTuple):
     """Places of n states on the way: the drive (n,), and the share of what is constant, (n, 1, 1) or 1."""
 
     drive: FloatArray
     share: Any = 1.0
 
     @classmethod
-    def from_problem(cls, problem: NetworkProblem, ways: FloatArray) -> Stage:
+    def from_problem(cls, problem: NetworkProblem, ways: FloatArray) -> LoadStage:
         """Return the stage at places of the way of a problem, (n,)."""
         return cls(np.zeros(len(ways)), ways[:, None, None]) if problem.ramp else cls(ways)
 
-    def take(self, some: Any) -> Stage:
+    def take(self, some: Any) -> LoadStage:
         """Return the stage of some of the states."""
-        return Stage(self.drive[some], self.share if np.isscalar(self.share) else self.share[some])
+        return LoadStage(self.drive[some], self.share if np.isscalar(self.share) else self.share[some])
 
 
-def side_states(mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> SideStates:
+def side_states(
+    mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
+) -> SideStates:
     """Return the states at fractions (k,) of elements (m,) in n states (n, size); contacts stand at their places."""
     moved = with_places(mesh, z)
     whole, rule, at = moved.elements, basis(mesh.degree), _rows_at(mesh.degree, fractions)
@@ -160,7 +162,9 @@ class SideGaps:
         sides = [self.half_thickness(parameter + step, element) for step in (PLACE_STEP, -PLACE_STEP)]
         return (sides[0] - sides[1]) / (2 * PLACE_STEP) / (fitted.speed(parameter, inside) / mesh.scales.length)
 
-    def measure(self, z: FloatArray, stage: Stage, elements: Any, fractions: FloatArray) -> tuple[Any, Any, SideStates]:
+    def measure(
+        self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
+    ) -> tuple[Any, Any, SideStates]:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
         values = self.item.outline.distance(seen.place * self.mesh.scales.length)
@@ -172,11 +176,11 @@ class SideGaps:
         slope = slope - np.stack(taper, axis=1)
         return values.value / self.mesh.scales.length - half, slope, seen
 
-    def is_parallel(self, z: FloatArray, stage: Stage) -> bool:
+    def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
         return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
 
-    def least(self, z: FloatArray, stage: Stage) -> FloatArray:
+    def least(self, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
 
         It is exact where it is below `NEAR_GAP`, and above it otherwise.
@@ -187,7 +191,7 @@ class SideGaps:
             values[state] = min(values[state], value + self.slack[row])
         return np.asarray(values)
 
-    def find_least(self, z: FloatArray, stage: Stage) -> LeastGap:
+    def find_least(self, z: FloatArray, stage: LoadStage) -> LeastGap:
         """Return the least gap of one state (size,) exactly: where the side is parallel to the obstacle."""
         gap, rows, seen = self._dips(z[None], stage)
         slack = self.slack[:, None]
@@ -204,7 +208,7 @@ class SideGaps:
                 best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
         return least
 
-    def _dips(self, z: FloatArray, stage: Stage) -> tuple[Any, _Dips, SideStates]:
+    def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
         gap, slope, seen = self.measure(z, stage, self.elements, self.fractions)
         step = -np.diff(seen.ahead, axis=-1)
@@ -220,7 +224,7 @@ class SideGaps:
         state, row, place = dips_near
         return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
 
-    def _refine(self, z: FloatArray, stage: Stage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
+    def _refine(self, z: FloatArray, stage: LoadStage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
         """Return the least gaps of dips and their places on their elements, where the slope is zero (Illinois)."""
         a, b = self.fractions[dips.place], self.fractions[dips.place + 1]
         low, high = dips.low.copy(), dips.high.copy()
@@ -241,7 +245,7 @@ class SideGaps:
                 a[indices], b[indices] = np.where(below, middle, a[indices]), np.where(below, b[indices], middle)
         return value, best
 
-    def _take_element(self, z: FloatArray, stage: Stage, element: int) -> _ElementStates:
+    def _take_element(self, z: FloatArray, stage: LoadStage, element: int) -> _ElementStates:
         """Return what gaps at places of an element are made of, in n states."""
         moved = with_places(self.mesh, z)
         e, count = moved.elements, len(z)
@@ -304,11 +308,11 @@ class _Beside(NamedTuple):
 
 def least_side_gaps(mesh: Discretisation, item: BeamOnObstacle, z: FloatArray, drive: FloatArray) -> FloatArray:
     """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
-    return SideGaps(mesh, item, ()).least(z, Stage(drive))
+    return SideGaps(mesh, item, ()).least(z, LoadStage(drive))
 
 
 def carry(
-    old: Discretisation, z: FloatArray, stage: Stage, new: Discretisation, places: FloatArray | None = None
+    old: Discretisation, z: FloatArray, stage: LoadStage, new: Discretisation, places: FloatArray | None = None
 ) -> FloatArray:
     """Return a state (size,) of a network on other elements of the same degree: fields are evaluated anew.
 
@@ -369,7 +373,7 @@ def _origin(mesh: Discretisation, place: int) -> FloatArray:
 
 
 def _sample(
-    mesh: Discretisation, z: FloatArray, stage: Stage, elements: Any, cuts: FloatArray, at: FloatArray
+    mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, cuts: FloatArray, at: FloatArray
 ) -> tuple[Any, Any, Any]:
     """Return place, rotation and section force of a beam at parameters, (m, 2), (m,), (m, 2)."""
     place, turn, force = np.empty((len(at), 2)), np.empty(len(at)), np.empty((len(at), 2))

@@ -11,7 +11,7 @@ import numpy as np
 
 from cfmkit.arrays import LazyMapping
 from cfmkit.curves import Column
-from cfmkit.elastica.contact.side_gaps import SideGaps, Stage
+from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
@@ -71,7 +71,7 @@ def refuse_sides_in_obstacles(assembly: Assembly) -> None:
     mesh = discretise(network, assembly.drive())
     rest = np.zeros((1, mesh.size))
     for contact in sides:
-        least = SideGaps(mesh, contact, ()).find_least(rest[0], Stage(np.zeros(1)))
+        least = SideGaps(mesh, contact, ()).find_least(rest[0], LoadStage(np.zeros(1)))
         depth = -least.gap * mesh.scales.length
         if depth > OVERLAP * mesh.scales.length:
             place = float(np.ravel(mesh.fits[contact.beam].arc(least.parameter))[0])

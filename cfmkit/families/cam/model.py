@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
+    from cfmkit.stock.parts_list import ListedPart
 
 UNLIKE = (
     "the quasi-static model is symmetric and would give the force of two right sides: add 'analysis.dynamics' with a "
@@ -122,7 +123,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         closed=loop,
         effort_error=solution.effort_error,
         part_efforts=loop.part_efforts,
-        tables=parts_tables(lambda: hardware(solution).parts),
+        tables=parts_tables(partial(_hardware_parts, solution)),
         state=solution,
     )
 
@@ -155,6 +156,10 @@ def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     travel = _requested_travel(solution, short=False)
     analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
     return spec.model_copy(update={"analysis": analysis})
+
+
+def _hardware_parts(solution: Solution) -> tuple[ListedPart, ...]:
+    return tuple(hardware(solution).parts)
 
 
 def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -> Solution:

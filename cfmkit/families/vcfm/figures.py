@@ -63,7 +63,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a result, by file stem; empty if nothing was solved."""
     if result.state is None or not result.curves:
         return {}
-    makers = [force, draw_split_forces, stress, mechanism]
+    makers = [force, split, stress, mechanism]
     if len(result.curves) > 1:
         makers += [preloads, from_rest, adjustability]
     if result.spec.at("analysis.fidelity") == "solid":
@@ -87,7 +87,7 @@ def _range_beyond(solution: Solution) -> tuple[MarkedRange, ...]:
     return (MarkedRange(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
 
 
-def draw_split_forces(result: Result) -> Figure:
+def split(result: Result) -> Figure:
     """Return what leaves and spring give, their sum, and the paper's law of the leaves [D, Fig. 3 and 11]."""
     solution: Solution = result.state
     push = solution.first

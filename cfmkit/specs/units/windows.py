@@ -111,8 +111,10 @@ def window_places(ends: Ends, travel: tuple[float, float]) -> tuple[float, float
 
     Examples
     --------
-    >>> window_places((TravelShare(0.25), TravelShare(1.0)), (0.0, 0.2)), window_places((0.002, TravelShare(1.0)), (0.0, -0.2))
-    ((0.05, 0.2), (-0.2, 0.002))
+    >>> window_places((TravelShare(0.25), TravelShare(1.0)), (0.0, 0.2))
+    (0.05, 0.2)
+    >>> window_places((0.002, TravelShare(1.0)), (0.0, -0.2))
+    (-0.2, 0.002)
     """
     start, stop = travel
     places = [start + float(end) * (stop - start) if isinstance(end, TravelShare) else float(end) for end in ends]

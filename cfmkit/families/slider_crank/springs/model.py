@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.results import Finding
+    from cfmkit.stock.parts_list import ListedPart
 
 
 Ends = tuple[float, float]
@@ -97,7 +98,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         closed=model,
         effort_error=float(solution.effort_error[0]),
         part_efforts=model.part_efforts,
-        tables=parts_tables(lambda: hardware(spec, solution).parts),
+        tables=parts_tables(partial(_hardware_parts, spec, solution)),
         state=solution,
     )
 
@@ -107,6 +108,10 @@ def _findings(solution: Solution, shortfalls: Sequence[Finding]) -> Iterator[Fin
     said = {item.name for item in shortfalls}
     found = findings_of_one(rules_of(solution), finding, solution)
     yield from (item for item in found if item.name not in said)
+
+
+def _hardware_parts(spec: SliderCrankSpec, solution: Solution) -> tuple[ListedPart, ...]:
+    return tuple(hardware(spec, solution).parts)
 
 
 def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
