@@ -180,19 +180,8 @@ class SolidSolution(ShortRepr):
 def analyze(spec: BeamSpec, run: Run) -> Result:
     """Return the force-displacement curve of the part as drawn, with everything that is wrong with it.
 
-    Parameters
-    ----------
-    spec : BeamSpec
-        The mechanism; its node is moved or turned, or a force or a moment acts on it.
-    run : Run
-        Its progress is reported.
-
-    Returns
-    -------
-    Result
-        PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
+    PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
-
     try:
         assembly, solved = _solve_part(spec, run)
     except GeometryError as error:
