@@ -395,8 +395,15 @@ class Spec(Model):
             raise spec_error(error, type(self), whole) from None
 
     def leaves(self) -> Iterator[tuple[str, float | int]]:
-        """Yield every numeric leaf of the mechanism and its analysis as (dotted path, SI value)."""
-        yield from _leaves(self.model_dump(exclude_none=True, exclude={"sweep", "sensitivity"}), "")
+        """Yield every numeric leaf of the mechanism and its analysis as (dotted path, SI value).
+
+        Laws that are assumed of a named material are none of the specification's.
+        """
+        stated = self.model_dump(exclude_unset=True)
+        for path, value in _leaves(self.model_dump(exclude_none=True, exclude={"sweep", "sensitivity"}), ""):
+            law = ASSUMED_LAW.match(path)
+            if law is None or _contains(stated, law[0].split(".")):
+                yield path, value
 
 
 def readable_requirement(entry: Any) -> Requirement | None:
@@ -440,11 +447,7 @@ def _set_value(data: Any, parts: list[str], value: Any, path: str) -> Any:
         items[int(head)] = _set_value(items[int(head)], rest, value, path) if rest else frozen(value)
         return tuple(items)
     if isinstance(data, Model):
-        # a block that was filled in, as an assumed law of the material, is stated from now on
-        filled = getattr(data, head, None) if rest else None
         data = keys_of(data)
-        if head not in data and isinstance(filled, Model | tuple):
-            data = {**data, head: filled}
     if data is not None and not isinstance(data, Mapping):
         raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
     block = dict(data or {})
@@ -459,6 +462,22 @@ def frozen(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: frozen(item) for key, item in value.items()}
     return value
+
+
+ASSUMED_LAW = re.compile(r".*\.(fatigue|relaxation)(?=\.)")
+"""Path of a block that a named material has without a word in the file."""
+
+
+def _contains(data: Any, parts: list[str]) -> bool:
+    """Return True if a block is stated at a path."""
+    for part in parts:
+        if isinstance(data, tuple | list) and part.isdigit() and int(part) < len(data):
+            data = data[int(part)]
+        elif isinstance(data, Mapping) and part in data:
+            data = data[part]
+        else:
+            return False
+    return True
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, float | int]]:
