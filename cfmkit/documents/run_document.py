@@ -321,8 +321,10 @@ def _stress(report: Report, known: set[str]) -> ValueRow | None:
         text = f"{text.partition(' ')[0]} of {format_short(allowed, 'stress', 3)}"
     if "safety_factor" not in known and _has_value(report, "safety_factor"):
         factor = report.metrics["safety_factor"].value or 0.0
-        text += f", safety {factor:.3g}" + _explain_low_safety(report)
+        text += f", safety {factor:.3g}"
         text += " (little margin)" if 1.0 <= factor < LITTLE_MARGIN else ""
+    if _has_value(report, "safety_factor"):
+        text += _explain_low_safety(report)
     return ValueRow("stress", text, about=report.metrics["stress_max"].definition)
 
 

@@ -173,7 +173,8 @@ def _keep_points(assembly: Assembly, path: Path) -> tuple[Any, Any]:
         return read_only(keep, np.int64), read_only(np.empty(0), np.int64)
     on_curve = assembly.on_curve[path.requested[path.at_requested]]
     keep = _with_contacts(path, path.at_requested[on_curve])
-    return read_only(keep, np.int64), read_only(np.setdiff1d(path.at_requested[~on_curve], keep), np.int64)
+    between = sorted(set(path.at_requested[~on_curve].tolist()) - set(keep.tolist()))  # setdiff1d imports numpy.ma
+    return read_only(keep, np.int64), read_only(np.array(between, dtype=np.int64), np.int64)
 
 
 def _with_contacts(path: Path, points: Any) -> Any:
