@@ -73,6 +73,13 @@ class GapBounds:
         return far
 
 
+def number_free_unknowns(mesh: Discretisation) -> Any:
+    """Return the number of every unknown among the free ones, (size,); -1 where it is held."""
+    slots = np.full(mesh.size, -1)
+    slots[mesh.free] = np.arange(len(mesh.free))
+    return slots
+
+
 @dataclass(frozen=True, eq=False)
 class ContactEquations(NumpyEquations):
     """Equations of a network with contacts for its free unknowns."""
@@ -84,9 +91,7 @@ class ContactEquations(NumpyEquations):
     def __post_init__(self) -> None:
         """Number the free unknowns."""
         super().__post_init__()
-        slots = np.full(self.mesh.size, -1)
-        slots[self.mesh.free] = np.arange(len(self.mesh.free))
-        object.__setattr__(self, "slots", slots)
+        object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
         object.__setattr__(self, "watched", GapBounds(self.mesh))
 
     def rebase(self, base: FloatArray) -> ContactEquations:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.equations import GapBounds, open_all_contacts
+from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, compute_moved_tables
@@ -79,9 +79,7 @@ class SlidingEquations(NumpyEquations):
     def __post_init__(self) -> None:
         """Number the free unknowns."""
         super().__post_init__()
-        slots = np.full(self.mesh.size, -1)
-        slots[self.mesh.free] = np.arange(len(self.mesh.free))
-        object.__setattr__(self, "slots", slots)
+        object.__setattr__(self, "slots", number_free_unknowns(self.mesh))
         nodes = tuple(contact for contact in self.mesh.contacts if contact.slide < 0)
         watched = GapBounds(replace(self.mesh, contacts=nodes)) if nodes else None
         object.__setattr__(self, "watched", watched)
@@ -95,9 +93,8 @@ class SlidingEquations(NumpyEquations):
             first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
             e = e._replace(**first, moved_cuts=None)
         copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
-        indices = e._replace(**copies)
-        whole = replace(mesh, elements=indices)
-        return cls(whole, ramp, plain=make(replace(open_all_contacts(whole), moving=None), ramp))
+        own = replace(mesh, elements=e._replace(**copies))
+        return cls(own, ramp, plain=make(replace(open_all_contacts(own), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
         """Return the equations with other values of the unknowns that are held, (size,)."""
