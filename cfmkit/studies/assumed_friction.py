@@ -46,10 +46,10 @@ def friction_note(result: Result, run: Run) -> str:
     means = [evaluate(outcome, [f"{name}[{path}]"])[f"{name}[{path}]"].value for path in ("load", "unload")]
     frictionless = evaluate(result, [name])[name].value
     if None in means or frictionless is None:
-        return f"with {PLAIN_FRICTION:g} assumed in pins and guide there is no force all the way; no friction is stated"
+        return f"no force all the way, with {PLAIN_FRICTION:g} assumed in pins and guide: no friction is stated"
     up, down, free = (format_short(float(entry or 0.0), kind) for entry in (*means, frictionless))
     size = format_short(pin, "length")
     return (
-        f"with {PLAIN_FRICTION:g} assumed in pins ({size}) and guide the mean {kind} is {up} one way and {down} "
-        f"back, not {free}; no friction is stated"
+        f"mean {kind} {up} one way and {down} back, not {free}: {PLAIN_FRICTION:g} assumed in pins ({size}) and guide, "
+        "because no friction is stated"
     )
