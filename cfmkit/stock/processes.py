@@ -52,7 +52,7 @@ PROCESSES: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for o
 SPRING_RATE = 0.05
 """Half width of the range in which the rate of a spring is found, over its nominal rate: all values are equally likely.
 
-Assumed for springs wound to measure, helical and torsion: EN 15800 (which replaced DIN 2095) gives the loads of cold
+Assumed for custom springs, helical and torsion: EN 15800 (which replaced DIN 2095) gives the loads of cold
 coiled springs in grade 2, the usual one, tolerances of this size; it is written for compression springs. Stock springs
 are wider: Lee Spring states 10 % of the rate.
 """

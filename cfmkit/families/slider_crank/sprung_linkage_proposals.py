@@ -348,7 +348,7 @@ def _force_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEf
 
 
 def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
-    """Return a designed linkage with springs wound to measure of steel wire, which bear its motion.
+    """Return a designed linkage with custom springs of steel wire, which bear its motion.
 
     A torsion spring is no wider than the crank, or the coupler, is long, so that those of two pins stand beside each
     other, and no deeper than the longer side of the envelope, or than what the links and those on their other side
