@@ -158,7 +158,7 @@ def quiet_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys):
-    check_mutants(quiet_folder, 12, 1, capsys)
+    check_mutants(quiet_folder, 12, 6, capsys)
 
 
 @pytest.mark.parametrize(
