@@ -235,7 +235,7 @@ class WarningEntry(NamedTuple):
     commands: tuple[str, ...] = ()  # the same as whole commands
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Document:
     """Outcome of one command."""
 
@@ -264,6 +264,10 @@ class Document:
     def tone(self) -> str:
         """``good``, ``warn`` or ``bad``, by how it ended."""
         return TONES.get(int(self.exit_code), "warn")
+
+    def __repr__(self) -> str:
+        """Return what it is of and how it ended."""
+        return f"<Document {self.title!r}: {self.summary}; {self.verdict}>"[:500]
 
 
 TONES = {0: "good", 3: "bad", 4: "bad", 5: "bad", 6: "warn", 7: "bad", 70: "bad"}

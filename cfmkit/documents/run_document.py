@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -162,12 +163,24 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
     elif design is not None and design.message != design.status.value:
         yield Note("design", design.message)
     if design is not None and design.nearest_feasible:
-        settings = [f"{path}={''.join(value.split())}" for path, value in design.nearest_feasible.items()]
-        yield Note("feasible", " ".join(f"--set {setting}" for setting in settings), whole=True)
+        yield from _nearest_feasible(design.nearest_feasible)
     for word, text in report.supplement.lines:
         yield Note(word, text, short=text.partition(EXPECTED)[2])
     for text in search_sentences(design.search) if design else ():
         yield Note("search", text)
+
+
+_PLAIN_VALUE = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)? ?[^\s,]*")
+
+
+def _nearest_feasible(nearest: Mapping[str, str]) -> Iterator[Note]:
+    """Yield the nearest values that work: plain values as options that can be pasted, bounds and others in words."""
+    plain = {path: "".join(value.split()) for path, value in nearest.items() if _PLAIN_VALUE.fullmatch(value)}
+    if plain:
+        yield Note("feasible", " ".join(f"--set {path}={value}" for path, value in plain.items()), whole=True)
+    for path, value in nearest.items():
+        if path not in plain:
+            yield Note("feasible", f"{path}: {value}", whole=True)
 
 
 def search_sentences(found: Mapping[str, Searched]) -> list[str]:

@@ -96,7 +96,7 @@ def test_design_rescales_writes_the_part_and_its_spec_is_a_design_too(cli, lan):
     assert done.code == 0
     assert "rescaled: width 10 mm -> 15.4 mm" in done.out
     assert {"beams.dxf", "beams.svg", "beam-b1.csv"} <= {path.name for path in (cli.folder / "out/geometry").iterdir()}
-    assert metrics(cli)["nominal_force"]["value"] == pytest.approx(15, rel=1e-8)
+    assert metrics(cli)["nominal_force"]["value"] == pytest.approx(15, rel=1e-4)  # widths have digits
     assert cli("analyze", "out/design.yaml", "-o", "again", "--no-plots").code == 0
     assert metrics(cli, "again") == metrics(cli)
 
