@@ -201,8 +201,8 @@ def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Sp
     """Return a design whose chosen lengths and angles have the digits that its process can hold.
 
     Where the rounded design would miss a requirement that it meets unrounded, or warn of something new, its digits are
-    refined. Where rates of
-    springs are chosen, they are chosen again for the rounded lengths: `finish` designs a specification.
+    refined; so they are where it would leave the tolerance of the design. Where rates of springs are chosen, they are
+    chosen again for the rounded lengths: `finish` designs a specification.
     """
     if outcome.spec is None:
         return outcome
@@ -269,5 +269,14 @@ def _outcomes(spec: Spec, run: Run) -> tuple[list[bool], set[str]]:
     record = family(spec.family)
     result = record.analyze(spec, run)
     met = check(spec.part_requirements, result, values_of_family(record.values))
-    reached = [result.status is Status.COMPLETE, *(bool(entry.ok) for entry in met)]
+    reached = [result.status is Status.COMPLETE, _keeps_tolerance(spec, result), *(bool(entry.ok) for entry in met)]
     return reached, {entry.name for entry in result.warnings}
+
+
+def _keeps_tolerance(spec: Spec, result: Result) -> bool:
+    """Return True if the effort keeps to the target as closely as the design was to, where it says how closely."""
+    tolerance = getattr(getattr(spec, "design", None), "tolerance", None)
+    if tolerance is None or not result.curves:
+        return True
+    deviation = evaluate(result, ["deviation_from_target"])["deviation_from_target"].value
+    return deviation is None or deviation <= tolerance
