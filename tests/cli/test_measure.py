@@ -213,8 +213,8 @@ def test_a_hole_in_the_window_is_named_and_ends_with_6(cli):
     assert "coverage on load 69.697 %" in page
     assert "force mean on load no value" in page
     document = json.loads((cli.folder / "out/metrics.json").read_text())
-    assert (document["status"], document["metrics"]["force_mean[load]"]["value"]) == ("partial", None)
-    assert document["metrics"]["coverage[load]"]["value"] == pytest.approx(1 - 30 / 99)
+    assert (document["status"], document["metrics"]["force_mean"]["branches"]["load"]["value"]) == ("partial", None)
+    assert document["metrics"]["coverage"]["value"] == pytest.approx(1 - 30 / 99)
     assert document["message"].startswith("not recorded: 30 ... 60 mm")
     assert json.loads((cli.folder / "out/manifest.json").read_text())["exit_code"] == 6
     for options in (("--window", "62 mm:98 mm"), ("--max-hole", "40 %")):
@@ -232,7 +232,7 @@ def test_each_specimen_of_a_file_has_its_own_values(cli):
     done = cli("measure", "both.csv", "--group", "Probe", "-o", "out")
     assert done.code == 0
     document = json.loads((cli.folder / "out/metrics.json").read_text())
-    levels = [document["metrics"][f"force_mean[{name},load]"]["value"] for name in "AB"]
+    levels = [document["metrics"][f"force_mean[{name}]"]["value"] for name in "AB"]
     assert levels[1] - levels[0] == pytest.approx(20.0)
     assert set(document["groups"]) == {"A", "B"}
     with (cli.folder / "out/curve.csv").open(newline="") as file:
@@ -241,7 +241,7 @@ def test_each_specimen_of_a_file_has_its_own_values(cli):
     assert {line[0] for line in lines} == {"A", "B"}
     assert {path.name for path in (cli.folder / "out/figures").iterdir()} == {"loop-1.png", "loop-2.png"}
     one = cli("measure", "both.csv", "--group", "Probe=B", "-o", "one", "--no-plots", "--json").document
-    assert one["metrics"]["force_mean[load]"]["value"] == pytest.approx(levels[1])
+    assert one["metrics"]["force_mean"]["value"] == pytest.approx(levels[1])
 
 
 def test_cycles_are_chosen_by_number(cli):

@@ -404,6 +404,9 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     half, hole = eye_and_hole(spec)
     rates, offset = solution.assembly.rates, solution.assembly.linkage.offset
     way = np.array([[at, offset] for at in (solution.units.position.min(), solution.units.position.max())])
+    for held in hardware(spec, solution).bodies:
+        outline = held.outline()
+        parts.edge(ax, np.vstack([outline, outline[:1]]), held.name, color=GREY, linewidth=0.6)
     parts.edge(ax, way, "guide", color=GREY, linewidth=0.6)
     parts.slider(ax, key.slider_pin, 2.0 * half)
     *links, pivot, crank_pin, slider_pin = bodies(spec, solution, solution.assembly.units(np.array([key.motion])))

@@ -49,6 +49,10 @@ N_SCREWS = 4
 """Of the ground."""
 
 
+LEAST_GROUND = 4.0
+"""Least width of the ground, in heads of its screws: two of them, each a head from the edge."""
+
+
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism, of all legs together."""
     mechanism, legs = spec.mechanism, spec.mechanism.sets
@@ -70,6 +74,8 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     screw = screw_for(load * legs, sheet, N_SCREWS, strength)
     ends = rod_at + np.array([[-0.5 * rod.bush, 0.0], [0.5 * rod.bush, 0.0]])
     low, high = np.minimum(ends.min(axis=0), 0.0) - eye, np.maximum(ends.max(axis=0), 0.0) + eye
+    spare = 0.5 * np.maximum(LEAST_GROUND * screw.head - (high - low), 0.0)
+    low, high = low - spare, high + spare
     ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
     places = clear_places(ground, moving, screw.head)
     bodies = (
