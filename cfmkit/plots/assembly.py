@@ -57,6 +57,7 @@ def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[Lis
     write_heading(figure, Heading(title, "assembly, numbers as in parts.csv"))
     ax = axes_mm(figure, (0.0, 4.0, SHEET_SIZE[0] - LIST_WIDTH, SHEET_SIZE[1] - 16.0))
     ax.axis("off")
+    ax.set(xticks=[], yticks=[])
     drawn = [(body, mm(body.outline(pose))) for body in bodies]
     points = np.vstack([outline for _, outline in drawn])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -152,6 +153,7 @@ def _list(figure: Figure, parts: Iterable[ListedPart]) -> None:
     ax = axes_mm(figure, (SHEET_SIZE[0] - LIST_WIDTH, 4.0, LIST_WIDTH, SHEET_SIZE[1] - 16.0))
     ax.set(xlim=(0.0, LIST_WIDTH), ylim=(0.0, SHEET_SIZE[1] - 16.0))
     ax.axis("off")
+    ax.set(xticks=[], yticks=[])
     y = SHEET_SIZE[1] - 20.0
     for number, part in enumerate(parts, start=1):
         name = part.name or part.data.partition(",")[0]

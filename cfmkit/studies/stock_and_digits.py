@@ -200,11 +200,12 @@ def decimals_of(accuracy: ProcessAccuracy) -> int:
 def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Spec], Design], run: Run) -> Design:
     """Return a design whose chosen lengths and angles have the digits that its process can hold.
 
+    So has a part to make: one of a stated material or process. A mechanism of lengths and rates alone stays exact.
     Where the rounded design would miss a requirement that it meets unrounded, or warn of something new, its digits are
     refined; so they are where it would leave the tolerance of the design. Where rates of springs are chosen, they are
     chosen again for the rounded lengths: `finish` designs a specification.
     """
-    if outcome.spec is None:
+    if outcome.spec is None or not _is_part_to_make(outcome.spec):
         return outcome
     stated, written = (
         dict(_texts(spec.model_dump(mode="json", exclude_unset=True))) for spec in (original, outcome.spec)
@@ -232,6 +233,13 @@ def with_digits_of_process(original: Spec, outcome: Design, finish: Callable[[Sp
     return outcome
 
 
+def _is_part_to_make(spec: Spec) -> bool:
+    """Return True if a specification says of which material, or by which process, its part is made."""
+    mechanism: Any = getattr(spec, "mechanism", None)
+    process = process_of_part(spec) or getattr(getattr(spec, "design", None), "process", None)
+    return process is not None or getattr(mechanism, "material", None) is not None
+
+
 def _has_chosen_rates(original: Spec, designed: Spec) -> bool:
     """Return True if a design has changed the rate of a spring."""
     springs = [dict(entry.leaves()) for entry in (original, designed)]
@@ -240,11 +248,11 @@ def _has_chosen_rates(original: Spec, designed: Spec) -> bool:
 
 
 def _texts(value: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    """Yield every length and angle of mechanism and analysis as (dotted path, text as written)."""
+    """Yield every length and angle of the mechanism as (dotted path, text as written)."""
     if isinstance(value, dict):
         for key, item in value.items():
             inside = f"{path}.{key}" if path else str(key)
-            if inside.split(".")[0] in ("mechanism", "analysis") and key not in NOT_CHOSEN:
+            if inside.split(".")[0] == "mechanism" and key not in NOT_CHOSEN:
                 yield from _texts(item, inside)
     elif isinstance(value, list):
         for number, item in enumerate(value):
