@@ -223,6 +223,7 @@ class Note(NamedTuple):
     whole: bool = False  # whether a short page has all of it, too: how a run ended
     short: str = ""  # what a short page has instead; empty: the clauses of the text that fit
     is_command: bool = False  # whether the text is a command: it is copied, and never broken
+    is_detail: bool = False  # whether short pages leave it out
 
 
 class WarningEntry(NamedTuple):
@@ -276,6 +277,9 @@ SHORT = 100
 SHORTEST = 24
 """Characters below which a clause says too little: rather a part of the next one is taken as well."""
 
+DOTS = "..."
+"""What ends a text that is cut inside a clause."""
+
 NUMBER = re.compile(r"(?<![A-Za-z_])\d")
 PLAIN_WORDS = re.compile(r"[a-z]+ [a-z]+ ")
 
@@ -313,8 +317,10 @@ def _beginning(text: str, limit: int) -> str:
     whole = [at for at in ends if text.count("(", 0, at) == text.count(")", 0, at)]
     if whole:
         return text[: max(whole)]
-    cut = text.rfind(" ", 0, max(limit - 3, 0))
-    return f"{text[:cut]} ..." if cut > 0 else text[:limit]
+    if (cut := text.rfind(" ", 0, max(limit - 3, 0))) > 0:
+        return f"{text[:cut]} {DOTS}"
+    cut = text.rfind(" ", 0, limit + 1)
+    return text[:cut] if cut > 0 else text[:limit]
 
 
 def _places(text: str, mark: str) -> Iterator[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,8 +57,13 @@ FACTS = (
 )
 """Metrics that are shown of every family, as far as they have a value."""
 
-EXPECTED = ", and expect "
-"""What stands before the forces of a test plan, which a short page shows."""
+SHOWN_PARTS = {
+    "test plan": re.compile(r", and expect (?P<text>.*): each range"),
+    "yield": re.compile(
+        r"(?P<text>[^:]*%[^:]*\)[^:]*): .*with margins(?P<more>: the same command with )(?P<remedy>.*)"
+    ),
+}
+"""What a short page shows of a paragraph that is longer: its text, and the options that remedy it."""
 
 LITTLE_MARGIN = 1.05
 """Safety factor below which the margin is called little."""
@@ -165,9 +171,12 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
         settings = [f"{path}={''.join(value.split())}" for path, value in design.nearest_feasible.items()]
         yield Note("feasible", " ".join(f"--set {setting}" for setting in settings), whole=True)
     for word, text in report.supplement.lines:
-        yield Note(word, text, short=text.partition(EXPECTED)[2])
+        shown = SHOWN_PARTS[word].search(text) if word in SHOWN_PARTS else None
+        parts = shown.groupdict() if shown else {}
+        remedy = parts.get("remedy", "")
+        yield Note(word, text.removesuffix(parts.get("more", "") + remedy), remedy, short=parts.get("text", ""))
     for text in search_sentences(design.search) if design else ():
-        yield Note("search", text)
+        yield Note("search", text, is_detail=True)
 
 
 def search_sentences(found: Mapping[str, Searched]) -> list[str]:
@@ -278,13 +287,13 @@ def _long_value(quantity: Quantity) -> str:
 def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
     """Return one row for each requirement: its metric, the value, the bounds, and whether they are kept."""
     rows = tuple(
-        (words(outcome.metric), *_value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
+        (words(outcome.metric), *value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
         for outcome in outcomes
     )
     return PageTable("Requirements", tuple(map(GridColumn, ("", "value", "required", ""))), rows)
 
 
-def _value_and_bounds(outcome: Outcome) -> tuple[str, str]:
+def value_and_bounds(outcome: Outcome) -> tuple[str, str]:
     """Return the value of an outcome and its bounds, as its sentence has them."""
     reported = outcome.sentence.removeprefix(words(outcome.metric)).strip().rpartition(": ")[0]
     value, _, bounds = reported.rpartition(", ")

@@ -51,7 +51,10 @@ def expected_forces(result: Result, run: Run) -> str:
     curve = result.curve
     at = [format_short(place, curve.motion_dimension) for place in places]
     ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(near.middle, low, high, strict=True)]
-    expected = [f"{one[0]} ({one[1]} to {one[2]}) at {place}" for one, place in zip(ends, at, strict=True)]
+    expected = [
+        f"{force} at {place} ({least.partition(' ')[0]} to {most})"
+        for place, (force, least, most) in zip(at, ends, strict=True)
+    ]
     make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
     verb = "displace to" if curve.motion_dimension == "length" else "turn to"
     return (

@@ -222,7 +222,7 @@ def expected_yield(result: Result, run: Run) -> str:
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
         return f"{_yield_sentence(found, shares)}; margins need 'design.free' to name values that may change"
-    return f"{_yield_sentence(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
+    return f"{_yield_sentence(found, shares)}; with margins: {again} --set design.yield=90%"
 
 
 def _yield_sentence(found: Assumed, shares: ExpectedShares) -> str:
@@ -247,4 +247,4 @@ def _format_share(share: Share) -> str:
     """Return a share of drawn parts to two digits, and never as all of them or none."""
     if 100.0 * share.value >= 99.5:
         return "over 99 %"
-    return f"about {100.0 * share.value:.2g} %" if share.good else "hardly any"
+    return f"{100.0 * share.value:.2g} %" if share.good else "hardly any"
