@@ -142,13 +142,13 @@ def _note_lines(note: Note, width: int) -> list[TextLine]:
 
 
 def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> TextLine:
-    """Return a line of a name, what fits of a text, and a remedy at the far end if the text keeps clause and number."""
+    """Return a line of a name, what fits of a text, and a remedy at the far end if the text keeps its number."""
     left = room - len(name)
     shown = shortened_to_clause(text, left) if left >= LEAST_TEXT else ""
     if remedy:
         beside = shortened_to_clause(text, max(left - len(remedy) - GAP, 0))
-        cut_off = beside != shown and (len(beside) < SHORTEST or beside.endswith(DOTS))
-        if cut_off or (NUMBER.search(shown) and not NUMBER.search(beside)):
+        kept = bool(NUMBER.search(beside)) if NUMBER.search(shown) else not beside.endswith(DOTS)
+        if beside != shown and (len(beside) < SHORTEST or not kept):
             remedy = ""
         else:
             shown = beside

@@ -123,14 +123,14 @@ def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bo
     Examples
     --------
     >>> bracket(10e-3, 1e-3, 0.35, False)
-    '10 mm wide, 1 mm thick: the force is between that of plane stress, as solved, and that of plane strain, 14 % more'
+    'the force is between plane stress, as solved, and plane strain, 14 % more (10 mm wide, 1 mm thick)'
     """
     if not width > NARROW * thickness:
         return ""
     more = percent(1.0 / (1.0 - poisson_ratio**2) - 1.0)
     return (
-        f"{mm(width)} wide, {mm(thickness)} thick: the force is between that of plane stress, as solved, and that of "
-        f"plane strain, {more} more"
+        f"the force is between plane stress, as solved, and plane strain, {more} more ({mm(width)} wide, "
+        f"{mm(thickness)} thick)"
         + ("; mechanism.wide_beams counts in beam models only and changes neither" if wide_beams else "")
     )
 

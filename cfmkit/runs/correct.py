@@ -114,7 +114,9 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
             tuple(_lines(correction, zero_known)),
             (*add.comparison_warnings(after, source), *calibration.warnings, *correction.warnings),
             shortfall=add.shortfall(after),
-            figures=add.comparison_figures(after, correction.drawn.name, calibration.before),
+            figures=add.comparison_figures(
+                after, correction.drawn.name, calibration.before if calibration.parameters else None
+            ),
             tables=(table,),
         ),
     )

@@ -282,7 +282,7 @@ def run_analysis(spec: Spec, run: Run) -> Report:
 def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
     """Return where the data on life and creep come from that a specification leaves to the library."""
     lasting = getattr(spec, "durability", None)
-    return () if lasting is None else tuple(("lasting", text) for text in lasting.assumed)
+    return () if lasting is None else tuple(("durability", text) for text in lasting.assumed)
 
 
 def run_design(spec: Spec, run: Run) -> Report:

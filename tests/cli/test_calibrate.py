@@ -35,7 +35,7 @@ def metrics(cli, folder):
 def test_analyze_with_data_adds_errors_a_figure_and_the_measured_curve(cli, cam, rig):
     done = cli("analyze", cam, "--data", rig, "-o", "out")
     assert (done.code, done.err) == (0, "")
-    assert "data     model - measured on load: rms " in done.out
+    assert "residual   rms " in done.out
     document = metrics(cli, "out")
     assert list(document)[:5] == ["status", "message", "metrics", "requirements", "warnings"]
     assert document["metrics"]["data_offset[load]"]["unit"] == "N"

@@ -113,14 +113,13 @@ def _document(
 ) -> Document:
     """Return the document of one recording, or of several of one file."""
     from cfmkit.documents.run_document import warning_of
-    from cfmkit.experiment.measurement_and_calibration_outputs import reading_line
 
     found = list(reports.values())
     source, record = found[0].source, found[0].data
     window = record["window"]
     points = f"{len(source.recording)} points, {len(source.raw)} cycle{'s' * (len(source.raw) > 1)}"
     where = f"window {window['from']:.6g} to {window['to']:.6g} {window['unit']}"
-    notes = [Note(*line) for report in found for line in reading_line(report.data["reading"])]
+    notes = [Note("read", text) for report in found for text in report.data["reading"]]
     notes += [Note("filter", report.source.low_pass.sentence) for report in found if report.source.low_pass]
     return Document(
         data=data,

@@ -316,7 +316,11 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
             "inaccurate",
         )
 
-    return FindingRule("thick_beam", is_short, sentence)
+    def short(solution: Solution) -> str:
+        length, thickness = sizes(solution)
+        return f"beam {name} is only {length / thickness:.2g} times as long as thick: beam theory is inaccurate"
+
+    return FindingRule("thick_beam", is_short, sentence, short)
 
 
 def _hindered_share(solution: Solution) -> tuple[float, str]:

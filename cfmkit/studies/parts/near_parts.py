@@ -218,7 +218,7 @@ def expected_yield(result: Result, run: Run) -> str:
     try:
         shares = expected_shares(result, Parts.assumed(spec, run.seed), run)
     except Unknown as why:
-        return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
+        return f"not estimated ({name}, assumed tolerances): {why}; {again} draws parts"
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
         return f"{_yield_sentence(found, shares)}; margins need 'design.free' to name values that may change"
