@@ -104,7 +104,7 @@ def too_soft(share: float, where: str) -> str:
     if not share > TOO_SOFT:
         return ""
     return (
-        f"beams that are wide for their thickness cannot curl across their width: bending takes about "
+        f"the anticlastic bending of beams that are wide for their thickness is suppressed: bending takes about "
         f"{percent(share)} more energy {where}, and the force rises by at least the same share; clamped ends "
         "add to it"
     )
@@ -112,7 +112,7 @@ def too_soft(share: float, where: str) -> str:
 
 def stiffer(share: float) -> str:
     """Return the same in short."""
-    return f"force at least {percent(share)} larger: beams cannot curl across their width"
+    return f"force at least {percent(share)} larger: anticlastic bending is suppressed"
 
 
 def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bool) -> str:

@@ -308,7 +308,7 @@ def run_design(spec: Spec, run: Run) -> Report:
 
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
-    """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
+    """Return a report with what is known of many parts of its design, and its test plan."""
     from cfmkit.studies.assumed_friction import friction_note
     from cfmkit.studies.parts.expected_forces import expected_forces
 

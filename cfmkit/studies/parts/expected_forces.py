@@ -1,6 +1,6 @@
 """The test plan in one sentence: what to make, what to measure on it, and what force to expect where, of 95 % of parts.
 
-Forces are those of parts to first order, drawn from `design.tolerances` or from what the process is assumed to hold.
+Forces are linear estimates of parts drawn from `design.tolerances`, or from what the process is assumed to hold.
 The dimensions are those whose errors move the force most: what is worth measuring before the force is looked at. What
 is no dimension and moves it as much, a modulus or the rate of a spring, is named beside them.
 """
