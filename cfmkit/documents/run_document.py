@@ -171,12 +171,17 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
         settings = [f"{path}={''.join(value.split())}" for path, value in design.nearest_feasible.items()]
         yield Note("feasible", " ".join(f"--set {setting}" for setting in settings), whole=True)
     for word, text in report.supplement.lines:
-        shown = SHOWN_PARTS[word].search(text) if word in SHOWN_PARTS else None
-        parts = shown.groupdict() if shown else {}
-        remedy = parts.get("remedy", "")
-        yield Note(word, text.removesuffix(parts.get("more", "") + remedy), remedy, short=parts.get("text", ""))
+        yield note_of(word, text)
     for text in search_sentences(design.search) if design else ():
         yield Note("search", text, is_detail=True)
+
+
+def note_of(word: str, text: str) -> Note:
+    """Return a paragraph that a verb adds, with what a short page shows of it."""
+    shown = SHOWN_PARTS[word].search(text) if word in SHOWN_PARTS else None
+    parts = shown.groupdict() if shown else {}
+    remedy = parts.get("remedy", "")
+    return Note(word, text.removesuffix(parts.get("more", "") + remedy), remedy, short=parts.get("text", ""))
 
 
 def search_sentences(found: Mapping[str, Searched]) -> list[str]:
