@@ -140,7 +140,7 @@ def carry_out(
     arguments : sequence of str
         The command line, for the manifest.
     progress : callable, optional
-        Is told how far the run is.
+        Progress callback.
     """
     start = time.perf_counter()
     document, spec = read(wanted)

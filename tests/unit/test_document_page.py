@@ -222,8 +222,8 @@ def test_a_short_page_has_the_yield_with_its_remedy_and_the_forces_of_the_test_p
     tail = "; linear estimate; with margins: the same command with --set design.process=fdm --set design.yield=90%"
     lines = {
         "yield": f"2 % (fdm, assumed tolerances), 20 % once the modulus is measured: thickness +- 0.05 mm{tail}",
-        "test plan": "make the part, displace to 2 mm and 12 mm, and expect 20 N at 2 mm (9 to 28 N) and 20.3 N at 12 mm "
-        "(9.6 to 28 N): each range holds for 95 % of parts (linear estimate)",
+        "test plan": "make the part, displace to 2 mm and 12 mm, and expect 20 N at 2 mm (9 to 28 N) and 20.3 N at "
+        "12 mm (9.6 to 28 N): each range holds for 95 % of parts (linear estimate)",
     }
     notes = tuple(run_document.note_of(word, text) for word, text in lines.items())
     first, second = page_of(Document(title="a", notes=notes))[1:]
