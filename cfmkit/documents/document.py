@@ -106,8 +106,10 @@ def verdict(ok: bool | None) -> Span:
 
 def format_bounds(bounds: Mapping[str, Any]) -> str:
     """Return the bounds ``min`` and ``max`` of a requirement, as far as it has them."""
-    low = [f">= {bounds['min']}"] if bounds["min"] is not None else []
-    return " and ".join([*low, *([f"<= {bounds['max']}"] if bounds["max"] is not None else [])])
+    low, high = bounds["min"], bounds["max"]
+    if low is None:
+        return "" if high is None else f"<= {high}"
+    return f">= {low}" if high is None else f"{low} to {high}"
 
 
 def name_in_words(name: str) -> str:

@@ -19,6 +19,7 @@ from cfmkit.documents.document import (
     WarningEntry,
     Written,
     command_line,
+    format_bounds,
     name_in_words,
     shortened_to_clause,
 )
@@ -425,7 +426,7 @@ def _required_row(report: Report, requirement: Requirement, outcome: Outcome) ->
     label = LABELS[base] + (f" on {branch}" if branch else "") if base in LABELS else words(outcome.metric)
     over = Window(*outcome.over) if outcome.over else None
     apart = "" if over is None or _is_title(report, over) else _format_window(report, outcome.metric, over)
-    bound = _bound(requirement)
+    bound = format_bounds({"min": requirement.min, "max": requirement.max})
     about = outcome.sentence
     if outcome.value is None:
         reason = outcome.sentence.partition("no value (")[2].rpartition("), ")[0]
@@ -445,12 +446,6 @@ def _is_title(report: Report, window: Window) -> bool:
         return False
     slack = 1e-9 * max(abs(shown.lo), abs(shown.hi))
     return abs(shown.lo - window.lo) <= slack and abs(shown.hi - window.hi) <= slack
-
-
-def _bound(requirement: Requirement) -> str:
-    if requirement.min is None:
-        return f"<= {requirement.max}"
-    return f">= {requirement.min}" if requirement.max is None else f"{requirement.min} to {requirement.max}"
 
 
 def complaints_of(report: Report) -> tuple[str, ...]:

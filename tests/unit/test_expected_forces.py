@@ -78,7 +78,7 @@ def test_ranges_by_the_engines_derivatives_are_those_by_neighbouring_parts(monke
     exact = near_parts.rr.exact_derivatives
     for slopes in (exact, lambda *_: {}):
         monkeypatch.setattr(near_parts.rr, "exact_derivatives", slopes)
-        numbers.append([float(text) for text in re.findall(r"([\d.]+) N", expected_forces(result, Run()))])
+        numbers.append([float(text) for text in re.findall(r"([\d.]+) (?:N|to)\b", expected_forces(result, Run()))])
     assert exact(result.spec, np.array([0.006, 0.012]), ("mechanism.beams.s.thickness", "mechanism.thickness"))
     assert len(numbers[0]) == 6
     np.testing.assert_allclose(*numbers, rtol=5e-3)
