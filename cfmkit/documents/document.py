@@ -295,7 +295,7 @@ def shortened_to_clause(text: str, limit: int) -> str:
     --------
     >>> shortened_to_clause("the roller is too large (16 mm): the first 1.1 mm run on a corner", 40)
     'the roller is too large (16 mm)'
-    >>> shortened_to_clause("the beam is wide: bending takes about 6.7 % more energy, and the force rises", 45)
+    >>> shortened_to_clause("beams are wide and stiff: bending takes about 6.7 % more energy, and the force rises", 45)
     'bending takes about 6.7 % more energy'
     >>> shortened_to_clause("beams that are wide are stiffer than in beam theory", 30)
     'beams that are wide are ...'
