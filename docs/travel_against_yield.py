@@ -52,6 +52,6 @@ def row(travel: float) -> str:
 
 
 if __name__ == "__main__":
-    print("| travel to | thickness | width | unloaded angle | good parts |\n|---|---|---|---|---|")
+    print("| travel to | thickness | width | unloaded angle | yield |\n|---|---|---|---|---|")
     for place in map(float, sys.argv[1:] or TRAVELS):
         print(row(place), flush=True)

@@ -41,7 +41,7 @@ class Made:
     command: str
     source: str
     spec: Spec  # what it said
-    # seed, points: of everything random, and how many points there are
+    # seed, points: random seed, and how many points there are
     seed: int
     points: int
 

@@ -10,7 +10,7 @@
 `reported_values_of_finished_design`
     What is reported of a design is what the analysis of its written specification measures.
 `robust_design`
-    Values for which made parts are good: margins from tolerances to first order, and drawn parts.
+    Values for which made parts are good: margins from tolerances by linear estimate, and drawn parts.
 
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.
 """

@@ -1,4 +1,4 @@
-"""Parts near a design to first order: their numbers move in proportion to their errors.
+"""Parts near a design by linear estimate: their numbers move in proportion to their errors.
 
 Derivatives are exact where they are known, and central differences elsewhere.
 """

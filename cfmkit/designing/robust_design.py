@@ -2,7 +2,7 @@
 
 What is seen of a part are numbers such as the force at some poses; limits are rows of them that must be at least zero.
 Near a design both move in proportion to its values and to the errors of its parts. So the numbers of drawn parts are
-known to first order, without solving one of them, and with them how far each limit must be drawn in: none is guessed.
+known by linear estimate, without solving one of them, and so is how far each limit must be drawn in: none is guessed.
 Derivatives are exact where the family has them, and central differences elsewhere.
 
 A step minimises, over such parts, the mean of the worst share of them (the conditional value at risk of the row that is
@@ -131,7 +131,7 @@ class RobustProblem:
 
 @dataclass(frozen=True)
 class Linear(NearParts):
-    """Limits of a design and of parts near it, to first order: the numbers are what the limits leave."""
+    """Limits of a design and of parts near it, by linear estimate: the numbers are what the limits leave."""
 
     x: FloatArray  # (n,) values of the design
     by_x: FloatArray  # (m, n) derivatives of the limits by the values
@@ -142,12 +142,12 @@ class RobustResult:
     """End of the steps."""
 
     x: FloatArray  # (n,) values of the design
-    share: float  # of good parts, estimated to first order, even where drawn parts were solved themselves
+    share: float  # of good parts, by linear estimate, even where drawn parts were solved themselves
     began: float  # the same where the steps began
     # steps, seen: steps that gained something, and parts that were solved
     steps: int
     seen: int
-    linear: Linear  # the design to first order
+    linear: Linear  # the design by linear estimate
     reached: bool  # whether the share is what was requested
 
 
@@ -172,7 +172,7 @@ class _Counted:
 
 
 def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | None:
-    """Return a design to first order; None if it, or a neighbour that a difference needs, has no numbers."""
+    """Return a design by linear estimate; None if it, or a neighbour that a difference needs, has no numbers."""
     middle = seen(x, problem.perfect)
     if middle is None:
         return None
@@ -214,7 +214,7 @@ def _by_errors(problem: RobustProblem, x: FloatArray, seen: SeenPart, known: Par
 
 
 def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> RobustResult:
-    """Return values for which the share of good parts, estimated to first order, is what was requested, or largest.
+    """Return values for which the yield, by linear estimate, is what was requested, or largest.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def optimise_on_samples(
 
 
 def costliest(found: RobustResult, problem: RobustProblem, groups: list[tuple[int, ...]]) -> int:
-    """Return the number of the group of errors without which most more parts would be good, to first order.
+    """Return the number of the group of errors without which most more parts would be good, by linear estimate.
 
     Where no group alone makes a difference to that, the one without which parts miss their limits by least.
     """

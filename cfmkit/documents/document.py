@@ -106,8 +106,10 @@ def verdict(ok: bool | None) -> Span:
 
 def format_bounds(bounds: Mapping[str, Any]) -> str:
     """Return the bounds ``min`` and ``max`` of a requirement, as far as it has them."""
-    low = [f">= {bounds['min']}"] if bounds["min"] is not None else []
-    return " and ".join([*low, *([f"<= {bounds['max']}"] if bounds["max"] is not None else [])])
+    low, high = bounds["min"], bounds["max"]
+    if low is None:
+        return "" if high is None else f"<= {high}"
+    return f">= {low}" if high is None else f"{low} to {high}"
 
 
 def name_in_words(name: str) -> str:
@@ -223,6 +225,7 @@ class Note(NamedTuple):
     whole: bool = False  # whether a short page has all of it, too: how a run ended
     short: str = ""  # what a short page has instead; empty: the clauses of the text that fit
     is_command: bool = False  # whether the text is a command: it is copied, and never broken
+    is_detail: bool = False  # whether short pages leave it out
 
 
 class WarningEntry(NamedTuple):
@@ -280,6 +283,9 @@ SHORT = 100
 SHORTEST = 24
 """Characters below which a clause says too little: rather a part of the next one is taken as well."""
 
+DOTS = "..."
+"""What ends a text that is cut inside a clause."""
+
 NUMBER = re.compile(r"(?<![A-Za-z_])\d")
 PLAIN_WORDS = re.compile(r"[a-z]+ [a-z]+ ")
 
@@ -293,10 +299,10 @@ def shortened_to_clause(text: str, limit: int) -> str:
     --------
     >>> shortened_to_clause("the roller is too large (16 mm): the first 1.1 mm run on a corner", 40)
     'the roller is too large (16 mm)'
-    >>> shortened_to_clause("beams cannot curl: bending takes about 6.7 % more energy, and the force rises", 45)
+    >>> shortened_to_clause("beams are wide and stiff: bending takes about 6.7 % more energy, and the force rises", 45)
     'bending takes about 6.7 % more energy'
-    >>> shortened_to_clause("beams that are wide cannot curl across their width", 30)
-    'beams that are wide cannot ...'
+    >>> shortened_to_clause("beams that are wide are stiffer than in beam theory", 30)
+    'beams that are wide are ...'
     """
     text = " ".join(text.split())
     if len(text) <= limit:
@@ -317,8 +323,10 @@ def _beginning(text: str, limit: int) -> str:
     whole = [at for at in ends if text.count("(", 0, at) == text.count(")", 0, at)]
     if whole:
         return text[: max(whole)]
-    cut = text.rfind(" ", 0, max(limit - 3, 0))
-    return f"{text[:cut]} ..." if cut > 0 else text[:limit]
+    if (cut := text.rfind(" ", 0, max(limit - 3, 0))) > 0:
+        return f"{text[:cut]} {DOTS}"
+    cut = text.rfind(" ", 0, limit + 1)
+    return text[:cut] if cut > 0 else text[:limit]
 
 
 def _places(text: str, mark: str) -> Iterator[int]:

@@ -19,6 +19,7 @@ from cfmkit.documents.document import (
     WarningEntry,
     Written,
     command_line,
+    format_bounds,
     name_in_words,
     shortened_to_clause,
 )
@@ -57,8 +58,13 @@ FACTS = (
 )
 """Metrics that are shown of every family, as far as they have a value."""
 
-EXPECTED = ", and expect "
-"""What stands before the forces of a test plan, which a short page shows."""
+SHOWN_PARTS = {
+    "test plan": re.compile(r", and expect (?P<text>.*): each range"),
+    "yield": re.compile(
+        r"(?P<text>[^:]*%[^:]*\)[^:]*): .*with margins(?P<more>: the same command with )(?P<remedy>.*)"
+    ),
+}
+"""What a short page shows of a paragraph that is longer: its text, and the options that remedy it."""
 
 LITTLE_MARGIN = 1.05
 """Safety factor below which the margin is called little."""
@@ -165,9 +171,17 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
     if design is not None and design.nearest_feasible:
         yield from _nearest_feasible(design.nearest_feasible)
     for word, text in report.supplement.lines:
-        yield Note(word, text, short=text.partition(EXPECTED)[2])
+        yield note_of(word, text)
     for text in search_sentences(design.search) if design else ():
-        yield Note("search", text)
+        yield Note("search", text, is_detail=True)
+
+
+def note_of(word: str, text: str) -> Note:
+    """Return a paragraph that a verb adds, with what a short page shows of it."""
+    shown = SHOWN_PARTS[word].search(text) if word in SHOWN_PARTS else None
+    parts = shown.groupdict() if shown else {}
+    remedy = parts.get("remedy", "")
+    return Note(word, text.removesuffix(parts.get("more", "") + remedy), remedy, short=parts.get("text", ""))
 
 
 _PLAIN_VALUE = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)? ?[^\s,]*")
@@ -291,13 +305,13 @@ def _long_value(quantity: Quantity) -> str:
 def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
     """Return one row for each requirement: its metric, the value, the bounds, and whether they are kept."""
     rows = tuple(
-        (words(outcome.metric), *_value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
+        (words(outcome.metric), *value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
         for outcome in outcomes
     )
     return PageTable("Requirements", tuple(map(GridColumn, ("", "value", "required", ""))), rows)
 
 
-def _value_and_bounds(outcome: Outcome) -> tuple[str, str]:
+def value_and_bounds(outcome: Outcome) -> tuple[str, str]:
     """Return the value of an outcome and its bounds, as its sentence has them."""
     reported = outcome.sentence.removeprefix(words(outcome.metric)).strip().rpartition(": ")[0]
     value, _, bounds = reported.rpartition(", ")
@@ -424,7 +438,7 @@ def _required_row(report: Report, requirement: Requirement, outcome: Outcome) ->
     label = LABELS[base] + (f" on {branch}" if branch else "") if base in LABELS else words(outcome.metric)
     over = Window(*outcome.over) if outcome.over else None
     apart = "" if over is None or _is_title(report, over) else _format_window(report, outcome.metric, over)
-    bound = _bound(requirement)
+    bound = format_bounds({"min": requirement.min, "max": requirement.max})
     about = outcome.sentence
     if outcome.value is None:
         reason = outcome.sentence.partition("no value (")[2].rpartition("), ")[0]
@@ -444,12 +458,6 @@ def _is_title(report: Report, window: Window) -> bool:
         return False
     slack = 1e-9 * max(abs(shown.lo), abs(shown.hi))
     return abs(shown.lo - window.lo) <= slack and abs(shown.hi - window.hi) <= slack
-
-
-def _bound(requirement: Requirement) -> str:
-    if requirement.min is None:
-        return f"<= {requirement.max}"
-    return f">= {requirement.min}" if requirement.max is None else f"{requirement.min} to {requirement.max}"
 
 
 def complaints_of(report: Report) -> tuple[str, ...]:

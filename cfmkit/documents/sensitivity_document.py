@@ -6,8 +6,10 @@ from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import BAD, Document, GridColumn, Note, PageTable, ValueRow, Written, name_in_words
-from cfmkit.documents.run_document import warning_of
+from cfmkit.documents.run_document import value_and_bounds, warning_of
+from cfmkit.metrics.metric_definitions import words
 from cfmkit.studies.sensitivity.output import by_interval, exit_code, message, warnings, yield_ok
+from cfmkit.studies.sensitivity.result_types import IN_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -72,6 +74,8 @@ def _notes(found: Findings) -> Iterator[Note]:
             yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=BAD)
     if found.interrupted:
         yield Note("stopped", message(found), tone=BAD, whole=True)
+    if by_interval(found):
+        yield Note("yield", "its 95 % interval reaches the one that is required: not missed", whole=True)
     if found.evaluator.failed:
         yield Note("first", found.evaluator.first_failure)
 
@@ -80,11 +84,10 @@ def _yields(found: Findings) -> Iterator[ValueRow]:
     if found.all_met is None:
         return
     wanted = found.setup.block.min_yield
-    bound = "" if wanted is None else f">= {100 * wanted:.4g} %" + (" (in the interval)" if by_interval(found) else "")
+    bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
     yield ValueRow("yield", share_of(found.all_met), bound, None if wanted is None else yield_ok(found))
     for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
-        limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
-        yield ValueRow(name_in_words(outcome.metric), f"{share_of(one)}  {limits}")
+        yield ValueRow(words(outcome.metric), f"{share_of(one)}  {_in_words(value_and_bounds(outcome)[1])}")
 
 
 def share_of(one: Share) -> str:
@@ -98,11 +101,29 @@ def share_of(one: Share) -> str:
 
 
 def _rankings(found: Findings) -> Iterator[PageTable]:
+    shares = {metric.label for metric in found.setup.study.metrics if metric.dimension == "ratio"}
     for metric, each in _by_metric(found).items():
         indices = [name for name in INDICES[found.setup.method] if any(name in lines for lines in each.values())]
-        heads = (GridColumn(name_in_words(metric)), *(GridColumn(name_in_words(name), wraps=False) for name in indices))
-        rows = tuple((parameter, *(_index(lines.get(name)) for name in indices)) for parameter, lines in each.items())
+        ranked = enumerate(indices)
+        heads = (
+            GridColumn(_in_words(metric)),
+            *(GridColumn(name_in_words(name), wraps=False, rank=rank) for rank, name in ranked),
+        )
+        rows = tuple(
+            (_without_block(parameter), *(_index(lines.get(name), metric in shares) for name in indices))
+            for parameter, lines in each.items()
+        )
         yield PageTable("", heads, rows, MAX_PARAMETERS)
+
+
+def _in_words(label: str) -> str:
+    """Return the label of a column with its window, or the limits of a requirement, as people write it."""
+    return name_in_words(label).replace(" ... ", " to ")
+
+
+def _without_block(parameters: str) -> str:
+    """Return parameters without the block that nearly all stand in."""
+    return ", ".join(path.removeprefix("mechanism.") for path in parameters.split(", "))
 
 
 def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
@@ -120,10 +141,11 @@ def _rank(item: tuple[str, dict[str, IndexLine]]) -> float:
     return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
 
 
-def _index(line: IndexLine | None) -> str:
+def _index(line: IndexLine | None, of_share: bool) -> str:
+    """Return an index with its interval; in per cent if it is a share, or has the unit of a metric that is one."""
     if line is None or line.value is None:
         return "not stated"
-    percent = line.index in PERCENT
+    percent = line.index in PERCENT or (of_share and line.index in IN_UNITS and line.unit == "1")
     unit = " %" if percent else "" if line.unit == "1" else f" {line.unit}"
     value, low, high = (None if end is None else _short(end, percent) for end in (line.value, line.low, line.high))
     if low is None or low == value == high:

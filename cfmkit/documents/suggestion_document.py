@@ -47,7 +47,7 @@ def document_of(record: Mapping[str, Any], code: ExitCode, files: Written | None
     """
     found = [*record["proposals"], *record["unjudged"]]
     head, _, rest = record["message"].partition("; ")
-    notes = [Note("time", rest, whole=True)] if rest else []
+    notes = [Note("time", rest, whole=True)] if rest and not record["warnings"] else []  # which say the same
     return Document(
         exit_code=code,
         title="suggest",
@@ -83,7 +83,12 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
             yield PageTable(heading, heads, tuple(cells))
     pair = (GridColumn("", False), GridColumn())
     named = {one["family"] for one in listed}
-    silent = tuple(_silent(one) for one in record["families"] if one["family"] not in named)
+    known = {(one["family"], one["misses"][0]) for one in near}
+    silent = tuple(
+        _silent(one)
+        for one in record["families"]
+        if one["family"] not in named and (one["nearest"] or (one["family"], one["reason"]) not in known)
+    )
     if silent:
         yield PageTable("no proposals from these families", pair, silent)
 
@@ -92,7 +97,7 @@ def _remarks(found: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     """Yield what was not judged and what is warned of, each once with the numbers of its proposals."""
     texts: dict[str, list[int]] = defaultdict(list)
     for number, one in enumerate(found, 1):
-        for text in (*one["unjudged"], *one["warnings"]):
+        for text in (*one["unjudged"], *(f"{name} (see `cfmkit show {name}`)" for name in one["warnings"])):
             texts[text].append(number)
     for text, numbers in texts.items():
         yield Note(f"no. {_numbers(numbers)}", text, whole=True)
@@ -125,9 +130,8 @@ def _incomplete(found: Sequence[Mapping[str, Any]], files: Written) -> Iterator[
     bare = [one["folder"] for one in found if f"{one['folder']}/metrics.json" not in files.files]
     if bare:
         text = (
-            f"the time ran out: of {', '.join(bare)} only design.yaml was written, and what is cut if there was time; "
-            "`cfmkit analyze` of that file gives the curve and figures, `cfmkit export --format dxf,svg,png` the files "
-            "to cut and a drawing"
+            f"no time was left for the curve and figures of {', '.join(bare)}: `cfmkit analyze` of its design.yaml "
+            "makes them, `cfmkit export --format dxf,svg,png` the files to cut and a drawing"
         )
         yield Note("note", text, whole=True)
 

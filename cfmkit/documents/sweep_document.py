@@ -67,7 +67,7 @@ def document_of(
         headline=(
             *(
                 ValueRow(
-                    name_in_words(one["metric"]),
+                    _in_words(one["metric"]),
                     f"met at {one['met']} of {one['of']}",
                     format_bounds(one),
                     bool(one["ok"]),
@@ -109,7 +109,7 @@ def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator
     metric = summary["metrics"][best["by"]]
     value = _quantity(metric["value"], metric["unit"], dimensions.get(best["by"], ""))
     tie = f" ({best['ties']} tie)" if best["ties"] > 1 else ""
-    yield ValueRow(f"{best['sense']} {name_in_words(best['by'])}", f"{value}, point {best['point']}{tie}")
+    yield ValueRow(f"{best['sense']} {_in_words(best['by'])}", f"{value}, point {best['point']}{tie}")
 
 
 def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[PageTable]:
@@ -126,16 +126,28 @@ def _ranges(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterat
         at_best = summary["metrics"].get(name, {}).get("value")
         shown = "" if at_best is None else _quantity(at_best, one["unit"], dimension)
         if one["max"] - one["min"] <= NO_INFLUENCE * max(abs(one["min"]), abs(one["max"])):
-            row, others = (name_in_words(name), low, "no influence", shown), constant
+            row, others = (_in_words(name), low, "no influence", shown), constant
         else:
-            row, others = (name_in_words(name), low, high, shown), rows
+            row, others = (_in_words(name), low, high, shown), rows
         (leading if name in (*first, *asked) else others).append(row)
     if leading or rows:
-        columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in ("from", "to", "best point")))
-        yield PageTable("", columns, (*leading, *rows), MAX_RANGES)
+        heads = ("from", "to", *(("best point",) if summary["best"] else ()))
+        columns = (GridColumn("range of"), *(GridColumn(head, wraps=False) for head in heads))
+        yield PageTable("", columns, tuple(row[: len(columns)] for row in (*leading, *rows)), MAX_RANGES)
     if constant:
         columns = (GridColumn("no influence on"), GridColumn("value", wraps=False))
         yield PageTable("Results without influence", columns, tuple(row[:2] for row in constant), 0)
+
+
+def _in_words(label: str) -> str:
+    """Return the label of a result as people write it, with its branch and window.
+
+    Examples
+    --------
+    >>> _in_words("force_mean[load] over 5 ... 235 mm")
+    'force mean on load over 5 to 235 mm'
+    """
+    return name_in_words(label).replace("[", " on ").replace("]", "").replace(" ... ", " to ")
 
 
 def _quantity(value: float | str, unit: str, dimension: str) -> str:

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING
 from cfmkit.documents.document import (
     BAD,
     BLANK,
+    DOTS,
     FAINT,
     GOOD,
     LABEL,
     MARGIN,
+    NUMBER,
     SHORTEST,
     CellGrid,
     GridColumn,
@@ -83,7 +85,7 @@ def page(document: Document, width: int, everything: bool = False) -> Iterator[B
         yield from _whole_page(document)
     else:
         yield from top
-        most = MAX_LINES_WITH_TABLES if document.tables else MAX_LINES
+        most = MAX_LINES_WITH_TABLES if document.tables and not document.metrics else MAX_LINES
         yield from _short_page(document, width, most - len(top))
 
 
@@ -109,7 +111,7 @@ def _title(document: Document, width: int) -> Iterator[TextLine]:
 
 def _short_page(document: Document, width: int, spare: int) -> Iterator[TextLine | CellGrid]:
     """Yield the lines below the title: what must stand first takes its lines, warnings and facts share the others."""
-    notes = [text for note in document.notes for text in _note_lines(note, width)]
+    notes = [text for note in document.notes if not note.is_detail for text in _note_lines(note, width)]
     tables = [text for table in document.tables if table.most != 0 for text in _table_lines(table, width)]
     follow = [*_file_lines(document.files, width), *([_command("next", document.next)] if document.next else [])]
     needed = _most_of_headline(document.headline)
@@ -140,13 +142,18 @@ def _note_lines(note: Note, width: int) -> list[TextLine]:
 
 
 def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> TextLine:
-    """Return a line of a name, what fits of a text, and a remedy at the far end where there is room for it."""
-    beside = room - len(remedy) - GAP if remedy else room
-    if remedy and beside - len(name) < min(SHORTEST, len(text)):
-        remedy, beside = "", room
-    left = beside - len(name)
-    shown = name + shortened_to_clause(text, left) if left >= LEAST_TEXT else name.removesuffix(": ")
-    return whole_line(word, shown, " " * (room - len(shown) - len(remedy)) + remedy if remedy else "")
+    """Return a line of a name, what fits of a text, and a remedy at the far end if the text keeps its number."""
+    left = room - len(name)
+    shown = shortened_to_clause(text, left) if left >= LEAST_TEXT else ""
+    if remedy:
+        beside = shortened_to_clause(text, max(left - len(remedy) - GAP, 0))
+        kept = bool(NUMBER.search(beside)) if NUMBER.search(shown) else not beside.endswith(DOTS)
+        if beside != shown and (len(beside) < SHORTEST or not kept):
+            remedy = ""
+        else:
+            shown = beside
+    whole = name + shown if shown else name.removesuffix(": ")
+    return whole_line(word, whole, " " * (room - len(whole) - len(remedy)) + remedy if remedy else "")
 
 
 def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> list[TextLine]:
@@ -229,15 +236,9 @@ def _wide(lines: Iterable[Sequence[Span]]) -> int:
 def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
     """Return a table without the columns of the highest ranks, as many as it takes to fit a page."""
     while any(column.rank for column in table.columns):
-        texts = [
-            [column.head for column in table.columns],
-            *([str(getattr(c, "text", c)) for c in r] for r in table.rows),
-        ]
-        wide = [max(len(row[at]) for row in texts) for at in range(len(table.columns))]
-        least = (min(w, LEAST_COLUMNS) if column.wraps else w for w, column in zip(wide, table.columns, strict=True))
-        if sum(least) + INDENT + 2 * (len(wide) - 1) <= width:
+        if sum(map(_least_columns, table.columns, _columns(table))) + INDENT + 2 * (len(table.columns) - 1) <= width:
             break
-        at = max(range(len(wide)), key=lambda k: table.columns[k].rank)
+        at = max(range(len(table.columns)), key=lambda k: table.columns[k].rank)
         table = table._replace(
             columns=(*table.columns[:at], *table.columns[at + 1 :]),
             rows=tuple((*row[:at], *row[at + 1 :]) for row in table.rows),
@@ -245,31 +246,56 @@ def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
     return table
 
 
+def _columns(table: PageTable) -> list[list[str]]:
+    """Return the texts of the cells of each column."""
+    return [
+        [getattr(row[at], "text", str(row[at])) for row in table.rows if at < len(row)]
+        for at in range(len(table.columns))
+    ]
+
+
+def _least_columns(column: GridColumn, texts: Sequence[str]) -> int:
+    """Return how many characters a column needs: its longest cell, or word where cells may be cut."""
+    words = [word for text in texts for word in (text.split() if column.wraps else [text])]
+    return max([min(len(column.head), LEAST_COLUMNS) if column.wraps else len(column.head), *map(len, words)])
+
+
 def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     """Return a table as lines: as many rows as a short page has of it, each as wide as the page."""
     table = _drop_ranked_columns(table, width)
     rows = table.rows if table.most is None else table.rows[: table.most]
-    cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
+    more, table = len(table.rows) - len(rows), table._replace(rows=rows)
+    texts = _columns(table)
     heads = [column.head for column in table.columns]
+    least = list(map(_least_columns, table.columns, texts))
+    wide = [max(map(len, column), default=0) for column in texts]
+    room = width - INDENT - 2 * (len(wide) - 1)
+    top = table.heading
+    if not top and sum(wide) - wide[0] + max(wide[0], len(heads[0])) > room:  # a long head takes a line of its own
+        top, heads[0] = heads[0], ""
+    wide = [max(columns, len(head)) for columns, head in zip(wide, heads, strict=True)]
+    lines: list[TextLine | CellGrid] = [line(f"  {top}", LABEL)] if top else []
+    while sum(wide) > room:  # texts give way, words and numbers do not
+        able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > least[at]]
+        if not able:  # cells take several lines
+            return [*lines, _grid(table._replace(columns=tuple(map(_with_head, table.columns, heads))), rows)]
+        widest = max(able, key=lambda at: wide[at])
+        wide[widest] = max(wide[widest] - (sum(wide) - room), least[widest])
+    cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
     if any(heads):
         cells.insert(0, [Span(head, FAINT) for head in heads])
-    wide = [max([0, *(len(row[at].text) for row in cells if at < len(row))]) for at in range(len(heads))]
-    room = width - INDENT - 2 * (len(wide) - 1)
-    while sum(wide) > room:  # texts give way, numbers do not
-        able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > LEAST_COLUMNS]
-        if not able:  # cells take several lines
-            return [*([line(f"  {table.heading}", LABEL)] if table.heading else []), _grid(table, rows)]
-        widest = max(able, key=lambda at: wide[at])
-        wide[widest] = max(wide[widest] - (sum(wide) - room), LEAST_COLUMNS)
-    lines: list[TextLine | CellGrid] = [line(f"  {table.heading}", LABEL)] if table.heading else []
     for row in cells:
-        texts = [
+        spans = [
             Span(f"{shortened_to_clause(one.text, wide[at]):<{wide[at] + 2}}", one.tone) for at, one in enumerate(row)
         ]
-        lines.append(whole_line(" " * INDENT, *texts))
-    if (more := len(table.rows) - len(rows)) > 0:
+        lines.append(whole_line(" " * INDENT, *spans))
+    if more > 0:
         lines.append(line(f"  and {more} more (-v)", FAINT))
     return lines
+
+
+def _with_head(column: GridColumn, head: str) -> GridColumn:
+    return column._replace(head=head)
 
 
 def _file_lines(files: Written | None, width: int) -> list[TextLine]:

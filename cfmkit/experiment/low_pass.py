@@ -110,7 +110,7 @@ def read_filter(text: str) -> LowPass | None:
     try:
         cutoff, per = _read_cutoff(match["cutoff"] if match else text)
     except QuantityError as error:
-        raise UsageError(f"--filter: {error}; write e.g. '2 Hz', '0.24 1/mm, order 3' or 'none'") from None
+        raise UsageError(f"--filter: {error} (e.g. '2 Hz', '0.24 1/mm, order 3', 'none')") from None
     order = int(match["order"]) if match and match["order"] else DEFAULT_ORDER
     return LowPass(cutoff, per, order, bool(match and match["corrected"]))
 

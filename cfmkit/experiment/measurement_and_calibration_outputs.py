@@ -25,7 +25,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
@@ -239,23 +239,27 @@ def comparison_data(comparison: Comparison, source: MeasuredCurves) -> dict[str,
 
 
 def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tuple[str, str], ...]:
-    """Return the paragraphs that a page shows: how the file was read, and the errors."""
+    """Return the paragraphs that a page shows: how the file was read, and by how much the model differs from it."""
     metrics, kind = comparison.metrics(), comparison.curve.kind
     several = len(comparison.samples) > 1
-    over = span_text(comparison.window.lo, comparison.window.hi, kind)
-    lines = [("read", text) for text in source.recording.lines]
-    for item in comparison.samples:
-        suffix = f"[{item.branch}]" if several else ""
-        values = [metrics[name + suffix].value for name in ("data_rmse", "data_offset", "data_error_max")]
-        reported = ["no value" if value is None else format_short(value, kind) for value in values]
-        where = f" on {item.branch}" if several else ""
-        lines.append(
-            (
-                "data",
-                f"model - measured{where}: rms {reported[0]}, mean {reported[1]}, largest {reported[2]} over {over}",
-            )
-        )
-    return tuple(lines)
+    over = span_text(comparison.window.lo, comparison.window.hi, kind).replace(" ... ", " to ")
+    residuals = []
+    for word, name in (("rms", "data_rmse"), ("mean", "data_offset"), ("largest", "data_error_max")):
+        values = []
+        for item in comparison.samples:
+            value = metrics[name + (f"[{item.branch}]" if several else "")].value
+            text = "no value" if value is None else format_short(value, kind)
+            values.append(f"{text} {item.branch}" if several else text)
+        residuals.append(f"{word} {', '.join(values)}")
+    reading = reading_line(source.recording.lines)
+    return (*reading, ("residual", f"{'; '.join(residuals)} (model - measured, {over})"))
+
+
+def reading_line(decisions: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Return the paragraph on how a file was read, its columns and what was subtracted first; nothing of arrays."""
+    columns = next((k for k, text in enumerate(decisions) if " = " in text), 0)
+    about_file = f" ({'; '.join(decisions[:columns])})" if columns else ""
+    return (("read", "; ".join(decisions[columns:]) + about_file),) if decisions else ()
 
 
 def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:

@@ -104,7 +104,7 @@ def too_soft(share: float, where: str) -> str:
     if not share > TOO_SOFT:
         return ""
     return (
-        f"beams that are wide for their thickness cannot curl across their width: bending takes about "
+        f"the anticlastic bending of beams that are wide for their thickness is suppressed: bending takes about "
         f"{percent(share)} more energy {where}, and the force rises by at least the same share; clamped ends "
         "add to it"
     )
@@ -112,7 +112,7 @@ def too_soft(share: float, where: str) -> str:
 
 def stiffer(share: float) -> str:
     """Return the same in short."""
-    return f"force at least {percent(share)} larger: beams cannot curl across their width"
+    return f"force at least {percent(share)} larger: anticlastic bending is suppressed"
 
 
 def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bool) -> str:
@@ -123,14 +123,14 @@ def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bo
     Examples
     --------
     >>> bracket(10e-3, 1e-3, 0.35, False)
-    '10 mm wide, 1 mm thick: the force is between that of plane stress, as solved, and that of plane strain, 14 % more'
+    'the force is between plane stress, as solved, and plane strain, 14 % more (10 mm wide, 1 mm thick)'
     """
     if not width > NARROW * thickness:
         return ""
     more = percent(1.0 / (1.0 - poisson_ratio**2) - 1.0)
     return (
-        f"{mm(width)} wide, {mm(thickness)} thick: the force is between that of plane stress, as solved, and that of "
-        f"plane strain, {more} more"
+        f"the force is between plane stress, as solved, and plane strain, {more} more ({mm(width)} wide, "
+        f"{mm(thickness)} thick)"
         + ("; mechanism.wide_beams counts in beam models only and changes neither" if wide_beams else "")
     )
 

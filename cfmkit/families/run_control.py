@@ -111,7 +111,7 @@ class Run:
     seed : int
         Random seed.
     progress : callable
-        Is told a fraction in [0, 1], which never falls, and a short text.
+        Progress callback: takes a fraction in [0, 1], which never falls, and a short text.
     time_budget : float, optional
         In seconds, a text with its unit is read; None: no limit.
     executor : Executor

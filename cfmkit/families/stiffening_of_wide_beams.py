@@ -1,8 +1,8 @@
-"""By how much the force of a part rises because its beams are too wide to curl across their width.
+"""By how much the force of a part rises because the anticlastic bending of its wide beams is suppressed.
 
-A planar solid is in plane stress: its beams curl freely. Beam models know both: with `mechanism.wide_beams` they are as
-stiff as the curvature makes them. The ratio of both means over the window is what a solid misses; what clamped ends
-add is left out (docs/beam.md, wide beams).
+In a planar solid, in plane stress, it is free. Beam models know both: with `mechanism.wide_beams` they are as stiff
+as the curvature makes them. The ratio of both means over the window is what a solid misses; what clamped ends add is
+left out (docs/beam.md, wide beams).
 """
 
 from __future__ import annotations

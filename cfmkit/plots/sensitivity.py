@@ -356,8 +356,8 @@ def draw_morris(found: Findings, number: int) -> Figure:
             axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
             continue
         colour, ends, up = LINES[row % len(LINES)], [factor * end for end in _numbers(size)[2:]], factor * scatter.value
-        axes.plot(factor * size.value, up, MARKERS[row], label=label, linestyle="", color=colour, ms=5)
-        axes.plot(ends, (up,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0)
+        axes.plot(factor * size.value, up, MARKERS[row], label=label, linestyle="", color=colour, ms=5, clip_on=False)
+        axes.plot(ends, (up,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0, clip_on=False)
         top = max(top, factor * (size.high or 0.0), up)
     if top:
         look = {"textcoords": "offset points", "ha": "right", "size": SMALL, "color": GREY}

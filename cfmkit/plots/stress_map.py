@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.arrays import FloatArray
+    from cfmkit.arrays import FloatArray, IntArray
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
+    from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.meshed_part import MeshSolution
     from cfmkit.solid.stress_along_fillets import FilletArc
 
@@ -125,6 +126,13 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
     return figure
 
 
+def boundary_nodes(mesh: TriangleMesh) -> Iterator[IntArray]:
+    """Yield the nodes along each ring of a mesh, in order: a refined mesh has its halved edges after all others."""
+    along = np.lexsort((mesh.arcs[:, 0], mesh.rings))
+    for ring in np.unique(mesh.rings):
+        yield mesh.edges[along[mesh.rings[along] == ring]][:, [0, 2]].ravel()
+
+
 def _draw_part(ax: Axes, view: StressView, places: FloatArray, top: float) -> Any:
     """Draw one part [mm] with its stress, 0 ... top [MPa]; return what a colour bar is made of."""
     from matplotlib.tri import Triangulation
@@ -142,8 +150,7 @@ def _draw_part(ax: Axes, view: StressView, places: FloatArray, top: float) -> An
         zorder=3,
     )
     shades.set_zorder(3)
-    chains = [grid.edges[grid.rings == ring][:, [0, 2]].ravel() for ring in np.unique(grid.rings)]
-    parts.plate(ax, [places[chain] for chain in chains])
+    parts.plate(ax, [places[nodes] for nodes in boundary_nodes(grid)])
     start = int(np.hypot(*(grid.nodes - view.solved.peaks[1][view.pose]).T).argmin())
     ax.plot(
         *(1e3 * places[start]), marker="o", markersize=6, color=VERMILLION, fillstyle="none", linestyle="", zorder=4

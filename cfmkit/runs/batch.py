@@ -157,7 +157,7 @@ def lost_entry(job: BatchJob, outcome: Lost) -> Entry:
 
 
 class BatchMonitor(Protocol):
-    """Who is told how far a batch is, and may end it."""
+    """Progress callback of a batch, with cancellation."""
 
     @property
     def stopped(self) -> bool:
@@ -175,7 +175,7 @@ class BatchMonitor(Protocol):
 
 @dataclass
 class Unwatched:
-    """A monitor that tells nobody."""
+    """A monitor that does nothing."""
 
     stopped: bool = False
 
@@ -386,7 +386,7 @@ def batch(
     arguments : sequence of str
         What manifests say of the command line.
     monitor : BatchMonitor, optional
-        Who is told how far it is, and may end it.
+        Progress callback with cancellation.
     noting : callable
         What opens the journal of the folder.
 

@@ -101,7 +101,8 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
     if calibration.parameters:
         files["parameters.csv"] = lambda: to_csv(add.parameters_table(calibration))
     heads = ("", "before (95 %)", "after", "predicted (95 %)")
-    table = PageTable("", tuple(map(GridColumn, heads)), tuple(row.cells for row in rows), N_ROWS_ON_PAGE)
+    shown = rows if correction.changes else rows[:1]  # else every value is as before
+    table = PageTable("", tuple(map(GridColumn, heads)), tuple(row.cells for row in shown), N_ROWS_ON_PAGE)
     return replace(
         report,
         metrics=dict(report.metrics) | after.metrics() | after.loss(),
@@ -113,7 +114,9 @@ def report_of(correction: DesignCorrection, source: MeasuredCurves, zero_known: 
             tuple(_lines(correction, zero_known)),
             (*add.comparison_warnings(after, source), *calibration.warnings, *correction.warnings),
             shortfall=add.shortfall(after),
-            figures=add.comparison_figures(after, correction.drawn.name, calibration.before),
+            figures=add.comparison_figures(
+                after, correction.drawn.name, calibration.before if calibration.parameters else None
+            ),
             tables=(table,),
         ),
     )
@@ -146,7 +149,7 @@ def _lines(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str
     calibration, kind = correction.explanation.calibration, correction.nominal.curve.kind
     for explanation in correction.explanations:
         word = "found" if explanation is correction.explanation else "or"
-        yield word, "; ".join(explanation.sentences) or "no error of the part that the recording shows"
+        yield word, "; ".join(explanation.sentences) or "the recording shows no error of the part"
     zero = calibration.zeros.effort
     if zero:
         yield "zero", f"without load the sensor shows {format_short(zero, kind, 3)}, which is taken off"
@@ -158,7 +161,7 @@ def _lines(correction: DesignCorrection, zero_known: bool) -> Iterator[tuple[str
         yield "loss", f"a measured cycle loses {area}, loss factor {factor.value:.3g}"
     wanted, reached = (format_short(value, kind, 4) for value in (correction.target, correction.before.value))
     if not correction.changes:
-        yield "corrected", f"{WITHIN_SCATTER}: the mean {kind} is {reached}"
+        yield "corrected", f"{WITHIN_SCATTER} (mean {kind} {reached})"
         return
     yield "corrected", f"for {wanted} instead of {reached}; the next part is assumed to be made with the same errors"
     if correction.will_be_made != correction.corrected:

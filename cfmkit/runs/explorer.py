@@ -183,7 +183,9 @@ class Explorer:
             moving = moving_of(family(result.spec.family), result)
         except CfmError:
             moving = None
-        drawn = "" if moving is None else still(moving, len(moving.motion) // 2, "the mechanism to scale, half way")
+        drawn = (
+            "" if moving is None else still(moving, len(moving.motion) // 2, "the mechanism to scale, at mid-travel")
+        )
         return {"svg": drawn}
 
     def yaml(self, changes: Sequence[str]) -> str:
@@ -206,7 +208,7 @@ class Explorer:
             raise UsageError(f"{visible(name)!r}: name a file such as mine.yaml, without a folder")
         target = self.folder / name
         if target.exists() or target.is_symlink():
-            raise OutputError(f"cannot write {visible(name)}: a file of that name is in the way")
+            raise OutputError(f"cannot write {visible(name)}: the file exists")
         with reporting(name):
             write_new(target, self.yaml(changes).encode())
         return {"saved": name}

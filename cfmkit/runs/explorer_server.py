@@ -74,7 +74,7 @@ class ExplorerServer(ThreadingHTTPServer):
     token : str
         What a request must have.
     failed : callable
-        Is told the exception of an answer that a bug ended; the page has one line of it.
+        Callback for the exception of an answer that a bug ended; the page has one line of it.
     """
 
     daemon_threads = True

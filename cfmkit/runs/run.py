@@ -140,7 +140,7 @@ def carry_out(
     arguments : sequence of str
         The command line, for the manifest.
     progress : callable, optional
-        Is told how far the run is.
+        Progress callback.
     """
     start = time.perf_counter()
     document, spec = read(wanted)
@@ -282,7 +282,7 @@ def run_analysis(spec: Spec, run: Run) -> Report:
 def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
     """Return where the data on life and creep come from that a specification leaves to the library."""
     lasting = getattr(spec, "durability", None)
-    return () if lasting is None else tuple(("lasting", text) for text in lasting.assumed)
+    return () if lasting is None else tuple(("durability", text) for text in lasting.assumed)
 
 
 def run_design(spec: Spec, run: Run) -> Report:
@@ -308,7 +308,7 @@ def run_design(spec: Spec, run: Run) -> Report:
 
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
-    """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
+    """Return a report with what is known of many parts of its design, and its test plan."""
     from cfmkit.studies.assumed_friction import friction_note
     from cfmkit.studies.parts.expected_forces import expected_forces
 

@@ -36,7 +36,7 @@ def suggest(
     springs: str | Sequence[str] | None = None,
     prefer: Sequence[str] | None = None,
 ) -> SuggestionsView:
-    """Return mechanisms of every family that do what is required, the best first, and those not judged in full.
+    """Return mechanisms of every family that meet the requirements, ranked, and those not judged in full.
 
     Parameters
     ----------

@@ -116,7 +116,7 @@ def sensitivity(
     design: bool | None = None,
     seed: int | None = None,
 ) -> StudyResult:
-    """Return which value matters most, or how many made parts will meet the requirements.
+    """Return the influence of each value, or the yield of manufactured parts.
 
     Parameters
     ----------

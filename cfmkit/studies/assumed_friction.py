@@ -50,6 +50,6 @@ def friction_note(result: Result, run: Run) -> str:
     up, down, free = (format_short(float(entry or 0.0), kind) for entry in (*means, frictionless))
     size = format_short(pin, "length")
     return (
-        f"mean {kind} {up} one way and {down} back, not {free}: {PLAIN_FRICTION:g} assumed in pins ({size}) and guide, "
-        "because no friction is stated"
+        f"mean {kind} {up} one way, {down} back with {PLAIN_FRICTION:g} in pins ({size}) and guide (assumed: none is "
+        f"stated); {free} without"
     )

@@ -289,7 +289,7 @@ def run(
     journal : Journal, optional
         Where rows are noted; without one they are kept in memory.
     monitor : Monitor, optional
-        Is told how far the study is, and may stop it.
+        Progress callback with cancellation.
     """
     study = work.study
     if study.design and family(study.spec.family).design is None:

@@ -93,7 +93,7 @@ class Study:
     metrics: tuple[Metric, ...]  # what is noted
     design: bool = False  # whether the mechanism is designed anew at each point
     curves: bool = False  # whether curves are kept
-    seed: int = 0  # of everything random inside an analysis
+    seed: int = 0  # random seed of an analysis
     findings: bool = True  # whether the names of findings are noted
     # what makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes
     deliver: Deliver = of_perfect_parts

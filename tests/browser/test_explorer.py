@@ -112,7 +112,7 @@ def test_the_numbers_of_a_list_and_the_requirements_say_what_they_are(page):
     }
     assert [one.inner_text() for one in names.values()] == ["from", "to"]
     assert "requirements.0: force_ripple" in page.locator("legend").all_inner_texts()
-    assert "Dashed: as in the file" in page.locator("figcaption").first.inner_text()
+    assert "Dashed: curve of the file" in page.locator("figcaption").first.inner_text()
 
 
 def test_what_was_moved_goes_back_to_what_stood_there(page):

@@ -35,7 +35,7 @@ def metrics(cli, folder):
 def test_analyze_with_data_adds_errors_a_figure_and_the_measured_curve(cli, cam, rig):
     done = cli("analyze", cam, "--data", rig, "-o", "out")
     assert (done.code, done.err) == (0, "")
-    assert "data model - measured on load: rms " in " ".join(done.out.split())
+    assert "residual rms " in " ".join(done.out.split())
     document = metrics(cli, "out")
     assert list(document)[:5] == ["status", "message", "metrics", "requirements", "warnings"]
     offset = document["metrics"]["data_offset"]

@@ -200,7 +200,7 @@ def test_a_part_that_follows_another_value_is_warned_of(cli, cam):
 
 def test_the_page_says_what_matters(cli, study):
     done = cli("sensitivity", study, "-o", "out", "--samples", "10", "--no-plots")
-    for words in ("yield", "95 %", "variance drop when halved", "mechanism.rest_half_width", "files"):
+    for words in ("yield", "95 %", "variance drop when halved", "  rest_half_width", "files"):
         assert words in done.out
 
 

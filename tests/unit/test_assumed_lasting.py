@@ -71,7 +71,7 @@ def test_what_is_assumed_is_not_written_into_a_specification():
 
 def test_an_analysis_reports_the_force_after_a_hold_and_that_its_creep_is_assumed(tmp_path, capsys):
     assert main(["analyze", str(CONFIGS / "make_pom_strip.yaml"), "--no-plots", "-v", "-o", str(tmp_path)]) == 0
-    assert "lasting" in (page := capsys.readouterr().out)
+    assert "durability" in (page := capsys.readouterr().out)
     assert "Hostaform C 9021" in page
     metrics = json.loads((tmp_path / "metrics.json").read_text())["metrics"]
     kept = metrics["force_after[1000 h]"]["value"] / metrics["force_mean"]["value"]

@@ -6,7 +6,7 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.output import Terminal
-from cfmkit.documents import sweep_document
+from cfmkit.documents import run_document, sweep_document
 from cfmkit.documents.document import (
     BLANK,
     CellGrid,
@@ -14,6 +14,7 @@ from cfmkit.documents.document import (
     GridColumn,
     JsonText,
     Note,
+    PageTable,
     Paragraph,
     Span,
     ValueRow,
@@ -188,3 +189,47 @@ def test_what_a_sweep_does_not_change_has_no_influence_and_ties_are_counted():
     assert any(line.split()[:2] == ["force", "ripple"] and "no influence" in line for line in lines)
     assert any(line.split()[:2] == ["usable", "stroke"] and "no influence" not in line for line in lines)
     assert any("point 1 (3 tie)" in line for line in lines)
+
+
+def test_a_remedy_costs_a_warning_neither_its_number_nor_its_clause():
+    """Before, the number of `undercut` gave way to the remedy on a page of 100 columns."""
+    text, remedy = "force not constant over the first 1.14 mm", "design --set design.choose=preload"
+    document = Document(title="a", warnings=(WarningEntry("undercut", text, text, (remedy,)),))
+    assert page_of(document)[1].endswith(f"undercut: {text}")
+    short = Document(title="a", warnings=(WarningEntry("undercut", text, text, ("--set a=1",)),))
+    assert page_of(short)[1].endswith("--set a=1")
+    assert text in page_of(short)[1]
+
+
+@pytest.mark.parametrize("width", [80, 100])
+def test_names_in_tables_are_whole_and_columns_of_less_weight_give_way(width):
+    """Before, `positive.thickness` and `positive.length` were cut to the same letters on a page of 80 columns."""
+    names = ("positive.thickness", "positive.length")
+    heads = (
+        GridColumn("deviation from target over 5 to 235 mm"),
+        GridColumn("normalised slope", False),
+        GridColumn("gradient", False, 1),
+    )
+    rows = tuple((name, "-2.85 (-3.16 to -2.55)", "-0.000777 1/mm (-0.00086 to -0.000695)") for name in names)
+    lines = page_of(Document(title="a", tables=(PageTable("", heads, rows),)), width)
+    assert max(map(len, lines)) <= width
+    assert "deviation from target over 5 to 235 mm" in "\n".join(lines)
+    assert [line.split()[0] for line in lines[-2:]] == list(names)
+    assert ("gradient" in "\n".join(lines)) is (width == 100)
+
+
+def test_a_short_page_has_the_yield_with_its_remedy_and_the_forces_of_the_test_plan():
+    tail = "; linear estimate; with margins: the same command with --set design.process=fdm --set design.yield=90%"
+    lines = {
+        "yield": f"2 % (fdm, assumed tolerances), 20 % once the modulus is measured: thickness +- 0.05 mm{tail}",
+        "test plan": "make the part, displace to 2 mm and 12 mm, and expect 20 N at 2 mm (9 to 28 N) and 20.3 N at "
+        "12 mm (9.6 to 28 N): each range holds for 95 % of parts (linear estimate)",
+    }
+    notes = tuple(run_document.note_of(word, text) for word, text in lines.items())
+    first, second = page_of(Document(title="a", notes=notes))[1:]
+    assert first.split("   ")[0].strip() == "yield"
+    assert "2 % (fdm, assumed tolerances)  " in first
+    assert first.endswith("   --set design.process=fdm --set design.yield=90%")
+    assert second.endswith("20 N at 2 mm (9 to 28 N) and 20.3 N at 12 mm (9.6 to 28 N)")
+    whole = " ".join(" ".join(page_of(Document(title="a", notes=notes), everything=True)).split())
+    assert whole.count("design.yield=90%") == 1

@@ -200,10 +200,12 @@ def test_panels_side_by_side_below_a_wide_diagram_stand_below_each_other_in_a_co
 
 def test_a_heading_stays_on_a_narrow_paper():
     figure = style.new_figure(84.0, 60.0)
-    write_heading(figure, Heading("sanchez-salinas-2022", "force over travel of the shuttle, from the as-made pose"))
+    write_heading(
+        figure, Heading("sanchez-salinas-2022", "force over travel of the shuttle, from the unloaded position")
+    )
     (text,) = figure.texts
     assert text.get_window_extent().x1 <= figure.bbox.width
-    assert text.get_text() == "force over travel of the shuttle, from the as-made pose"
+    assert text.get_text() == "force over travel of the shuttle, from the unloaded position"
 
 
 def test_names_of_axes_and_lines_stay_on_a_narrow_paper_and_off_the_curve():

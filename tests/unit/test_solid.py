@@ -12,11 +12,13 @@ from shoulder_fillets import handbook
 
 from cfmkit.errors import GeometryError
 from cfmkit.export import contours
+from cfmkit.plots.stress_map import boundary_nodes
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.followed_part import FollowedPart
 from cfmkit.solid.mesh import TriangleMesh, mesh
+from cfmkit.solid.mesh_refinement import refine
 from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
 from cfmkit.solid.path_following import PathEnd, PosePath, follow
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
@@ -71,6 +73,17 @@ def test_a_part_has_two_elements_across_its_thin_places():
     grid = mesh((Ring.of(arms, False),), 1e-3)
     a, b = grid.nodes[grid.edges[:, 0]], grid.nodes[grid.edges[:, 1]]
     assert np.hypot(*(b - a).T).max() < 1.6 * 0.1e-3  # where the arms meet the part is thicker
+
+
+def test_the_boundary_of_a_refined_mesh_is_drawn_from_edge_to_edge():
+    """Before, halved edges stood behind all others, and stress maps had grey areas between places far apart."""
+    ring = Ring.of(box(0, 0, 10e-3, 2e-3), False)
+    coarse = mesh((ring,), 1e-3)
+    fine = refine(coarse, (ring,), np.arange(len(coarse.triangles)) < 5).mesh
+    assert len(fine.edges) > len(coarse.edges)
+    (nodes,) = boundary_nodes(fine)
+    x, y = fine.nodes[nodes].T
+    assert 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) == pytest.approx(20e-6)
 
 
 def test_elements_meet_along_a_seam():

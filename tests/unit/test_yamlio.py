@@ -255,6 +255,7 @@ def test_the_last_of_two_options_counts() -> None:
         ("mechanism.load={kind: weight}", "--set mechanism.load: the key 'mass' is missing: a mass, e.g. '0.25 kg'"),
         ("mechanism.load={kind: weight, mass: 1 N}", "--set mechanism.load: mechanism.load.mass: '1 N' is a force; "
          "a mass is needed, e.g. '1 kg'"),
+        ("width=5 mm", "--set width: unknown key 'width'; did you mean 'mechanism.width'?"),
         ("new.block.key=1", "--set new.block.key: new: unknown key 'new'; allowed are cfmkit, family, name, "
          "description, requirements, sweep, sensitivity, mechanism, analysis"),
     ],

@@ -165,4 +165,4 @@ def _shown_warnings(report: MeasureReport) -> list[str]:
 def _short(quantity: Any) -> str:
     from cfmkit.specs.units import format_short
 
-    return "no value" if quantity.value is None else format_short(quantity.value, quantity.dimension, 6)
+    return "no value" if quantity.value is None else format_short(quantity.value, quantity.dimension, 4)

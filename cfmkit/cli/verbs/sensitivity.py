@@ -1,4 +1,4 @@
-"""``cfmkit sensitivity``: which value matters, and how good the made parts will be."""
+"""``cfmkit sensitivity``: the influence of values, and the yield."""
 
 from __future__ import annotations
 

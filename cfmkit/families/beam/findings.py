@@ -57,7 +57,7 @@ FINDINGS = {
     "surface_stress_exceeded": "the stress along the surface exceeds the allowable one",
     "tip_jams": "somewhere the surface is too steep for the friction at the tip",
     "thick_beam": "a beam is short for its thickness: beam theory is inaccurate",
-    "wide_beam": "a beam is so wide that it cannot curl across its width: it is stiffer than in beam theory",
+    "wide_beam": "the anticlastic bending of a wide beam is suppressed: it is stiffer than in beam theory",
     "beams_touch": "two beams touch, or cross: contact is not modelled",
     "joined_away_from_nodes": "the part as drawn is one piece where the mechanism has beams, pads or bars apart: they "
     "cross, touch or lie on one another, or fillets fill the gap between them",
@@ -316,7 +316,11 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
             "inaccurate",
         )
 
-    return FindingRule("thick_beam", is_short, sentence)
+    def short(solution: Solution) -> str:
+        length, thickness = sizes(solution)
+        return f"beam {name} is only {length / thickness:.2g} times as long as thick: beam theory is inaccurate"
+
+    return FindingRule("thick_beam", is_short, sentence, short)
 
 
 def _hindered_share(solution: Solution) -> tuple[float, str]:

@@ -212,8 +212,8 @@ class Mechanism(RoundedCorners, Model):
     shear: bool = Field(False, description="whether beams shear, too")
     wide_beams: bool = Field(
         False,
-        description="whether wide beams are stiffer because they cannot curl across their width; clamped ends, which "
-        "stiffen them further, are left out",
+        description="whether wide beams are stiffer because their anticlastic bending is suppressed; clamped ends, "
+        "which stiffen them further, are left out",
     )
     closure: Literal["rotscale", "chain", "raw"] = Field(
         "rotscale",

@@ -1,4 +1,4 @@
-"""Geometry of a beam mechanism over its motion: strips and blocks as made, what of them is held, and all as it moves.
+"""Geometry of a beam mechanism over its motion: unloaded strips and blocks, what of them is held, and all as it moves.
 
 At clamps and at the part that is guided the beams end in pads, at pinned supports in eyes with a hole; rigid links and
 what joins two mirrored halves are bars. Stages in series are drawn above each other, legs side by side once.
@@ -294,7 +294,7 @@ def _moved_bodies(assembly: Assembly, path: Path, place: HeldPlace, at: Sequence
 
 
 def made_strips(assembly: Assembly) -> list[PosedBody]:
-    """Return the smooth pieces of all beams as made."""
+    """Return the smooth pieces of all unloaded beams."""
     made = [PosedBody.polygon("strip", "free", one.polygon) for found in strips_of(assembly).values() for one in found]
     return with_image(assembly, made)
 

@@ -492,4 +492,5 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
             "overstressed",
             f"the stress reaches {format_short(largest, 'stress')} at {place_text(spot)}; the allowable stress is "
             f"{format_short(allowable, 'stress')}",
+            short=f"{format_short(largest, 'stress')}, {format_short(allowable, 'stress')} allowed",
         )

@@ -217,7 +217,11 @@ def _jam(number: int) -> FindingRule[Solution]:
             "no force moves the slider there; use less friction, or start beyond",
         )
 
-    return FindingRule("up_jam", lambda one: np.array([len(jams) > number for jams in one.all_jams]), message)
+    def short(solution: Solution) -> str:
+        low, high = (mm(end) for end in solution.jams[number])
+        return f"self-locks on the way up from {low} to {high}"
+
+    return FindingRule("up_jam", lambda one: np.array([len(jams) > number for jams in one.all_jams]), message, short)
 
 
 def _is_sunk(solution: Solution) -> Any:
@@ -293,15 +297,24 @@ def _is_lifted(solution: Solution) -> Any:
 
 def _lift_off(solution: Solution) -> tuple[str, ...]:
     loads, mounting = solution.assembly.loads, solution.mechanism.mounting
-    beside = abs(loads.sideways[0])
-    opened = loads.stiffness * solution.mechanism.springs.tension_stretch
-    released = _travel_at(solution, (beside - opened) / loads.stiffness)
+    beside, released = abs(loads.sideways[0]), _lifted_travel(solution)
     return (
         f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "
         f"the lower roller lifts off the cam for the first {mm(released)} of travel; use preloaded springs, "
         "lighter rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
         f"mechanism.mounting={{elevation: {np.degrees(mounting.elevation):.10g} deg, roll: 90 deg}}",
     )
+
+
+def _lifted_travel(solution: Solution) -> float:
+    """Return the travel over which the lower roller is off the cam [m]."""
+    loads = solution.assembly.loads
+    opened = loads.stiffness * solution.mechanism.springs.tension_stretch
+    return _travel_at(solution, (abs(loads.sideways[0]) - opened) / loads.stiffness)
+
+
+def _lift_off_in_short(solution: Solution) -> str:
+    return f"the lower roller is off the cam over the first {mm(_lifted_travel(solution))}"
 
 
 def _is_overloaded(solution: Solution) -> Any:
@@ -355,7 +368,7 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
         FindingRule("spring_overstretched", _is_overstretched, _describe_overstretch),
         _slack_cable("up"),
         _slack_cable("down"),
-        FindingRule("lift_off", _is_lifted, _lift_off),
+        FindingRule("lift_off", _is_lifted, _lift_off, _lift_off_in_short),
         FindingRule("bearing_overloaded", _is_overloaded, _describe_overload),
         FindingRule("overstressed", _is_overstressed, _describe_overstress),
     )

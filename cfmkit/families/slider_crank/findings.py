@@ -52,8 +52,7 @@ FINDINGS = {
     "branch_begins_late": "the branch against the kink exists only beyond a certain travel",
     "force_negative": "the chain pulls instead of pushing back",
     "overstressed": "the stress exceeds the allowable stress within the travel",
-    "wide_beam": "strip or flexures are so wide that they cannot curl across their width: they are stiffer than "
-    "in beam theory",
+    "wide_beam": "the anticlastic bending of a wide strip or flexure is suppressed: it is stiffer than in beam theory",
     "sharp_corners": "without fillets the stress in inside corners has no value",
     "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "too_thin": "a thickness is below the thinnest wall of the process",

@@ -20,7 +20,7 @@ class BoughtSprings(SpringSupport):
     """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
 
     Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is
-    shorter (longer) than relaxed, and all are relaxed as made.
+    shorter (longer) than relaxed, and all are relaxed when unloaded.
     """
 
     kind: Literal["compression", "extension"] = Field("compression", description="how they are loaded")

@@ -93,7 +93,7 @@ class Push(ShortRepr):
     """One curve of one mechanism: what figures draw and sentences name."""
 
     preload: float  # of the spring's far end [m]
-    travel: FloatArray  # of the shuttle from the as-made pose, increasing, (n,) [m]
+    travel: FloatArray  # of the shuttle from the unloaded position, increasing, (n,) [m]
     leaves: LeafSamples  # all of them, (n,) each
     spring_force: FloatArray  # (n,) [N]
     spring_stress: FloatArray  # (n,) [Pa]

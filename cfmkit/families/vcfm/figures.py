@@ -78,7 +78,7 @@ def force(result: Result) -> Figure:
     levels = () if np.isnan(alone) else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
     look = CurveLook(levels=levels, regions=_range_beyond(solution))
-    return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
+    return loop_figure(nominal, look, "force over travel of the shuttle, from the unloaded position")
 
 
 def _range_beyond(solution: Solution) -> tuple[MarkedRange, ...]:
@@ -132,8 +132,8 @@ def stress(result: Result) -> Figure:
 
 @apply_style
 def preloads(result: Result) -> Figure:
-    """Return the curves of all preloads over the travel from the as-made pose [D, Fig. 13 (a)]."""
-    return _curves(result, "force for each preload, from the as-made pose", shifted=False)
+    """Return the curves of all preloads over the travel from the unloaded position [D, Fig. 13 (a)]."""
+    return _curves(result, "force for each preload, from the unloaded position", shifted=False)
 
 
 @apply_style
@@ -190,7 +190,7 @@ def adjustability(result: Result) -> Figure:
     ]
     starts = _starts(solution, over)
     begins = [
-        Series(starts, "start of the window, from the as-made pose", BLUE, prefer=0.4),
+        Series(starts, "start of the window, from the unloaded position", BLUE, prefer=0.4),
         Series(starts + rests, "start of the window, from rest", PURPLE, prefer=0.7),
     ]
     diagrams = [Diagram(over, x, first, forces), Diagram(over, x, Scale("shift", "length"), shifts)]

@@ -134,13 +134,13 @@ class Traced:
 
     @property
     def buckled_range(self) -> tuple[float, float]:
-        """Range in which another form than as made is taken, from and to [m]; NaN where none is."""
+        """Range in which another form than unloaded is taken, from and to [m]; NaN where none is."""
         found = np.flatnonzero(self.buckled)
         return (self.edges[found[0]], self.edges[found[-1] + 1]) if len(found) else (np.nan, np.nan)
 
     @cached_property
     def buckled(self) -> Any:
-        """Whether each piece is on a branch that was not there as made."""
+        """Whether each piece is on a branch that was not there unloaded."""
         return self._most(self.points.buckled, False)
 
     @cached_property
@@ -256,7 +256,7 @@ def _begin_path(route: Route, end: float, count: int) -> First:
         if 0 < sense * event < sense * reached and abs(event - (inner[-1] if inner else 0.0)) > 1e-10:
             inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
-    zero = PathPoints(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the pose as made
+    zero = PathPoints(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the unloaded position
     return First(zero.joined(points), (0.0, *inner, reached), places, problem)
 
 

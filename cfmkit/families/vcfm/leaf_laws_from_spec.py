@@ -34,7 +34,7 @@ class LeafLaws:
 
     @property
     def positive_stiffness(self) -> Any:
-        """K_p as made [N/m]."""
+        """K_p, unloaded [N/m]."""
         return self.spring.stiffness
 
     @property
@@ -44,7 +44,7 @@ class LeafLaws:
 
     @property
     def first_stiffness(self) -> Any:
-        """K_b1, the stiffness of all leaves as made [N/m]."""
+        """K_b1, the stiffness of all unloaded leaves [N/m]."""
         return self.half_beams * self.leaf.first_stiffness
 
     @property

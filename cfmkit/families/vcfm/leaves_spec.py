@@ -91,7 +91,7 @@ class Bistable(Model):
         None, description="thickness of a hybrid leaf's middle over that of its flexures; default 4"
     )
     waviness: NonNegativeLength = Field(
-        0.0, description="deviation of a leaf as made from its shape, in its buckling mode; exact model only"
+        0.0, description="deviation of an unloaded leaf from its shape, in its buckling mode; exact model only"
     )
 
     @property

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 
 MOST_BACK = 20
-"""The way from the rest position to the as-made pose has at most so many times the points of the travel: a travel of
-some nanometres would take them by the billion."""
+"""The way from the rest position to the unloaded position has at most so many times the points of the travel: a travel
+of some nanometres would take them by the billion."""
 
 MAX_SAMPLES = 60_000
 """Samples that are worked on together: few enough to stay in a processor's cache."""
@@ -105,7 +105,7 @@ def _shortfall(solution: Solution) -> str:
 
 
 def travel_grid(spec: VcfmSpec) -> FloatArray:
-    """Return the travels of a curve that starts at the as-made pose [m]."""
+    """Return the travels of a curve that starts at the unloaded position [m]."""
     return np.asarray(spec.travel * (np.arange(spec.analysis.points) / (spec.analysis.points - 1.0)))
 
 
@@ -207,7 +207,7 @@ def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def rests_of(sampler: PartSampler, preloads: FloatArray | Sequence[float], grid: FloatArray) -> FloatArray:
-    """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the as-made pose on.
+    """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the unloaded one on.
 
     NaN where there is none, or where the spring could not be followed so far.
 
@@ -261,7 +261,7 @@ def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -
     """Return where the shuttle rests at positive preloads, (r,) [m]."""
     nothing = np.zeros((len(preload), 1))
     there, behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
-    # No number as made: leaves too thin for the engine could not be moved at all. No number farther back: than they
+    # No number unloaded: leaves too thin for the engine could not be moved at all. No number farther back: than they
     # were followed, where they pull still harder. The closed form of arches pulls the wrong way far out of its range.
     rests = (there > 0) & ~(behind > 0)
 

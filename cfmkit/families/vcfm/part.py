@@ -1,7 +1,7 @@
-"""Geometry of a mechanism: exact edges as made, and everything when the shuttle has travelled so far.
+"""Geometry of a mechanism: exact unloaded edges, and everything when the shuttle has travelled so far.
 
 The shuttle moves down along x = 0; the leaves go from it to the walls at both sides, the spring stands below it on
-a base that the preload pushes up. The as-made apex of the lowest leaves is the origin.
+a base that the preload pushes up. The unloaded apex of the lowest leaves is the origin.
 
 The deformed centre lines of the leaves follow from the closed forms. There a leaf goes from the wall at (0, 0) to the
 shuttle at (X, h - d); its ends keep their direction.
@@ -66,7 +66,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
 
 
 def _travels(push: Push) -> list[float]:
-    """Return travels of a curve, from as made or, where a preload pushes the shuttle back, from rest on [m]."""
+    """Return travels of a curve, from unloaded or, where a preload pushes the shuttle back, from rest on [m]."""
     end = float(push.travel[-1])
     back = [push.rest] if push.rest is not None and push.rest < 0 else []
     return [*back, *np.linspace(0.0, end, N_POSES).tolist()]
@@ -158,7 +158,7 @@ def _coils(spec: VcfmSpec, bottom: float, head: float, deflection: float, farthe
         yield PosedBody.polygon("beam", "driven", rectangle(min(left, 0.0), start - 0.5 * frame.block, right, start))
 
 
-# --- as made: exact edges ---------------------------------------------------------------------------------------
+# --- unloaded: exact edges ---------------------------------------------------------------------------------------
 
 
 def specified_pieces(spec: VcfmSpec, top: float) -> Iterator[SpecifiedPiece]:

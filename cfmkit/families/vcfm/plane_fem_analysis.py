@@ -69,7 +69,7 @@ class SolidPath:
 
     @property
     def buckled_range(self) -> tuple[float, float]:
-        """Range in which another form than as made is taken, from and to [m]; NaN where none is."""
+        """Range in which another form than unloaded is taken, from and to [m]; NaN where none is."""
         edges = self.edges
         return (edges[1], edges[2]) if len(edges) > 2 else (np.nan, np.nan)
 

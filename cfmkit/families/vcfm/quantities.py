@@ -153,7 +153,7 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         for name, about in OF_SOLIDS.items()
     },
     "positive_stiffness": ScalarQuantity(
-        "stiffness", "K_p of the spring as made", lambda solution: solution.character.positive_stiffness
+        "stiffness", "K_p of the unloaded spring", lambda solution: solution.character.positive_stiffness
     ),
     "negative_stiffness": ScalarQuantity(
         "stiffness",
@@ -161,7 +161,7 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.character.negative_stiffness,
     ),
     "first_stiffness": ScalarQuantity(
-        "stiffness", "stiffness K_b1 of the leaves as made", lambda solution: solution.character.first_stiffness
+        "stiffness", "stiffness K_b1 of the unloaded leaves", lambda solution: solution.character.first_stiffness
     ),
     "rise": ScalarQuantity(
         "length", "h of the leaves: travel to the flat pose", lambda solution: solution.parts.strip.rise
@@ -196,10 +196,10 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "force", "mean force in the longest window within analysis.flatness", lambda solution: solution.window_force
     ),
     "rest_position": ScalarQuantity(
-        "length", "rest position of the shuttle at the nominal preload, from the as-made position", _rest_position
+        "length", "rest position of the shuttle at the nominal preload, from the unloaded position", _rest_position
     ),
     "rest_shift_max": ScalarQuantity(
-        "length", "largest distance of a rest position from the as-made position, over all preloads", _rest_shift_max
+        "length", "largest distance of a rest position from the unloaded position, over all preloads", _rest_shift_max
     ),
     "force_change_max": ScalarQuantity(
         "force",

@@ -1,4 +1,4 @@
-"""Solved mechanisms: F(x) = F_b(x) + F_p(x + dr), x from the as-made pose, dr the preload of the spring's far end.
+"""Solved mechanisms: F(x) = F_b(x) + F_p(x + dr), x from the unloaded position, dr the preload of the spring's far end.
 
 Of m mechanisms with p preloads each, curves are m p rows, those of one mechanism together and the nominal preload
 first; of one mechanism m is 1. Everything that results, findings and studies read is computed here, when it is first

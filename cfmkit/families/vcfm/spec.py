@@ -62,8 +62,8 @@ class Mechanism(CutLeaves, Model):
     bistable: Bistable
     wide_beams: bool = Field(
         False,
-        description="whether wide leaves are stiffer because they cannot curl across their width; exact model only, "
-        "the effect of clamped ends is left out",
+        description="whether wide leaves are stiffer because their anticlastic bending is suppressed; exact model "
+        "only, the effect of clamped ends is left out",
     )
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
     part: VcfmPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes, frame")
@@ -208,7 +208,7 @@ OTHER_DEFAULTS = "; ".join(
 
 
 class VcfmAnalysis(Analysis):
-    """Analysis of the mechanism. Displacements are the shuttle's from the as-made pose."""
+    """Analysis of the mechanism. Displacements are the shuttle's from the unloaded position."""
 
     preloads: tuple[Length, ...] = Field(
         (0.0,),

@@ -21,7 +21,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class FrameSizes:
-    """Places of walls, stop and ground [m]; the as-made apex of the lowest leaves is the origin."""
+    """Places of walls, stop and ground [m]; the unloaded apex of the lowest leaves is the origin."""
 
     # half, bottom, top: half the width of the shuttle, its lower end, and its upper one without a bar across it
     half: float
@@ -74,7 +74,7 @@ def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None
     ----------
     spec : VcfmSpec
     spring : four floats or None
-        Smallest x and y, largest x and y of the spring as made [m], where it has a seat.
+        Smallest x and y, largest x and y of the unloaded spring [m], where it has a seat.
 
     Raises
     ------

@@ -10,7 +10,9 @@ import difflib
 import re
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
+
+from pydantic import BaseModel
 
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import describe_value
@@ -21,7 +23,7 @@ from cfmkit.specs.yamlio.path_notation import Path, to_dotted
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from pydantic import BaseModel, ValidationError
+    from pydantic import ValidationError
 
 MOST_LISTED = 15
 MOST_EXPLAINED = 500
@@ -140,8 +142,16 @@ def _unknown_key(found: Trace) -> str:
     removed = (getattr(slot.model, "removed_keys", {}).get(key) for slot in found.parents)
     if instead := next(filter(None, removed), ""):
         return f"the key {quote(key)} was removed; {instead}"
-    hint = did_you_mean(key, names) or list_allowed("allowed are", names)
+    deeper = [f"{name}.{key}" for name, field in fields if _has_key(field.annotation, key)]
+    meant = f"did you mean {' or '.join(map(quote, deeper))}?" if deeper else did_you_mean(key, names)
+    hint = meant or list_allowed("allowed are", names)
     return f"unknown key {quote(key)}" + (f"; {hint}" if hint else "")
+
+
+def _has_key(annotation: Any, key: str) -> bool:
+    """Return True if a block has a key."""
+    blocks = (annotation, *get_args(annotation))
+    return any(isinstance(one, type) and issubclass(one, BaseModel) and key in one.model_fields for one in blocks)
 
 
 def _unknown_kind(line: _Error) -> Complaint:

@@ -7,7 +7,7 @@
 `requirement_rows`
     What decides whether a part is good, as rows of force and stress at a few poses.
 `near_parts`
-    `NearParts`: parts to first order, by exact derivatives where they are known; the yield that they let expect.
+    `NearParts`: parts by linear estimate, with exact derivatives where they are known; their yield.
 `expected_forces`
     The test plan: what to measure of a part, and what force to expect of it.
 `outcomes`
@@ -17,5 +17,5 @@
 `redesign`, `allowed_tolerances`
     Values for which enough parts are good, and the tolerances for which they are.
 `share`
-    `Share`: a share of good parts with its confidence intervals.
+    `Share`: a yield with its confidence intervals.
 """

@@ -39,7 +39,7 @@ LEAST_FORCE = 0.05
 
 @dataclass(frozen=True)
 class Yields:
-    """Shares of good parts of a design, of those that were drawn."""
+    """Yields of a design, of those that were drawn."""
 
     parts: Parts  # of the design
     after: Share  # parts as they are

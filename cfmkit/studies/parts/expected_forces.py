@@ -1,6 +1,6 @@
 """The test plan in one sentence: what to make, what to measure on it, and what force to expect where, of 95 % of parts.
 
-Forces are those of parts to first order, drawn from `design.tolerances` or from what the process is assumed to hold.
+Forces are linear estimates of parts drawn from `design.tolerances`, or from what the process is assumed to hold.
 The dimensions are those whose errors move the force most: what is worth measuring before the force is looked at. What
 is no dimension and moves it as much, a modulus or the rate of a spring, is named beside them.
 """
@@ -51,7 +51,10 @@ def expected_forces(result: Result, run: Run) -> str:
     curve = result.curve
     at = [format_short(place, curve.motion_dimension) for place in places]
     ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(near.middle, low, high, strict=True)]
-    expected = [f"{one[0]} ({one[1]} to {one[2]}) at {place}" for one, place in zip(ends, at, strict=True)]
+    expected = [
+        f"{force} at {place} ({least.partition(' ')[0]} to {most})"
+        for place, (force, least, most) in zip(at, ends, strict=True)
+    ]
     make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
     verb = "displace to" if curve.motion_dimension == "length" else "turn to"
     return (

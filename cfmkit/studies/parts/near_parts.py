@@ -53,7 +53,7 @@ class Unknown(Exception):
 
 
 def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, known: FloatArray | None = None) -> NearParts:
-    """Return the numbers of parts to first order.
+    """Return the numbers of parts by linear estimate.
 
     `middle`: those of the design, (q,); `numbers`: of a part, all of them or those after the exactly known ones;
     `known`: exact derivatives of the first numbers by all errors, (k, d).
@@ -100,7 +100,7 @@ def _refuse_many(parts: Parts, quick: bool = True) -> None:
 
 
 def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) -> NearParts:
-    """Return the effort of parts on one branch at places (p,), to first order.
+    """Return the effort of parts on one branch at places (p,), by linear estimate.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def efforts_of_parts(parts: Parts, places: FloatArray, branch: str, run: Run) ->
 
 @dataclass(frozen=True)
 class ExpectedShares:
-    """Shares of good parts to first order."""
+    """Yields by linear estimate."""
 
     good: Share  # of parts as they are made
     measured: Share  # of parts whose modulus is as it should be
@@ -132,7 +132,7 @@ class ExpectedShares:
 
 
 def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
-    """Return which shares of the parts of an analysed design are good, to first order.
+    """Return the yields of an analysed design by linear estimate.
 
     Raises
     ------
@@ -218,11 +218,11 @@ def expected_yield(result: Result, run: Run) -> str:
     try:
         shares = expected_shares(result, Parts.assumed(spec, run.seed), run)
     except Unknown as why:
-        return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
+        return f"not estimated ({name}, assumed tolerances): {why}; {again} draws parts"
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
         return f"{_yield_sentence(found, shares)}; margins need 'design.free' to name values that may change"
-    return f"{_yield_sentence(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
+    return f"{_yield_sentence(found, shares)}; with margins: {again} --set design.yield=90%"
 
 
 def _yield_sentence(found: Assumed, shares: ExpectedShares) -> str:
@@ -247,4 +247,4 @@ def _format_share(share: Share) -> str:
     """Return a share of drawn parts to two digits, and never as all of them or none."""
     if 100.0 * share.value >= 99.5:
         return "over 99 %"
-    return f"about {100.0 * share.value:.2g} %" if share.good else "hardly any"
+    return f"{100.0 * share.value:.2g} %" if share.good else "hardly any"

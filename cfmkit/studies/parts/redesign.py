@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 
 ESTIMATED = 4000
-"""Parts whose yield is estimated to first order: one standard deviation of the estimate is 0.5 % at 90 %."""
+"""Parts whose yield is by linear estimate: one standard deviation of the estimate is 0.5 % at 90 %."""
 
 SEARCH_SEED = 7919
 """Added to the seed: the parts that a search looks at are not those that it is judged by."""

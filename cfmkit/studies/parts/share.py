@@ -1,4 +1,4 @@
-"""A share of good parts among those made, and the confidence that one has in it.
+"""A yield, counted in parts, and its confidence intervals.
 
 Reference
 ---------
@@ -26,7 +26,7 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Share:
-    """Share of good parts among some."""
+    """Parts that are good among all that were drawn."""
 
     good: int  # parts that meet everything
     failed: int  # parts without a complete result, which count as bad

@@ -28,7 +28,7 @@ IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
 class IndexLine:
     """One index of one parameter, in border units; None if it cannot be stated."""
 
-    metric: str  # the label of a column of results.csv; ``yield`` for the share of good parts
+    metric: str  # the label of a column of results.csv; or ``yield``
     parameter: str  # its path, or several with commas that are tightened together
     index: str  # ``first_order``, ``mu_star``, ``swing``, ..
     # value, low, high: the index and its interval. A missing `high` beside a `low` is open: "at least"

@@ -69,7 +69,7 @@ def optimise_shape(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         active_bounds=held,
         warnings=_warnings(task, best, result),
         search=search_of(task, best, drawn, result),
-        notes=notes_of(best.audit, spread, held),
+        notes=notes_of(best.audit, drawn, spread, held),
         tables=tables,
     )
 

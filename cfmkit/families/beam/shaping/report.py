@@ -246,11 +246,12 @@ def _drawn_values(drawn: Drawn) -> dict[str, float | None]:
     }
 
 
-def notes_of(audit: Audit, spread: NetworkScatter, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """Return the paragraphs of the page that hold no number of the block `search`."""
-    drawn = (
-        f"{spread.samples} networks with nodes off by {format_short(spread.nodes, 'length')} and coefficients by "
-        f"{spread.coefficients:g} rad (standard deviations)"
+def notes_of(audit: Audit, drawn: Drawn, spread: NetworkScatter, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs of the page on what was found."""
+    median = f"half band {percent(float(np.median(drawn.bands)))}" if len(drawn.bands) else "no force"
+    scatter = (
+        f"{median} (median of {spread.samples} networks with nodes off by {format_short(spread.nodes, 'length')}, "
+        f"coefficients by {spread.coefficients:g} rad)"
     )
     sound = ", ".join(
         (
@@ -258,12 +259,12 @@ def notes_of(audit: Audit, spread: NetworkScatter, held: tuple[str, ...]) -> tup
             "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
         )
     )
-    return tuple(note for note in (("audit", sound), ("drawn", drawn), _active_limit(held)) if note[1])
+    return tuple(note for note in (("audit", sound), ("scatter", scatter), _active_limit(held)) if note[1])
 
 
 def _active_limit(held: tuple[str, ...]) -> tuple[str, str]:
     more = f" and {len(held) - 8} more" if len(held) > 8 else ""
-    return "limits", "; ".join(held[:8]) + more
+    return "limits", f"active: {'; '.join(held[:8])}{more}" if held else ""
 
 
 def starts_table(task: Task, result: Explored) -> Table:

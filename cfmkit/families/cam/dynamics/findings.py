@@ -145,6 +145,7 @@ def _mismatch(what: str, stated: float, expected: float, allowed: tuple[float, f
             "inertia_mismatch",
             f"the moment of inertia of {what}, {format_short(stated, 'inertia')}, does not fit its mass and {size}: "
             f"it is {share} that of a {body}, {format_short(expected, 'inertia')}; check unit and decimal point",
+            short=f"the moment of inertia of {what} is {share} that of a {body}",
         )
 
 

@@ -1,4 +1,4 @@
-"""Geometry of a printed slider-crank: one leg as made, with its exact edges, and while it is pressed.
+"""Geometry of a printed slider-crank: one unloaded leg, with its exact edges, and while it is pressed.
 
 Flexures, strip and distances of pins are exact. What is around them is a sensible choice: pads behind the clamped
 end and at the slider, links wider than any flexure.
@@ -60,7 +60,7 @@ class LegPiece:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One leg as made, from the ground to the slider."""
+    """One unloaded leg, from the ground to the slider."""
 
     points: FloatArray  # (n, 2) ends of its straight pieces [m]
     place: FloatArray  # (n,) how far along its centre line they are [m]

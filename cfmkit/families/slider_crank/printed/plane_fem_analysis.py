@@ -271,6 +271,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
             f"the stress reaches {format_short(float(peaks[worst]), 'stress')} at {place_text(places[worst])} "
             f"of the drawing, at {format_short(float(course.travel[worst]), 'length')} of travel; "
             f"the allowable stress is {format_short(limit, 'stress')}",
+            short=f"{format_short(float(peaks[worst]), 'stress')}, {format_short(limit, 'stress')} allowed",
         )
     if reported := left_out_friction(solution.spec):
         yield finding("friction_left_out", reported)

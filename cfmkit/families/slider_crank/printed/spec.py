@@ -116,8 +116,8 @@ class Printed(RoundedCorners, Model):
     beam: StripSpec | None = Field(None, description="one strip of varying thickness: fidelity 'beam'")
     wide_beams: bool = Field(
         False,
-        description="whether a wide strip or flexure is stiffer because it cannot curl across its width; the effect of "
-        "clamped ends is left out",
+        description="whether a wide strip or flexure is stiffer because its anticlastic bending is suppressed; the "
+        "effect of clamped ends is left out",
     )
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
 

@@ -181,14 +181,21 @@ def _far_side(solution: Solution) -> Sentence:
     )
 
 
-def _run_in(solution: Solution) -> Sentence:
-    """Return how far the force needs to come up: to 95 % of what it is in the middle of the motion."""
+def _run_in_end(solution: Solution) -> str:
+    """Return where the force has come up, to 95 % of what it is in the middle of the motion."""
     assembly, end = solution.assemblies[0], float(solution.motion[0, -1])
     motion = np.geomspace(1e-9, 1.0, 400) * end
     force = assembly.efforts(motion)
     there = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * end, motion, force)))
-    lead = _lead(solution)
-    until = f"within {mm(float(motion[there[0]]))} it reaches 95 %" if len(there) else "it never reaches 95 %"
+    return f"within {mm(float(motion[there[0]]))} it reaches 95 %" if len(there) else "it never reaches 95 %"
+
+
+def _run_in_in_short(solution: Solution) -> str:
+    return f"the force begins at zero: {_run_in_end(solution)} of that at mid-travel"
+
+
+def _run_in(solution: Solution) -> Sentence:
+    assembly, lead, until = solution.assemblies[0], _lead(solution), _run_in_end(solution)
     kink = abs(math.sin(lead)) * assembly.linkage.crank
     return (
         f"the springs are relaxed {deg(abs(lead))} off the stretched position, a kink of {mm(kink)} at the crank "
@@ -210,6 +217,10 @@ def _pole(solution: Solution) -> Sentence:
         f"at {mm(solution.assemblies[0].reach[0])} of travel crank and coupler are in one line and the springs are "
         "not relaxed: no finite force moves the slider there; choose a motion that does not reach it",
     )
+
+
+def _pole_in_short(solution: Solution) -> str:
+    return f"no finite force moves the slider at {mm(solution.assemblies[0].reach[0])}"
 
 
 # --- reference and window -------------------------------------------------------------------------------------------
@@ -332,8 +343,9 @@ RULES: tuple[Rule, ...] = (
             _is_nearly_stretched(solution) & ~np.isnan(solution.rest[:, 0]) & (solution.motion[:, -1] >= 0.0)
         ),
         _run_in,
+        _run_in_in_short,
     ),
-    FindingRule("force_unbounded", _nears_pole, _pole),
+    FindingRule("force_unbounded", _nears_pole, _pole, _pole_in_short),
     FindingRule(
         "reference_outside",
         _misses_reference,

@@ -218,6 +218,7 @@ def find_unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
         "force_unbounded",
         f"at {places} of travel crank and coupler are in one line and the springs are not relaxed: no finite force "
         f"moves the slider there; the curve ends before, at {ends}",
+        short=f"no finite force moves the slider at {places}; the curve ends at {ends}",
     )
 
 

@@ -35,7 +35,7 @@ _ROUNDING = 4.0 * float(np.finfo(float).eps)
 _PLACES = np.linspace(-1.0, 1.0, 41)
 
 N_EDGE_POINTS = 201
-"""Points of the centre line as made, from which edges are drawn."""
+"""Points of the unloaded centre line, from which edges are drawn."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class CosineLeaf(LeafLaw):
 
     @cached_property
     def developed(self) -> Any:
-        """Length of the leaf as made [m]."""
+        """Length of the unloaded leaf [m]."""
         slope = 0.25 * np.pi * self.strip.rise / self.strip.reach
         return self.strip.reach * (1.0 + slope**2 - 0.75 * slope**4)
 
@@ -137,7 +137,7 @@ class CosineLeaf(LeafLaw):
 
     @cached_property
     def _own(self) -> FloatArray:
-        """Slope of the shape as made over half its rise, at the places of the quadrature [1/m]."""
+        """Slope of the unloaded shape over half its rise, at the places of the quadrature [1/m]."""
         return np.asarray(np.pi / self.developed * np.cos(0.5 * np.pi * _POSITIVE))
 
     @cached_property
@@ -202,7 +202,7 @@ class CosineLeaf(LeafLaw):
 
     @property
     def centre_line(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """x, y [m] and slope as made, from the shuttle at (0, 0) to the wall."""
+        """x, y [m] and slope, unloaded, from the shuttle at (0, 0) to the wall."""
         reach, rise = float(self.strip.reach), float(self.strip.rise)
         x = np.linspace(0.0, reach, N_EDGE_POINTS)
         wave = np.pi * x / reach

@@ -94,7 +94,7 @@ class HybridLeaf(LeafLaw):
 
     @property
     def first_stiffness(self) -> Any:
-        """Stiffness as made [N/m]."""
+        """Stiffness, unloaded [N/m]."""
         s, c = np.sin(self.strip.angle), np.cos(self.strip.angle)
         return self.bar_stiffness * s * s + 2.0 * self.pivot * c * c / self.bar**2
 

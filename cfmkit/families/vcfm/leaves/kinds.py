@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 class LeafLaw(ABC):
     """Force and stress of one leaf over the travel of the shuttle, and its shape.
 
-    Travels count from the as-made pose, positive towards the flat pose [m]. What a subclass leaves out is that of a
-    straight leaf of constant thickness, or follows from its force.
+    Travels count from the unloaded position, positive towards the flat pose [m]. What a subclass leaves out is that of
+    a straight leaf of constant thickness, or follows from its force.
     """
 
     strip: LeafStrip
@@ -59,7 +59,7 @@ class LeafLaw(ABC):
 
     @property
     def first_stiffness(self) -> Any:
-        """Stiffness as made [N/m], from the force at a thousandth of the rise."""
+        """Stiffness, unloaded [N/m], from the force at a thousandth of the rise."""
         small = 1e-3 * self.strip.rise
         return self.force(np.array([small]))[0] / small
 
@@ -93,7 +93,7 @@ class LeafLaw(ABC):
 
     @property
     def centre_line(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """x, y [m] and slope as made, from the shuttle at (0, 0) to the wall; of a straight leaf its two ends."""
+        """x, y [m] and slope, unloaded, from the shuttle at (0, 0) to the wall; of a straight leaf its two ends."""
         reach, rise = float(self.strip.reach), float(self.strip.rise)
         x = np.linspace(0.0, reach, 2)
         return x, -rise * x / reach, np.full(2, -rise / reach)
@@ -131,7 +131,7 @@ class LeafSpring(ABC):
     @property
     @abstractmethod
     def stiffness(self) -> Any:
-        """K_p as made [N/m]."""
+        """K_p, unloaded [N/m]."""
 
     def force(self, compression: Any) -> Any:
         """Return the force [N] at a compression [m]."""

@@ -81,7 +81,7 @@ class Diamond(LeafSpring):
 
     @property
     def stiffness(self) -> Any:
-        """K_p as made [N/m]."""
+        """K_p, unloaded [N/m]."""
         return self.pairs * self.share / leaf_compliance(self.strip)
 
     def stress(self, compression: Any) -> Any:
@@ -177,7 +177,7 @@ class UShape(LeafSpring):
 
     @property
     def stiffness(self) -> Any:
-        """K_p as made [N/m]."""
+        """K_p, unloaded [N/m]."""
         developed, centroid, second = self.moments
         return self.share * self.strip.bending / (second - centroid**2 * developed)
 
@@ -275,7 +275,7 @@ class StraightSpring(LeafSpring):
 
     @property
     def stiffness(self) -> Any:
-        """K_p as made [N/m]; it grows with the square of the compression."""
+        """K_p, unloaded [N/m]; it grows with the square of the compression."""
         return self.share * 2.0 * 12.0 * self.strip.bending / self.strip.length**3
 
     def force(self, compression: Any) -> FloatArray:

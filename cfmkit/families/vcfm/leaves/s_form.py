@@ -193,7 +193,7 @@ def s_force(angle: Any, slimness: Any, travel: Any) -> Force:
     Parameters
     ----------
     angle : array
-        Of the leaf as made [rad].
+        Of the unloaded leaf [rad].
     slimness : array
         t/L.
     travel : array

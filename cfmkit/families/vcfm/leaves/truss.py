@@ -48,7 +48,7 @@ class TrussLeaf(LeafLaw):
 
     @property
     def first_stiffness(self) -> Any:
-        """Stiffness as made [N/m]."""
+        """Stiffness, unloaded [N/m]."""
         return self.strip.axial * np.sin(self.strip.angle) ** 2 / self.strip.length
 
     @property

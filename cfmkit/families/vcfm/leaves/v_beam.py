@@ -82,7 +82,7 @@ def negative_stiffness(strip: LeafStrip) -> Any:
 
 
 def first_stiffness(strip: LeafStrip) -> Any:
-    """Return the stiffness of one leaf as made, K_b1 [N/m]: EA sin^2/L + 12 EI cos^2/L^3."""
+    """Return the stiffness of one unloaded leaf, K_b1 [N/m]: EA sin^2/L + 12 EI cos^2/L^3."""
     s, c = np.sin(strip.angle), np.cos(strip.angle)
     return strip.axial * s * s / strip.length + 12.0 * strip.bending * c * c / strip.length**3
 
@@ -113,7 +113,7 @@ class VBeam(LeafLaw):
 
     @property
     def first_stiffness(self) -> Any:
-        """Stiffness as made [N/m]."""
+        """Stiffness, unloaded [N/m]."""
         return first_stiffness(self.strip)
 
     @property
@@ -183,7 +183,7 @@ class VBeam(LeafLaw):
         Parameters
         ----------
         travel : array
-            Of the shuttle from the as-made pose, positive towards the flat pose [m].
+            Of the shuttle from the unloaded position, positive towards the flat pose [m].
         """
         strip, bent = self.strip, ~np.asarray(self.buckled(travel))
         drop = strip.rise - np.asarray(travel, dtype=float)
