@@ -189,7 +189,7 @@ def test_the_page_has_the_numbers_requirements_warnings_and_files(cli, cam):
     assert any(line.startswith("  ripple") and line.endswith("<= 5 %      ok") for line in lines)
     assert "warning    undercut: " in page
     assert "           cfmkit design cam.yaml --set design.avoid_undercut=true\n" in page
-    assert "files      cfm-out/cam-design/  design.yaml curve.csv metrics.json" in page
+    assert "files      cfm-out/cam-design/  design.yaml curve.csv parts.csv metrics.json" in page
     assert "geometry/cam.dxf" in page
     assert "figures/" in page
 

@@ -16,7 +16,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 
 def test_a_designed_strip_comes_with_its_drawing_and_its_limits(cli):
     (cli.folder / "taper.yaml").write_bytes((CONFIGS / "slider_crank_taper_design.yaml").read_bytes())
-    done = cli("design", "taper.yaml", "-o", "out", "--no-plots")
+    done = cli("design", "taper.yaml", "-o", "out", "--no-plots", "-v")
     assert done.code == 0, done.err
     assert "converged to a local optimum" in " ".join(done.out.split())
     assert {path.name for path in (cli.folder / "out/geometry").iterdir()} >= {
@@ -72,5 +72,7 @@ def test_what_a_strip_is_said_to_keep_is_what_its_analysis_says(cli):
     said = re.search(r"within ([0-9.]+) % from", " ".join(page.split()))
     found = cli("analyze", "one/design.yaml", "-o", "two", "--no-plots", "--json").document["metrics"]
     assert said is not None
-    assert float(said.group(1)) == pytest.approx(100 * found["deviation_from_target"]["value"], abs=5e-4)
+    assert float(said.group(1)) == pytest.approx(
+        100 * found["deviation_from_target"]["value"], abs=2e-3
+    )  # with its digits
     assert found["stress_max"]["value"] <= 42.5

@@ -166,7 +166,8 @@ def test_a_part_stays_in_the_envelope_that_is_required():
     """Widths alone would make it 15.2 mm deep."""
     hidden = Hidden("make_finger", {MODULUS: 0.85}, changes=("requirements.0={metric: envelope_z, max: 13.5 mm}",))
     found = cfmkit.correct(hidden.drawn, hidden.recording())
-    (depth,) = (one for one in cfmkit.check(found.predicted) if one.metric == "envelope_z")
+    result = cfmkit.analyze(found.predicted.spec)
+    (depth,) = (one for one in result.requirements if one.metric == "envelope_z")
     assert depth.ok
     assert any(path.endswith("thickness") for path in found.changes)
     assert found.after.value == pytest.approx(found.target, rel=0.01)

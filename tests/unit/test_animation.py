@@ -76,6 +76,6 @@ def test_a_sensitivity_study_has_a_page_with_indices_and_shares(tmp_path):
     assert main([*command, "-j", "1", "-o", str(out), "-q"]) in (0, 5)
     page = (out / "report.html").read_text()
     assert "a sensitivity study" in page
-    assert "Share of parts that are good" in page
-    assert "variance_drop_when_halved" in page
+    assert "yield reached" in page
+    assert "yield gain when halved" in page
     assert " src=" not in page.replace('src="data:', "")

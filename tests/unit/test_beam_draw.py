@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from beam_support import CANTILEVER, MM, cantilever, config
+from matplotlib.text import Text
 
 import cfmkit
 from cfmkit.families.beam.figures import centre_line, figures, rigid_parts
@@ -58,7 +59,7 @@ def test_links_and_springs_are_drawn_and_links_move_with_their_node():
 
 def test_a_key_above_the_shapes_gives_each_pose_its_displacement_and_colour():
     figure = drawn(config("beam_lan2010", "analysis.points=9"), "shapes")
-    key = [text for text in figure.texts if text.get_text().endswith(" mm")]
+    key = [text for text in figure.findobj(Text) if text.get_text().endswith(" mm")]
     assert [text.get_text() for text in key] == ["4.5 mm", "9 mm", "13.5 mm", "18 mm"]
     poses = list(dict.fromkeys(line.get_color() for line in by_gid(figure, "pose-")))
     assert [text.get_color() for text in key] == poses

@@ -110,8 +110,8 @@ def test_what_its_beams_alone_judged_meets_nothing(beams):
     record = as_json(found, block())
     assert record["proposals"] == []
     assert record["unjudged"][0]["unjudged"] == ["reissner model; solid not run"]
-    assert "no mechanism is known to meet the request" in record["message"]
-    assert ",open,reissner," in table(found).decode()
+    assert "no mechanism is known to meet the requirements" in record["message"]
+    assert ",open: solid,reissner," in table(found).decode()
 
 
 def test_of_each_family_as_many_go_to_the_finest_model_as_it_lacks(beams):

@@ -23,7 +23,7 @@ def test_the_solid_of_a_verified_design_has_the_wanted_mean_force():
     assert design.spec is not None
     assert design.spec.fidelity == "solid"
     mean = api.evaluate(design.spec, ["force_mean"])["force_mean"].value
-    assert mean == pytest.approx(design.search["verified_target"].quantity.value, rel=1e-6)
+    assert mean == pytest.approx(design.search["verified_target"].quantity.value, rel=2e-4)  # lengths have digits
     assert design.search["verified_target"].quantity.value == pytest.approx(11.15)
     (reported,) = (text for word, text in design.notes if word == "verify")
     assert "mechanism.bistable.width" in reported
