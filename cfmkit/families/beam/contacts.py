@@ -20,6 +20,8 @@ from cfmkit.families.beam.contact_spec import OVERLAP, column_names, pads_of, si
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
+from cfmkit.families.end_stops import DEFINITIONS, LARGEST_FORCE
+from cfmkit.families.end_stops import FINDINGS as OF_STOPS
 from cfmkit.numerics.quadrature import clenshaw_curtis
 from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
@@ -35,18 +37,6 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.solution import Solution
 
-DEFINITIONS = {
-    "first_contact": ("length", "displacement of the driven node at which the first contact begins"),
-    "contact_force[contact]": (
-        "force", "mean force in the window of the stop or the obstacle that is named, on one copy; of a stop with two "
-        "sides positive where it limits the motion along its direction, of an obstacle the sum of all pads"
-    ),
-    "contact_force_ripple[contact]": ("ratio", "(max - min)/max of that force in the window"),
-}  # fmt: skip
-LARGEST_FORCE = (
-    "largest normal force: of a stop or an obstacle on one copy, or between tip and `analysis.surface` in both "
-    "directions of the motion"
-)
 N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners
 PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
@@ -233,9 +223,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 
 
 # -- findings ----------------------------------------------------------------------------------------------------------
-FINDINGS = {
-    "contact_begins": "a stop is reached, or a pad touches an obstacle",
-    "blocked": "a rigid contact leaves the drive no way to go on: the curve ends there",
+FINDINGS = OF_STOPS | {
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
     "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
