@@ -3,8 +3,9 @@
 At an equilibrium the gradient of the functional vanishes, so that its unknowns change by dz/dx = -K^-1 d(grad P)/dx;
 what an output depends on besides has a complex step already, and is differentiated by computing it. Efforts of a drive
 by a motion need no solution: the slope of the path is the adjoint (`cfmkit.elastica.mechanics.design_derivatives`).
-Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
-and directions, gaps and stiffnesses of stops; not obstacles, and not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
+Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, gaps and stiffnesses
+of stops, support displacements and directions; not obstacles, and not the number of anything. The drive keeps its
+values; a support that turns takes its drive with it.
 States along beams, of which there are many, are computed as dual arrays; what depends on them otherwise, variable by
 variable with the complex step.
 

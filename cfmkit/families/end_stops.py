@@ -149,7 +149,8 @@ class EndStops:
         for name, stop in self.stops:
             low, high = stop.ends
             rigid = stop.stiffness is None
-            if math.isfinite(low) and (start < low - SAME_PLACE or (rigid and pressed and abs(start - low) <= SAME_PLACE)):
+            at_rest = rigid and pressed and abs(start - low) <= SAME_PLACE
+            if math.isfinite(low) and (start < low - SAME_PLACE or at_rest):
                 found.append(StopEvent(name, "ends", max(start, low)))
             if rigid and self.blocking(end) == name:
                 found.append(StopEvent(name, "blocks", high))

@@ -169,7 +169,7 @@ def _contract(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
 
 
 def _changed_terms(designs: NetworkDesigns) -> list[list[Acting]]:
-    """Return the springs, loads and contacts of each design that have a complex step, with the arrays of that design."""
+    """Return the springs, loads and contacts of each design with a complex step, with the arrays of that design."""
     found: list[list[Acting]] = []
     if not _acting(designs.template):
         return found

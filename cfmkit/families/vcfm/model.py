@@ -74,7 +74,7 @@ def result_of(solution: Solution) -> Result:
         return Result(spec, Status.NO_EQUILIBRIUM, _shortfall(solution), warnings=closed)
     reason = _shortfall(solution)
     short = nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(reason)
-    stops, travel = solution.curves.stops, nominal.travel
+    stops, pressed = solution.curves.stops, bool(nominal.force[0] > solution.effort_error[0])
     curves = tuple(_curve(push, stops, bool(push.force[0] > solution.effort_error[0])) for push in solution.pushes)
     (low, high), dense = (float(end[0]) for end in solution.linear), DenseCurve(solution)
     return Result(
@@ -82,7 +82,7 @@ def result_of(solution: Solution) -> Result:
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=reason if short else "",
         curves=curves,
-        values=values_of_one(QUANTITIES, solution) | stops.values(travel, nominal.force[0] > solution.effort_error[0], solution.window_of_one),
+        values=values_of_one(QUANTITIES, solution) | stops.values(nominal.travel, pressed, solution.window_of_one),
         warnings=LazySequence(partial(_findings, solution)),
         travel=(float(nominal.travel[0]), spec.travel),
         valid=((low, min(high, float(solution.reach[0]))),) if solution.is_linear[0] else None,
