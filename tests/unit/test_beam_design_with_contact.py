@@ -122,19 +122,12 @@ def test_the_force_that_a_design_sees_is_the_column_of_the_contact():
 def test_a_pad_inside_an_obstacle_at_rest_is_no_design():
     spec = gripper().replace({"mechanism.obstacles.work.centre": (14e-3, -12.1e-3)})
     task = task_of(spec, spec.design.optimise)
-    poses = np.array([0.0, 14e-3])
-    assert respond(Variables(task, 1), np.array([14e-3 / task.size, 1.2]), poses) is not None
-    assert (
-        respond(Variables(replace(task, network=_lower(task.network)), 1), np.array([14e-3 / task.size, 1.2]), poses)
-        is None
-    )
-
-
-def _lower(network):
-    """Return the network with its tip 1 mm lower."""
-    nodes = dict(network.nodes)
+    nodes = dict(task.network.nodes)
     nodes["tip"] = replace(nodes["tip"], y=-1e-3)
-    return replace(network, nodes=nodes)
+    lower = replace(task, network=replace(task.network, nodes=nodes))
+    x, poses = np.array([14e-3 / task.size, 1.2]), np.array([0.0, 1e-3])
+    assert respond(Variables(task, 1), x, poses) is not None
+    assert respond(Variables(lower, 1), x, poses) is None
 
 
 @pytest.mark.slow
