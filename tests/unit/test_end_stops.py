@@ -141,3 +141,12 @@ def test_a_stop_that_cannot_be_is_refused_with_its_place(name, changes, place, s
 def test_stops_of_rigid_links_and_solids_are_refused():
     with pytest.raises(SpecError, match=r"mechanism\.stops: stops are known of flexures and strips"):
         stopped("slider_crank_strip", {"gap": GAP}, **{"analysis.fidelity": "solid"})
+
+
+def test_requirements_on_stress_count_with_the_stop_reached():
+    """Leaves that a stop saves from the rest of the travel have the stress of its gap, not of the travel."""
+    free = cfmkit.analyze(vcfm({"gap": 9e-3}))
+    result = cfmkit.analyze(vcfm({"gap": GAP}))
+    at_gap = float(free.closed.stress("load", np.array([GAP]))[0])
+    assert result.values["travel_stress_max"].value < free.values["travel_stress_max"].value
+    assert result.curve.extra["max_stress"].values[-1] == pytest.approx(at_gap, rel=1e-9)

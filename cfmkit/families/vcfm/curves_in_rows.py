@@ -100,14 +100,14 @@ class Push(ShortRepr):
     spring_force: FloatArray  # (n,) [N]
     spring_stress: FloatArray  # (n,) [Pa]
     rest: float | None  # where the shuttle rests [m]; None if nothing holds it short of the end
-    stop_force: FloatArray | float = 0.0  # of elastic stops, (n,) [N]
+    stop_force: FloatArray | None = None  # of elastic stops, (n,) [N]; None without any
     solved: NDArray[np.bool_] | None = None  # where parts were solved for, not interpolated; None if all is known
 
     @cached_property
     def force(self) -> FloatArray:
         """Force on the shuttle [N]."""
         total: FloatArray = np.add(self.leaves.force, self.spring_force)
-        return total + self.stop_force
+        return total if self.stop_force is None else total + self.stop_force
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -136,7 +136,7 @@ class Solution(ShortRepr):
         force, stress = (one[row, :size] for one in vars(curves.spring_samples).values())
         travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
         known = None if np.isnan(rest) else rest
-        stopped = curves.stops.force(travel) if curves.stops else 0.0
+        stopped = curves.stops.force(travel) if curves.stops else None
         return Push(preload, travel, leaves, force, stress, known, stopped, curves.sampler.solved(travel, preload))
 
     # --- what characterises each mechanism, (m,) --------------------------------------------------------------------
@@ -357,8 +357,10 @@ class Solution(ShortRepr):
         spring = self.curves.sampler.spring(np.repeat(places, self.preloads, axis=0) + self.curves.preload)[0]
         first, last = (self.by_mechanism(end)[..., None] for end in self.curves.ends)
         inside = (places[:, None] >= first) & (places[:, None] <= last)
-        stopped = self.curves.stops.force(places)[:, None] if self.curves.stops else 0.0
-        return np.where(inside, leaves + self.by_mechanism(spring) + stopped, np.nan)
+        force = leaves + self.by_mechanism(spring)
+        if self.curves.stops:
+            force = force + self.curves.stops.force(places)[:, None]
+        return np.where(inside, force, np.nan)
 
     # --- the nominal curves, as metrics see them --------------------------------------------------------------------
 
