@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from cfmkit.families.end_stops import stop_faults
+from cfmkit.families.end_stops_spec import stop_faults
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.families.end_stops import EndStop, EndStops, stop_faults
+from cfmkit.families.end_stops import EndStops
+from cfmkit.families.end_stops_spec import EndStop, stop_faults
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive

@@ -7,7 +7,8 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.families.end_stops import EndStop, EndStops
+from cfmkit.families.end_stops import EndStops
+from cfmkit.families.end_stops_spec import EndStop
 from cfmkit.specs.spec import Analysis, Model, PositiveLength
 from cfmkit.specs.units import Length, Ratio
 from cfmkit.stock.material_and_part_spec import MaterialField, PaddedPart, RoundedCorners, SafetyFactor
