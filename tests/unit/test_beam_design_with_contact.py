@@ -14,15 +14,13 @@ from cfmkit.errors import InputError, SpecError
 from cfmkit.families.beam import beams_in_rows
 from cfmkit.families.beam.force_at_few_poses import _replace_values
 from cfmkit.families.beam.network_from_spec import assemble
-from cfmkit.families.beam.shaping.design import optimise_shape, task_of
+from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.report import judge_design
 from cfmkit.families.beam.shaping.response import respond
 from cfmkit.families.beam.shaping.search import Found
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.families.run_control import Run
-from cfmkit.results import Status
 
 CLOSE = Control(tolerance=1e-10)
 OPTIMISE = {
@@ -128,17 +126,6 @@ def test_a_pad_inside_an_obstacle_at_rest_is_no_design():
     x, poses = np.array([14e-3 / task.size, 1.2]), np.array([0.0, 1e-3])
     assert respond(Variables(task, 1), x, poses) is not None
     assert respond(Variables(lower, 1), x, poses) is None
-
-
-@pytest.mark.slow
-def test_a_finger_is_designed_for_its_force_on_the_workpiece_and_keeps_it():
-    spec = gripper(force={"target": 1.0, "tolerance": 0.02})
-    design = optimise_shape(spec, spec.design.optimise, Run())
-    assert design.status is Status.COMPLETE
-    before, after = (cfmkit.analyze(one).values for one in (spec, design.spec))
-    assert after["contact_force[work]"].value == pytest.approx(1.0, rel=0.021)
-    assert after["contact_force_ripple[work]"].value < before["contact_force_ripple[work]"].value
-    assert design.spec.mechanism.obstacles == spec.mechanism.obstacles
 
 
 def test_mechanisms_with_contacts_are_not_solved_twice_in_a_study(monkeypatch):
