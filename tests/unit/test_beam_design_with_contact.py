@@ -17,7 +17,7 @@ from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.report import judge_design
 from cfmkit.families.beam.shaping.response import respond
-from cfmkit.families.beam.shaping.search import Found
+from cfmkit.families.beam.shaping.search import Found, StartBudget, evaluate_in_model, flatten
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
@@ -126,6 +126,20 @@ def test_a_pad_inside_an_obstacle_at_rest_is_no_design():
     x, poses = np.array([14e-3 / task.size, 1.2]), np.array([0.0, 1e-3])
     assert respond(Variables(task, 1), x, poses) is not None
     assert respond(Variables(lower, 1), x, poses) is None
+
+
+@pytest.mark.slow
+def test_a_few_steps_make_the_force_on_a_workpiece_flatter_and_keep_its_mean():
+    spec = gripper(force={"target": 1.0, "tolerance": 0.02})
+    task = task_of(spec, spec.design.optimise)
+    before = evaluate_in_model(task, Found(np.array([12e-3 / task.size, 1.2]), 1, 9e-3, 1.0, 0.0, "", 0))
+    after = flatten(task, before, StartBudget(flattening=8))
+    judged = judge_design(spec, task, after)
+    assert after.feasible
+    assert judged.half_band < before.objective - 0.003
+    assert judged.half_band == pytest.approx(after.objective, abs=1e-4)
+    mean = cfmkit.analyze(judged.spec).values["contact_force[work]"].value
+    assert mean == pytest.approx(1.0, abs=0.021)
 
 
 def test_mechanisms_with_contacts_are_not_solved_twice_in_a_study(monkeypatch):
