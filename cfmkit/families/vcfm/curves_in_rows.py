@@ -56,6 +56,19 @@ class Characteristics:
     linear: tuple[Any, Any]
 
 
+class ForceSampler(Protocol):
+    """The forces of leaves and spring: all that decides where a shuttle rests."""
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+
+    def of_rows(self, rows: Any) -> Self:
+        """Return the model of some of the rows."""
+
+
 class PartSampler(Protocol):
     """A model of leaves and spring: at travels of any shape of one mechanism, or (r, n) of r mechanisms."""
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.end_stops import EndStops
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.curves_in_rows import PartSampler, Push
+    from cfmkit.families.vcfm.curves_in_rows import ForceSampler, PartSampler, Push
     from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
@@ -235,7 +235,7 @@ def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def rests_of(
-    sampler: PartSampler, preloads: FloatArray | Sequence[float], grid: FloatArray, stops: EndStops = NO_STOPS
+    sampler: ForceSampler, preloads: FloatArray | Sequence[float], grid: FloatArray, stops: EndStops = NO_STOPS
 ) -> FloatArray:
     """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the as-made pose on.
 
@@ -243,7 +243,7 @@ def rests_of(
 
     Parameters
     ----------
-    sampler : PartSampler
+    sampler : ForceSampler
         Of one mechanism, or of one for each preload.
     preloads : (r,) array
         [m].
@@ -263,7 +263,7 @@ def rests_of(
     return rest
 
 
-def _rests_on_stops(sampler: PartSampler, preload: FloatArray, grid: FloatArray, stops: EndStops) -> FloatArray:
+def _rests_on_stops(sampler: ForceSampler, preload: FloatArray, grid: FloatArray, stops: EndStops) -> FloatArray:
     """Return where the shuttle rests at each preload between stops, (r,) [m]."""
     rest, (low, high) = rests_of(StoppedSampler(sampler, stops), preload, grid), stops.rigid_ends
     if math.isfinite(low):
@@ -272,12 +272,12 @@ def _rests_on_stops(sampler: PartSampler, preload: FloatArray, grid: FloatArray,
     return np.minimum(rest, high)
 
 
-def _force(sampler: PartSampler, travel: FloatArray, preload: FloatArray) -> FloatArray:
+def _force(sampler: ForceSampler, travel: FloatArray, preload: FloatArray) -> FloatArray:
     """Return the force at travels (r, n) and preloads (r,) [N]."""
     return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload[:, None])[0])
 
 
-def _pulled_ahead(sampler: PartSampler, preload: FloatArray, grid: FloatArray) -> FloatArray:
+def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at negative preloads, (r,) [m]."""
     force, rows = _force(sampler, grid, preload), np.arange(len(preload))
     beyond = force >= 0
@@ -300,7 +300,7 @@ def _pulled_ahead(sampler: PartSampler, preload: FloatArray, grid: FloatArray) -
     return np.where(slack, 0.0, np.where(exact, high, np.where(some, place, np.nan)))
 
 
-def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
+def _pushed_back(sampler: ForceSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at positive preloads, (r,) [m]."""
     nothing = np.zeros((len(preload), 1))
     there, behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
@@ -315,7 +315,7 @@ def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -
     return np.where(rests, _polish_rest(sampler, preload, place, 1e-9 * preload), np.nan)
 
 
-def _polish_rest(sampler: PartSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
+def _polish_rest(sampler: ForceSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
     """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
     here, ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):
@@ -323,7 +323,7 @@ def _polish_rest(sampler: PartSampler, preload: FloatArray, place: FloatArray, s
     return place - np.where(np.abs(change) < step, change, 0.0)
 
 
-def rest_of(sampler: PartSampler, preload: float, grid: FloatArray) -> float | None:
+def rest_of(sampler: ForceSampler, preload: float, grid: FloatArray) -> float | None:
     """Return `rests_of` for one preload [m]; None if the shuttle does not rest."""
     rest = float(rests_of(sampler, [preload], grid)[0])
     return None if np.isnan(rest) else rest
@@ -400,7 +400,7 @@ class LawSampler:
 class StoppedSampler:
     """The force of leaves and spring with that of elastic stops, as far as it decides where a shuttle rests."""
 
-    sampler: PartSampler
+    sampler: ForceSampler
     stops: EndStops
 
     def of_rows(self, rows: Any) -> Self:
