@@ -3,10 +3,14 @@
 At an equilibrium the gradient of the functional vanishes, so that its unknowns change by dz/dx = -K^-1 d(grad P)/dx;
 what an output depends on besides has a complex step already, and is differentiated by computing it. Efforts of a drive
 by a motion need no solution: the slope of the path is the adjoint (`cfmkit.elastica.mechanics.design_derivatives`).
-Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
-and directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
+Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, gaps and stiffnesses
+of stops, support displacements and directions; not obstacles, and not the number of anything. The drive keeps its
+values; a support that turns takes its drive with it.
 States along beams, of which there are many, are computed as dual arrays; what depends on them otherwise, variable by
 variable with the complex step.
+
+Contacts of nodes stay closed or open as they are: at a point at which one begins or ends the derivative is that of one
+side.
 
 SI, variables last; each output is computed when it is first needed.
 """
@@ -26,6 +30,7 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria, dual_arrays
 from cfmkit.elastica.mechanics.designs import design_of, make_up, set_up
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results import beam_states, stress_extremes
 from cfmkit.elastica.results.path import N_PLACES, load_displacement, node_motion, node_reaction, strain_energy
@@ -112,6 +117,13 @@ class Gradient:
     def reaction(self) -> Mapping[str, FloatArray]:
         """Node -> (p, 3, k) derivatives of `EquilibriumPath.reaction`."""
         return _Lookup(self, lambda node: self.of(lambda _, at: node_reaction(at, node, _residual(at))))
+
+    def contact_force(self, number: int) -> FloatArray:
+        """Return the derivatives of `EquilibriumPath.contact_force`, (p, k)."""
+        mesh = self.path.mesh
+        unit = mesh.scales.moment if self.path.network.contacts[number].turns else mesh.scales.force
+        (unknown,) = [contact.unknown for contact in mesh.contacts if contact.number == number]
+        return read_only(self.unknowns[:, :, unknown] * unit)
 
     def end_force(self, beam: str, end: int) -> FloatArray:
         """Return the derivatives of `EquilibriumPath.end_force`, (p, 3, k)."""
@@ -229,11 +241,11 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
     ------
     cfmkit.errors.InputError
         If a variable changes the make-up of the network, moves a corner of a beam and a step of its thickness past
-        each other, or moves one side of a step only; and for networks with contacts, whose gaps depend on a design,
-        too. Outputs raise it where the tangent is singular at a point.
+        each other, or moves one side of a step only; and where sides of beams may touch an obstacle. Outputs raise it
+        where the tangent is singular at a point.
     """
-    if path.network.contacts:
-        raise InputError("derivatives by design variables are not known of networks with contacts")
+    if any(isinstance(contact, BeamOnObstacle) for contact in path.network.contacts):
+        raise InputError("derivatives by design variables are not known where sides of beams touch obstacles")
     x = np.asarray(variables, dtype=float)
     pairs = []
     for k in range(len(x)):

@@ -24,8 +24,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
+from cfmkit.elastica.mechanics.discretise import ContactAt
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
@@ -37,7 +39,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+    from cfmkit.elastica.mechanics.terms import Contribution
 
+    Acting = tuple[Discretisation, Attached | ContactAt]
 
 MAX_TOGETHER = 300_000  # numbers of a table of all designs at some points: 5 MB
 
@@ -164,16 +168,16 @@ def _contract(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
     return np.asarray(total + np.zeros((len(known["length"]), designs.count)))
 
 
-def _changed_terms(designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
-    """Return the springs and loads of each design that have a complex step, with the arrays of that design."""
-    found: list[list[tuple[Discretisation, Attached]]] = []
-    if not (designs.template.springs or designs.template.loads):
+def _changed_terms(designs: NetworkDesigns) -> list[list[Acting]]:
+    """Return the springs, loads and contacts of each design with a complex step, with the arrays of that design."""
+    found: list[list[Acting]] = []
+    if not _acting(designs.template):
         return found
     for d in range(designs.count):
         network = design_of(designs, d)
         own = []
-        for attached in (*network.springs, *network.loads):
-            places = list(attached.places)
+        for attached in _acting(network):
+            places = [attached.place] if isinstance(attached, ContactAt) else list(attached.places)
             arrays = [getattr(network.attachments, name)[places] for name in ("origin", "arm", "frame")]
             if _is_stepped(attached.item) or any(np.imag(array).any() for array in arrays):
                 own.append((network, attached))
@@ -191,13 +195,24 @@ def _is_stepped(item: Any) -> bool:
     )
 
 
-def _term_slopes(own: tuple[Discretisation, Attached], at: Equilibria, motions: FloatArray) -> FloatArray:
-    """Return what a spring or load adds to the derivatives, (p,)."""
-    network, attached = own
-    term = TERMS[type(attached.item)]
+def _acting(network: Discretisation) -> tuple[Attached | ContactAt, ...]:
+    """Return what acts on attachments."""
+    return (*network.springs, *network.loads, *network.contacts)
+
+
+def _term(acting: Acting, z: Any, drive: float) -> Contribution:
+    """Return the term of a spring, a load or a contact in one state."""
+    network, attached = acting
+    if isinstance(attached, ContactAt):
+        return press(network, attached, z)
+    return TERMS[type(attached.item)](network, attached, z, 1.0, drive)
+
+
+def _term_slopes(own: Acting, at: Equilibria, motions: FloatArray) -> FloatArray:
+    """Return what a spring, a load or a contact adds to the derivatives, (p,)."""
     found = np.empty(len(at.z))
     for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
-        part = term(network, attached, z, 1.0, drive)
+        part = _term(own, z, drive)
         found[k] = (np.imag(part.gradient) * motions[k][part.unknowns]).sum() / COMPLEX_STEP
     return found
 
@@ -252,10 +267,9 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
             here: Any = (slice(None), slice(None), unknowns[:, list(columns)])
             np.add.at(found[some], here, change)
     for d, terms in enumerate(_moved_terms(at, designs)):
-        for one, attached in terms:
+        for acting in terms:
             for k, drive in enumerate(at.drive.tolist()):
-                z = at.z[k] if held is None else at.z[k] + 1j * COMPLEX_STEP * held[d]
-                part = TERMS[type(attached.item)](one, attached, z, 1.0, drive)
+                part = _term(acting, at.z[k] if held is None else at.z[k] + 1j * COMPLEX_STEP * held[d], drive)
                 np.add.at(found[k, d], part.unknowns, np.imag(part.gradient) / COMPLEX_STEP)
     return found
 
@@ -277,9 +291,9 @@ def _dual(owner: Any, stepped: dict[str, Any]) -> dict[str, Any]:
     return {name: DualArray(getattr(owner, name), steps / COMPLEX_STEP) for name, steps in changed.items()}
 
 
-def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
-    """Return the springs and loads of each design that have a complex step, or all where held unknowns have one."""
-    if designs.base is None or not (at.mesh.springs or at.mesh.loads):
+def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[Acting]]:
+    """Return the springs, loads and contacts of each design with a complex step; all where held unknowns have one."""
+    if designs.base is None or not _acting(at.mesh):
         return _changed_terms(designs)
     each = (design_of(designs, d) for d in range(designs.count))
-    return [[(one, attached) for attached in (*one.springs, *one.loads)] for one in each]
+    return [[(network, attached) for attached in _acting(network)] for network in each]

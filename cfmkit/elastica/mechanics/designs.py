@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.element_tables import plain_tables
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.network import PointLoad, SlideSpring
 from cfmkit.elastica.model.plain_beams_at_once import (
     check_fits,
@@ -85,7 +86,7 @@ def set_up(
 
 
 def make_up(network: Network) -> Any:
-    """Return what networks of one topology share: nodes, beams, joints, supports, links, springs and loads by name."""
+    """Return what networks of one topology share: nodes, beams, joints, supports, links, and what acts on them."""
     nodes = [
         (name, node.support.along, node.support.across, node.support.rotation) for name, node in network.nodes.items()
     ]
@@ -94,7 +95,7 @@ def make_up(network: Network) -> Any:
         (type(one), *(getattr(one, name, None) for name in ("node", "start", "end", "beam", "follows")))
         for one in (*network.springs, *network.loads)
     ]
-    return nodes, beams, network.links, acting
+    return nodes, beams, network.links, acting, [type(contact) for contact in network.contacts]
 
 
 def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> bool:
@@ -108,6 +109,7 @@ def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: S
         and net.springs == network.springs
         and net.loads == network.loads
         and own.loads == drive.loads
+        and net.contacts == network.contacts
         for net, own in (origin, *pairs)
     )
 
@@ -181,6 +183,7 @@ def _whose(origin: tuple[Network, Drive], names: list[str], inside: Any, ends: A
         at += [spring.node] if isinstance(spring, SlideSpring) else [n for n in (spring.start, spring.end) if n]
     at += [load.node for load in (*network.loads, *drive.loads) if isinstance(load, PointLoad)]
     at += names
+    at += [contact.node for contact in network.contacts if not isinstance(contact, BeamOnObstacle)]
     number = {name: k for k, name in enumerate(names)}
     node = np.array([number[name] for name in at])
     return node, np.array([number[network.master_of(name)] for name in at])

@@ -15,12 +15,12 @@ import numpy as np
 from cfmkit.elastica import PathStatus
 from cfmkit.elastica.results.paths_of_designs import PathsOfDesigns
 from cfmkit.errors import CfmError
-from cfmkit.families.beam.contacts import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.beam.findings import rules_of
 from cfmkit.families.beam.model import kind_of, solve
 from cfmkit.families.beam.scalar_results import QUANTITIES, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as OF_SURFACES
+from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule
 from cfmkit.metrics import split_name
 from cfmkit.metrics.branch_views import MeasuringFrame
@@ -119,15 +119,16 @@ def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]
             continue
         path, law = solution.path, solution.everywhere
         quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
-        quiet &= not path.network.contacts
         if quiet and law is not None and solution.accurate.all():
             found[index] = solution
     return found
 
 
 def _may_go_straight_on(spec: BeamSpec) -> bool:
-    """Return False for what is no curve over an increasing motion, or more than that."""
+    """Return False for what is no curve over an increasing motion, or more than that; with contacts it has corners."""
     analysis, by_motion = spec.analysis, spec.mechanism.drive.by_motion
+    if spec.mechanism.stops or spec.mechanism.obstacles:
+        return False
     plain = analysis.surface is None and getattr(spec, "target_curve", None) is None and not analysis.through_folds
     return plain and by_motion and spec.fidelity != "solid" and spec.extent > 0 and not analysis.imperfection
 

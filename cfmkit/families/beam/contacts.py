@@ -20,6 +20,8 @@ from cfmkit.families.beam.contact_spec import OVERLAP, column_names, pads_of, si
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
+from cfmkit.families.end_stops import DEFINITIONS, LARGEST_FORCE
+from cfmkit.families.end_stops import FINDINGS as OF_STOPS
 from cfmkit.numerics.quadrature import clenshaw_curtis
 from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
@@ -35,18 +37,6 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.solution import Solution
 
-DEFINITIONS = {
-    "first_contact": ("length", "displacement of the driven node at which the first contact begins"),
-    "contact_force[contact]": (
-        "force", "mean force in the window of the stop or the obstacle that is named, on one copy; of a stop with two "
-        "sides positive where it limits the motion along its direction, of an obstacle the sum of all pads"
-    ),
-    "contact_force_ripple[contact]": ("ratio", "(max - min)/max of that force in the window"),
-}  # fmt: skip
-LARGEST_FORCE = (
-    "largest normal force: of a stop or an obstacle on one copy, or between tip and `analysis.surface` in both "
-    "directions of the motion"
-)
 N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners
 PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
@@ -97,11 +87,19 @@ def toucher(contact: Contact) -> str:
 
 def signed_force(path: Path, numbers: list[int]) -> FloatArray:
     """Return the force of a stop or a pad at every point of a path, (n,) [N or N m], on one copy."""
-    contacts = path.network.contacts
-    signs = [one.sense if isinstance(one, Stop) else 1.0 for one in (contacts[number] for number in numbers)]
     if len(numbers) == 1:
         return path.contact_force(numbers[0])
-    return np.asarray(sum(sign * path.contact_force(number) for sign, number in zip(signs, numbers, strict=True)))
+    return np.asarray(sum(sense_of(path.network.contacts[number]) * path.contact_force(number) for number in numbers))
+
+
+def sense_of(contact: Contact) -> float:
+    """Return the sign with which the force of a contact counts: of a stop that of its direction."""
+    return contact.sense if isinstance(contact, Stop) else 1.0
+
+
+def numbers_of(contacts: tuple[Contact, ...], name: str) -> list[int]:
+    """Return the numbers of the one-sided contacts of a stop or an obstacle."""
+    return [number for number, contact in enumerate(contacts) if contact.name == name]
 
 
 def named_force(path: Path, name: str) -> FloatArray:
@@ -172,7 +170,8 @@ def contact_values(solution: Solution) -> Mapping[str, Quantity]:
             mean = _mean(solution, contact.removesuffix("]"), window)
             reason = "" if mean is not None else "the window is not on the curve, or the curve turns back"
             return Quantity(mean, *DEFINITIONS["contact_force[contact]"], reason=reason)
-        ripple = _ripple(solution, contact.removesuffix("]"), window)
+        top, bottom = force_extremes(solution, contact.removesuffix("]"), window)
+        ripple = (top - bottom) / top if top is not None and bottom is not None and top > 0 else None
         reason = "" if ripple is not None else "there is no contact in the window"
         return Quantity(ripple, *DEFINITIONS["contact_force_ripple[contact]"], reason=reason)
 
@@ -193,16 +192,16 @@ def _first_contact(solution: Solution) -> float | None:
     return float(solution.motion[0]) if closed else None
 
 
-def _ripple(solution: Solution, name: str, window: tuple[float, float]) -> float | None:
-    def rows(path: Path) -> FloatArray:
-        force = named_force(path, name)
-        return np.array([force, -force])
+def force_extremes(
+    solution: Solution, name: str, window: tuple[float, float]
+) -> tuple[float, float] | tuple[None, None]:
+    """Return the largest and the smallest force of a contact in a window [N]; None of a window that is not reached."""
 
-    def row(path: Path, number: int) -> FloatArray:
-        return rows(path)[number : number + 1]
+    def signed(path: Path, sign: float) -> FloatArray:
+        return sign * named_force(path, name)[None]
 
-    top, bottom = (largest(solution, partial(row, number=number), window) for number in (0, 1))
-    return (top + bottom) / top if top is not None and bottom is not None and top > 0 else None
+    top, bottom = (largest(solution, partial(signed, sign=sign), window) for sign in (1.0, -1.0))
+    return (None, None) if top is None or bottom is None else (top, -bottom)
 
 
 def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float | None:
@@ -224,9 +223,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 
 
 # -- findings ----------------------------------------------------------------------------------------------------------
-FINDINGS = {
-    "contact_begins": "a stop is reached, or a pad touches an obstacle",
-    "blocked": "a rigid contact leaves the drive no way to go on: the curve ends there",
+FINDINGS = OF_STOPS | {
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
     "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",

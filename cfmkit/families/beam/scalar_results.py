@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.contacts import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
+from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.rows import ScalarQuantity
 from cfmkit.numerics.cubic_interpolation import value_at

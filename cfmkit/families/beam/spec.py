@@ -146,6 +146,8 @@ class BeamDesign(DesignBlock):
             raise ValueError("a 'target' needs 'optimise' with 'objective: ripple': it looks for the nearest force")
         if self.optimise.force.target is not None or self.optimise.force.min is not None:
             raise ValueError("'target' says the force: remove 'optimise.force'")
+        if self.optimise.contact is not None:
+            raise ValueError("'target' is a curve of the drive's force: remove it, or 'optimise.contact'")
         curve, window = self.target.curve(), self.optimise.window
         if not curve.covers(*window):
             raise ValueError("'optimise.window' is beyond the points of 'target'")
@@ -378,8 +380,6 @@ def _contact_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str
         return
     if spec.analysis.modes:
         yield ("analysis", "modes"), "natural frequencies are not known with stops or obstacles: leave it out"
-    if spec.design is not None and spec.design.optimise is not None:
-        yield ("design", "optimise"), "shapes are searched without stops and obstacles: leave these out"
 
 
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:

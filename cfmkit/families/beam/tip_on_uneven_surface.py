@@ -22,8 +22,8 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
-from cfmkit.families.beam.contacts import LARGEST_FORCE
 from cfmkit.families.beam.findings import finding
+from cfmkit.families.end_stops import LARGEST_FORCE
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
 from cfmkit.results import Quantity, quantities

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search, when_called
+from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.slider_crank.findings import FINDINGS
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
@@ -29,7 +30,7 @@ FAMILY = Family(
     rows=when_called("cfmkit.families.slider_crank.springs.model:solve_rows"),
     design=when_called("cfmkit.families.slider_crank.design:design"),
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),
-    values=OF_SPRINGS | OF_PARTS,
+    values=OF_SPRINGS | OF_PARTS | OF_STOPS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,
     errors="cfmkit.families.slider_crank.redesign_variables_and_process_errors:errors",

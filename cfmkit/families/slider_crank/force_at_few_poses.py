@@ -16,6 +16,7 @@ from cfmkit.families.slider_crank.printed.solution import Solution
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.solution import ChainModel
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
@@ -31,6 +32,8 @@ def sample_poses(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
     """
     if spec.fidelity in ("prb", "solid") or spec.analysis.side is not None or places[0] < 0:
         return None
+    if places[-1] > spec.mechanism.end_stops.rigid_ends[1]:
+        return None
     try:
         spec = resolve(spec)
         linkage = linkage_of(spec.mechanism)
@@ -40,7 +43,7 @@ def sample_poses(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
     pressed = chain.press(places, 0, spec.analysis.accuracy)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
-    model = "lumped" if spec.fidelity == "lumped" else "beam"
+    model: ChainModel = "lumped" if spec.fidelity == "lumped" else "beam"
     ends = float(places[0]), float(places[-1])
-    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, False)  # type: ignore[arg-type]
+    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, spec=spec)
     return Sampled({"load": np.asarray(solution.force)}, np.asarray(solution.stress)[None])

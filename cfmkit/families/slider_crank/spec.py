@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
+from cfmkit.families.end_stops_spec import stop_faults
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -182,6 +183,16 @@ class SliderCrankSpec(Spec):
         names = ("pivot", "crank_pin", "slider_pin")
         widths = {f"flexures.{name}.width": getattr(own, name).width for name in names} if own else {}
         return widths | ({"beam.width": strip.width} if strip else {})
+
+    @model_validator(mode="after")
+    def _stops_are_of_a_part_that_is_pressed(self) -> Self:
+        faults = dict(stop_faults(self.mechanism.stops, self.requirements))
+        if self.mechanism.stops and self.fidelity in ("prb", "solid"):
+            faults["mechanism", "stops"] = (
+                f"stops are known of flexures and strips: 'analysis.fidelity' of lumped or beam, not {self.fidelity}"
+            )
+        refuse("Spec", faults)
+        return self
 
     @model_validator(mode="after")
     def _a_mirrored_pair_is_on_one_slider(self) -> Self:

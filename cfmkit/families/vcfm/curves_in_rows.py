@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.longest_interval_in_band import flat_window
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.end_stops import EndStops
 
     Ends = tuple[FloatArray, FloatArray]
     Law = Callable[[FloatArray], FloatArray]
@@ -52,6 +54,19 @@ class Characteristics:
     negative_stiffness: Any
     first_stiffness: Any
     linear: tuple[Any, Any]
+
+
+class ForceSampler(Protocol):
+    """The forces of leaves and spring: all that decides where a shuttle rests."""
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+
+    def of_rows(self, rows: Any) -> Self:
+        """Return the model of some of the rows."""
 
 
 class PartSampler(Protocol):
@@ -98,13 +113,14 @@ class Push(ShortRepr):
     spring_force: FloatArray  # (n,) [N]
     spring_stress: FloatArray  # (n,) [Pa]
     rest: float | None  # where the shuttle rests [m]; None if nothing holds it short of the end
+    stop_force: FloatArray | None = None  # of elastic stops, (n,) [N]; None without any
     solved: NDArray[np.bool_] | None = None  # where parts were solved for, not interpolated; None if all is known
 
     @cached_property
     def force(self) -> FloatArray:
         """Force on the shuttle [N]."""
         total: FloatArray = np.add(self.leaves.force, self.spring_force)
-        return total
+        return total if self.stop_force is None else total + self.stop_force
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,12 +132,14 @@ class Rows(ShortRepr):
     rest: FloatArray  # (r,) where the shuttle rests [m]; NaN if nothing holds it short of the end
     travel: FloatArray  # (r, n), increasing; after the end of a row its last place is repeated [m]
     count: NDArray[np.intp]  # (r,) points of each row
+    stops: EndStops = NO_STOPS  # of the shuttle
 
     def of_rows(self, rows: Any) -> Rows:
         """Return some of the curves, with what is known of them."""
         chosen = Rows(
-            self.sampler.of_rows(rows), self.preload[rows], self.rest[rows], self.travel[rows], self.count[rows]
-        )
+            self.sampler.of_rows(rows), self.preload[rows], self.rest[rows], self.travel[rows], self.count[rows],
+            self.stops,
+        )  # fmt: skip
         for name in ("leaves", "leaf_force", "spring_samples"):
             if name in self.__dict__:
                 chosen.__dict__[name] = rows_of(self.__dict__[name], rows)
@@ -150,7 +168,8 @@ class Rows(ShortRepr):
     @cached_property
     def force(self) -> FloatArray:
         """Force on the shuttle at the points, (r, n) [N]; NaN after the end of a row."""
-        return np.where(self.there, self.leaf_force + self.spring_samples.force, np.nan)
+        total = self.leaf_force + self.spring_samples.force
+        return np.where(self.there, total + self.stops.force(self.travel) if self.stops else total, np.nan)
 
     @property
     def ends(self) -> Ends:
@@ -162,7 +181,8 @@ class Rows(ShortRepr):
         sampler, preload = self.sampler, self.preload
         if rows is not None:
             sampler, preload = sampler.of_rows(rows), preload[rows]
-        return np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
+        total = np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
+        return total + self.stops.force(places) if self.stops else total
 
     def reached(self, places: FloatArray) -> FloatArray:
         """Return the same, NaN beyond the ends of a row [N]."""

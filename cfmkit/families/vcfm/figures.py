@@ -172,10 +172,12 @@ def adjustability(result: Result) -> Figure:
     over = np.linspace(given.min(), given.max(), PRELOADS)
     one = solution.character
     places = np.linspace(*solution.window_of_one, 41)
+    stops = solution.curves.stops
     leaves = solution.sampler.leaves(places).force
+    leaves = leaves + stops.force(places) if stops else leaves
     mean = np.array([(leaves + solution.sampler.spring(places + preload)[0]).mean() for preload in over])
     grid = np.linspace(0.0, float(solution.first.travel[-1]), 241)
-    rests = -rests_of(solution.sampler, over, grid)
+    rests = -rests_of(solution.sampler, over, grid, stops)
     nominal = float(np.interp(solution.first.preload, over, mean))
     straight = nominal + force_change(one.positive_stiffness, over - solution.first.preload)
     by_rule = rest_shift(one.positive_stiffness, one.first_stiffness, over)
@@ -205,7 +207,8 @@ def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
 
     def force_at(places: FloatArray) -> FloatArray:
         sampler = solution.sampler
-        return np.asarray(sampler.leaf_force(places) + sampler.spring(places + preloads[:, None])[0])
+        total = sampler.leaf_force(places) + sampler.spring(places + preloads[:, None])[0]
+        return np.asarray(total + solution.curves.stops.force(places) if solution.curves.stops else total)
 
     forces = force_at(np.broadcast_to(travel, (len(preloads), FINE)))
     return flat_window(travel, forces, solution.spec.analysis.flatness, force_at)[0]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.end_stops import FINDINGS as ON_STOPS
 from cfmkit.families.findings import (
     TOO_SOFT,
     finder,
@@ -80,6 +81,7 @@ FINDINGS = {
     "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
     "spring_slack": "bought springs are slack over a part of the travel",
     "no_spring_fits": "no spring of the catalogue fits",
+    **ON_STOPS,
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
 }
 
@@ -132,7 +134,8 @@ def _contradiction(solution: Solution) -> Sentence:
 def is_closed(solution: Solution) -> NDArray[np.bool_]:
     """Return whether the spring is pressed together within the travel, (m,) of bool."""
     most = solution.column(lambda spec: max(spec.analysis.preloads))
-    return np.asarray(most + solution.travel > solution.column(spring_room) * (1 + ROUNDING))
+    reach = np.minimum(solution.travel, solution.curves.stops.rigid_ends[1])
+    return np.asarray(most + reach > solution.column(spring_room) * (1 + ROUNDING))
 
 
 def closed_spring(solution: Solution) -> Sentence:
@@ -280,7 +283,8 @@ def _forces_beyond_linear(solution: Solution) -> tuple[FloatArray, FloatArray]:
 
 def _is_overloaded(solution: Solution) -> Any:
     at_end, last = _forces_beyond_linear(solution)
-    beyond = goes_beyond(solution.nominal.ends[1], solution.linear[1])
+    saved = solution.curves.stops.free_end <= solution.linear[1] * (1 + ROUNDING)  # what rises there is the stop
+    beyond = goes_beyond(solution.nominal.ends[1], solution.linear[1]) & ~saved
     return beyond & ~(last - at_end <= solution.spec.analysis.flatness * np.abs(last))
 
 

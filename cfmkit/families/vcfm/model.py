@@ -5,7 +5,8 @@ Each curve begins where the shuttle rests under its preload: pulled back by it, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Self
@@ -14,6 +15,7 @@ import numpy as np
 
 from cfmkit.arrays import LazySequence, ShortRepr
 from cfmkit.curves import Column, Curve
+from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
@@ -33,10 +35,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.end_stops import EndStops
     from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.curves_in_rows import PartSampler, Push
+    from cfmkit.families.vcfm.curves_in_rows import ForceSampler, PartSampler, Push
     from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws
     from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.results import Finding
 
 
 MOST_BACK = 20
@@ -70,17 +74,18 @@ def result_of(solution: Solution) -> Result:
         return Result(spec, Status.NO_EQUILIBRIUM, _shortfall(solution), warnings=closed)
     reason = _shortfall(solution)
     short = nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(reason)
-    curves = tuple(_curve(push) for push in solution.pushes)
+    stops, pressed = solution.curves.stops, bool(nominal.force[0] > solution.effort_error[0])
+    curves = tuple(_curve(push, stops, bool(push.force[0] > solution.effort_error[0])) for push in solution.pushes)
     (low, high), dense = (float(end[0]) for end in solution.linear), DenseCurve(solution)
     return Result(
         spec=_as_run(spec),
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=reason if short else "",
         curves=curves,
-        values=values_of_one(QUANTITIES, solution),
-        warnings=LazySequence(partial(findings_of_one, RULES, finding, solution)),
+        values=values_of_one(QUANTITIES, solution) | stops.values(nominal.travel, pressed, solution.window_of_one),
+        warnings=LazySequence(partial(_findings, solution)),
         travel=(float(nominal.travel[0]), spec.travel),
-        valid=((low, min(high, spec.travel)),) if solution.is_linear[0] else None,
+        valid=((low, min(high, float(solution.reach[0]))),) if solution.is_linear[0] else None,
         target=target_of(spec),
         allowable_stress=spec.mechanism.allowable_stress,
         stress_overrated=float(solution.overrating[0]),
@@ -97,11 +102,21 @@ def result_of(solution: Solution) -> Result:
     )
 
 
+def _findings(solution: Solution) -> Iterator[Finding]:
+    yield from findings_of_one(RULES, finding, solution)
+    first = float(solution.first.force[0])
+    pressed = first if first > solution.effort_error[0] else 0.0
+    for name, message in solution.curves.stops.sentences(solution.first.travel, pressed):
+        yield finding(name, message)
+
+
 def _shortfall(solution: Solution) -> str:
     """Return why a curve ends before the travel does; empty if none does."""
     if solution.sampler.problem:
         return solution.sampler.problem
-    return str(closed_spring(solution)[0]) if is_closed(solution).any() else ""
+    if is_closed(solution).any():
+        return str(closed_spring(solution)[0])
+    return solution.curves.stops.blocked(float(solution.nominal.ends[1][0]))
 
 
 def travel_grid(spec: VcfmSpec) -> FloatArray:
@@ -115,11 +130,13 @@ def solve(spec: VcfmSpec, made: LeafLaws, sampler: PartSampler) -> Solution:
     A preload at which the spring cannot be followed, or is closed, has no curve; a message says so.
     """
     preloads = np.array(spec.analysis.preloads)
-    curves = _curves(sampler, preloads, travel_grid(spec)[None, :], np.full(len(preloads), spring_room(spec)))
+    room = np.full(len(preloads), spring_room(spec))
+    curves = _curves(sampler, preloads, travel_grid(spec)[None, :], room, spec.mechanism.end_stops)
     curves.leaves  # noqa: B018  force and stress come of one root, and a curve has both
     known = np.isfinite(curves.force)
     if (known != curves.there).any():
-        curves = Rows(sampler, curves.preload, curves.rest, *_compress_rows(curves.travel, known))
+        travel, count = _compress_rows(curves.travel, known)
+        curves = replace(curves, travel=travel, count=count)
     kept = curves.count >= LEAST_POINTS
     kept[0] = True
     return Solution((spec,), made, curves if kept.all() else curves.of_rows(np.flatnonzero(kept)), int(kept.sum()))
@@ -152,7 +169,7 @@ def _is_complete(solution: Solution) -> NDArray[np.bool_]:
 def _kind(spec: VcfmSpec) -> Hashable | None:
     """Return what mechanisms that are solved together have in common; None if the model of one is not a closed form."""
     analysis = spec.analysis
-    if analysis.fidelity not in ("truss", "analytic") or spec.target_curve is not None:
+    if analysis.fidelity not in ("truss", "analytic") or spec.target_curve is not None or spec.mechanism.stops:
         return None
     stated = analysis.window is None, analysis.measured is None
     settings = analysis.points, len(analysis.preloads), analysis.flatness, analysis.band
@@ -171,14 +188,25 @@ def _solve_kind(specs: Sequence[VcfmSpec]) -> Solution:
     return Solution(tuple(specs), made, _curves(sampler, preloads, grid[each], room[each]), count)
 
 
-def _curves(sampler: PartSampler, preloads: FloatArray, grid: FloatArray, room: FloatArray) -> Rows:
-    """Return one curve for each preload (r,), from where the shuttle rests up to where the spring is closed [m]."""
-    rest = rests_of(sampler, preloads, grid)
+def _curves(
+    sampler: PartSampler, preloads: FloatArray, grid: FloatArray, room: FloatArray, stops: EndStops = NO_STOPS
+) -> Rows:
+    """Return one curve for each preload (r,), from where the shuttle rests up to where the spring is closed [m].
+
+    Stops are those of all rows.
+    """
+    rest = rests_of(sampler, preloads, grid, stops)
     travel, count = _travels(np.nan_to_num(rest), np.broadcast_to(grid, (len(preloads), grid.shape[1])))
+    if stops:
+        marked = stops.mark_rows(row[:points] for row, points in zip(travel, count, strict=True))
+        count = np.array([len(row) for row in marked])
+        travel = np.array([np.append(row, np.full(max(count.max(), 1) - len(row), row[-1:])) if len(row) else
+                           np.full(max(count.max(), 1), start)
+                           for row, start in zip(marked, travel[:, 0], strict=True)])  # fmt: skip
     is_open = (travel + preloads[:, None] <= room[:, None] * (1 + 1e-12)) & (
         np.arange(travel.shape[1]) < count[:, None]
     )
-    return Rows(sampler, preloads[:, None], rest, *_compress_rows(travel, is_open))
+    return Rows(sampler, preloads[:, None], rest, *_compress_rows(travel, is_open), stops)
 
 
 def _travels(start: FloatArray, grid: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -206,20 +234,26 @@ def _compress_rows(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatAr
     return np.where(np.arange(size) < count[:, None], travel, last), count
 
 
-def rests_of(sampler: PartSampler, preloads: FloatArray | Sequence[float], grid: FloatArray) -> FloatArray:
+def rests_of(
+    sampler: ForceSampler, preloads: FloatArray | Sequence[float], grid: FloatArray, stops: EndStops = NO_STOPS
+) -> FloatArray:
     """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the unloaded one on.
 
     NaN where there is none, or where the spring could not be followed so far.
 
     Parameters
     ----------
-    sampler : PartSampler
+    sampler : ForceSampler
         Of one mechanism, or of one for each preload.
     preloads : (r,) array
         [m].
     grid : (n,) or (r, n) array
         Travels at which a shuttle whose spring is pulled is looked for first [m].
+    stops : EndStops
+        Of the shuttle: it may rest on one.
     """
+    if stops:
+        return _rests_on_stops(sampler, np.asarray(preloads, dtype=float), grid, stops)
     preload = np.asarray(preloads, dtype=float)
     grid = np.broadcast_to(grid, (len(preload), np.shape(grid)[-1]))
     rest = np.where(preload == 0, 0.0, np.nan)
@@ -229,12 +263,21 @@ def rests_of(sampler: PartSampler, preloads: FloatArray | Sequence[float], grid:
     return rest
 
 
-def _force(sampler: PartSampler, travel: FloatArray, preload: FloatArray) -> FloatArray:
+def _rests_on_stops(sampler: ForceSampler, preload: FloatArray, grid: FloatArray, stops: EndStops) -> FloatArray:
+    """Return where the shuttle rests at each preload between stops, (r,) [m]."""
+    rest, (low, high) = rests_of(StoppedSampler(sampler, stops), preload, grid), stops.rigid_ends
+    if math.isfinite(low):
+        pressed = _force(sampler, np.full((len(preload), 1), low), preload)[:, 0] + stops.force(np.array(low)) > 0
+        rest = np.where((preload > 0) & ~(rest > low) & pressed, low, rest)
+    return np.minimum(rest, high)
+
+
+def _force(sampler: ForceSampler, travel: FloatArray, preload: FloatArray) -> FloatArray:
     """Return the force at travels (r, n) and preloads (r,) [N]."""
     return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload[:, None])[0])
 
 
-def _pulled_ahead(sampler: PartSampler, preload: FloatArray, grid: FloatArray) -> FloatArray:
+def _pulled_ahead(sampler: ForceSampler, preload: FloatArray, grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at negative preloads, (r,) [m]."""
     force, rows = _force(sampler, grid, preload), np.arange(len(preload))
     beyond = force >= 0
@@ -257,7 +300,7 @@ def _pulled_ahead(sampler: PartSampler, preload: FloatArray, grid: FloatArray) -
     return np.where(slack, 0.0, np.where(exact, high, np.where(some, place, np.nan)))
 
 
-def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
+def _pushed_back(sampler: ForceSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
     """Return where the shuttle rests at positive preloads, (r,) [m]."""
     nothing = np.zeros((len(preload), 1))
     there, behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
@@ -272,7 +315,7 @@ def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -
     return np.where(rests, _polish_rest(sampler, preload, place, 1e-9 * preload), np.nan)
 
 
-def _polish_rest(sampler: PartSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
+def _polish_rest(sampler: ForceSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
     """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
     here, ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):
@@ -280,7 +323,7 @@ def _polish_rest(sampler: PartSampler, preload: FloatArray, place: FloatArray, s
     return place - np.where(np.abs(change) < step, change, 0.0)
 
 
-def rest_of(sampler: PartSampler, preload: float, grid: FloatArray) -> float | None:
+def rest_of(sampler: ForceSampler, preload: float, grid: FloatArray) -> float | None:
     """Return `rests_of` for one preload [m]; None if the shuttle does not rest."""
     rest = float(rests_of(sampler, [preload], grid)[0])
     return None if np.isnan(rest) else rest
@@ -292,7 +335,7 @@ def _as_run(spec: VcfmSpec) -> VcfmSpec:
     return spec.model_copy(update={"analysis": analysis})
 
 
-def _curve(push: Push) -> Curve:
+def _curve(push: Push, stops: EndStops, pressed: bool) -> Curve:
     leaves = push.leaves
     extra = {
         "bistable_force": Column(leaves.force, "force"),
@@ -304,6 +347,7 @@ def _curve(push: Push) -> Curve:
     }
     if push.solved is not None:
         extra["solved"] = Column(np.where(push.solved, "yes", "between"), "text")
+    extra |= stops.columns(push.travel, pressed)
     branch = np.full(len(push.travel), "load")
     return Curve(push.travel, push.force, branch, leaves.stable, extra, label={"preload": (push.preload, "length")})
 
@@ -350,6 +394,26 @@ class LawSampler:
         """Stiffnesses and linear range by the laws."""
         parts = self.parts
         return Characteristics(parts.positive_stiffness, parts.negative_stiffness, parts.first_stiffness, parts.linear)
+
+
+@dataclass(frozen=True)
+class StoppedSampler:
+    """The force of leaves and spring with that of elastic stops, as far as it decides where a shuttle rests."""
+
+    sampler: ForceSampler
+    stops: EndStops
+
+    def of_rows(self, rows: Any) -> Self:
+        """Return those of some rows."""
+        return type(self)(self.sampler.of_rows(rows), self.stops)
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of leaves and stops [N]."""
+        return self.sampler.leaf_force(travel) + self.stops.force(travel)
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+        return self.sampler.spring(compression)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
 from cfmkit.families.rows import ScalarQuantity
@@ -268,5 +269,5 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result of the family, in the order in which they are shown."""
 
-DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()}
+DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()} | OF_STOPS
 """Name -> dimension and definition."""

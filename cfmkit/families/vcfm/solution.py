@@ -136,7 +136,8 @@ class Solution(ShortRepr):
         force, stress = (one[row, :size] for one in vars(curves.spring_samples).values())
         travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
         known = None if np.isnan(rest) else rest
-        return Push(preload, travel, leaves, force, stress, known, curves.sampler.solved(travel, preload))
+        stopped = curves.stops.force(travel) if curves.stops else None
+        return Push(preload, travel, leaves, force, stress, known, stopped, curves.sampler.solved(travel, preload))
 
     # --- what characterises each mechanism, (m,) --------------------------------------------------------------------
 
@@ -160,6 +161,11 @@ class Solution(ShortRepr):
     def travel(self) -> FloatArray:
         """Requested travels of the shuttles [m]."""
         return self.column(lambda spec: spec.travel)
+
+    @cached_property
+    def reach(self) -> FloatArray:
+        """Ends of the travels, or where the first stop is reached [m]."""
+        return np.minimum(self.travel, self.curves.stops.free_end)
 
     @cached_property
     def allowable_stress(self) -> FloatArray:
@@ -200,7 +206,7 @@ class Solution(ShortRepr):
     @cached_property
     def is_linear(self) -> NDArray[np.bool_]:
         """True where the leaves buckle within the travel, and so have a range of constant negative stiffness."""
-        return np.isfinite(self.linear[0]) & (self.linear[0] < self.travel)
+        return np.isfinite(self.linear[0]) & (self.linear[0] < self.reach)
 
     @cached_property
     def window(self) -> Ends:
@@ -213,11 +219,11 @@ class Solution(ShortRepr):
             low, high = np.array([window_places(ends, travel) for ends, travel in stated if ends is not None]).T
             return low, high
         if self.is_linear.all():  # nothing flat needs to be looked for
-            return self.linear[0], np.minimum(self.linear[1], self.travel)
+            return self.linear[0], np.minimum(self.linear[1], self.reach)
         some, (first, last) = np.isfinite(self.flat[0]), self.linear
         return (
             np.where(self.is_linear, first, np.where(some, self.flat[0], 0.0)),
-            np.where(self.is_linear, np.minimum(last, self.travel), np.where(some, self.flat[1], self.travel)),
+            np.where(self.is_linear, np.minimum(last, self.reach), np.where(some, self.flat[1], self.reach)),
         )
 
     @property
@@ -351,7 +357,10 @@ class Solution(ShortRepr):
         spring = self.curves.sampler.spring(np.repeat(places, self.preloads, axis=0) + self.curves.preload)[0]
         first, last = (self.by_mechanism(end)[..., None] for end in self.curves.ends)
         inside = (places[:, None] >= first) & (places[:, None] <= last)
-        return np.where(inside, leaves + self.by_mechanism(spring), np.nan)
+        force = leaves + self.by_mechanism(spring)
+        if self.curves.stops:
+            force = force + self.curves.stops.force(places)[:, None]
+        return np.where(inside, force, np.nan)
 
     # --- the nominal curves, as metrics see them --------------------------------------------------------------------
 
@@ -360,6 +369,7 @@ class Solution(ShortRepr):
         """Increasing travels of each shuttle, (m, q), so dense that the force hides nothing between two [m]."""
         low, high = (end[:, None] for end in self.nominal.ends)
         grid = [np.linspace(low[:, 0], high[:, 0], EVEN, axis=1)]
+        grid += [np.clip(np.full_like(low, place), low, high) for place in self.curves.stops.marks]
         with np.errstate(all="ignore"):
             for mark in (*(end[:, None] for end in self.linear), np.zeros_like(low)):
                 crowd = np.hstack([mark, mark - CROWDED * (high - low), mark + CROWDED * (high - low)])
@@ -398,7 +408,7 @@ class Solution(ShortRepr):
             self.effort_error,
             self.target,
             self.spec.analysis.band,
-            (low, np.minimum(high, self.travel)),
+            (low, np.minimum(high, self.reach)),
             self.part_efforts,
             StressRows(self._stress_samples, self.stress, self.allowable_stress),
         )

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from cfmkit.families.end_stops import EndStops
+from cfmkit.families.end_stops_spec import EndStop, stop_faults
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
@@ -65,6 +67,9 @@ class Mechanism(CutLeaves, Model):
         description="whether wide leaves are stiffer because their anticlastic bending is suppressed; exact model "
         "only, the effect of clamped ends is left out",
     )
+    stops: dict[str, EndStop] = Field(
+        {}, description="stops of the shuttle, by name: {end: {gap: 6 mm, stiffness: 80 N/mm}}"
+    )
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
     part: VcfmPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes, frame")
 
@@ -75,6 +80,11 @@ class Mechanism(CutLeaves, Model):
         if self.positive is not None and self.springs is not None:
             raise ValueError("give either 'positive', a spring of leaves, or 'springs' that are bought")
         return self
+
+    @property
+    def end_stops(self) -> EndStops:
+        """Stops of the shuttle."""
+        return EndStops(tuple(self.stops.items()))
 
     @property
     def flexures(self) -> Positive:
@@ -301,6 +311,11 @@ class VcfmSpec(Spec):
         spring = self.mechanism.positive
         own = {} if spring is None else {"positive.width": spring.width}
         return {"bistable.width": self.mechanism.bistable.width} | own
+
+    @model_validator(mode="after")
+    def _has_the_stops_that_it_names(self) -> Self:
+        refuse("Spec", dict(stop_faults(self.mechanism.stops, self.requirements)))
+        return self
 
     @model_validator(mode="after")
     def _preloads_are_within_reach(self) -> Self:

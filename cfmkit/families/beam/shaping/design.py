@@ -100,7 +100,8 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         network=assembly.network,
         driven=assembly.driven,
         direction=assembly.direction,
-        copies=float(assembly.parallel),
+        copies=float(assembly.parallel) if wanted.contact is None else 1.0,
+        contact=wanted.contact,
         window=(wanted.window[0] / layers, wanted.window[1] / layers),
         coordinates=tuple(_coordinates(wanted)),
         shaped=wanted.beams if wanted.beams is not None else tuple(mechanism.beams),
@@ -228,7 +229,8 @@ def _report_search(task: Task, design: Judged, result: Explored) -> str:
         )
     elif design.half_band is not None:
         share = 1 - window[0] / window[1]
-        reached = f"force within ± {percent(design.half_band)} over {percent(share)} of the travel"
+        whose = "force" if task.contact is None else f"force of {task.contact!r}"
+        reached = f"{whose} within ± {percent(design.half_band)} over {percent(share)} of the travel"
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {found.objective:.3f}"
     return (

@@ -13,13 +13,14 @@ import numpy as np
 
 from cfmkit.designing.reported_values_of_finished_design import measure_metrics
 from cfmkit.elastica.model.beam import fit
+from cfmkit.families.beam.contacts import force_extremes
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.shaping.search import PLACES, Found
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.run_control import Run
-from cfmkit.results import Quantity, Searched
+from cfmkit.results import Quantity, Searched, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class Judged:
     spec: BeamSpec  # as it is written; its window is the one that the analysis confirms
     found: Found  # what came out of the search
     audit: Audit  # whether it exists as drawn
-    half_band: float | None  # the metric of this name of the analysis, over the window
+    half_band: float | None  # of the force that is to be constant, over the window, as the analysis finds it
     faults: tuple[str, ...]  # what analysis and audit hold against it
     # largest distance from the target curve over its largest force, where there is one: a metric of the analysis
     miss: float | None = None
@@ -67,10 +68,18 @@ def judge_design(spec: BeamSpec, task: Task, found: Found, audit: Audit | None =
     result = analyze(new, Run())
     window = _confirmed_window(task, result, _window(spec, task, found), _requested_window(spec)[0])
     new = new.replace({"analysis.window": window})
-    (band,) = measure_metrics(result, window, "half_band")
+    band = _half_band(task, result, window)
     audit = audit or audited(Variables(task, found.order), found)
     (miss,) = (None,) if task.shape is None else measure_metrics(result, window, "deviation_from_curve")
     return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)), miss)
+
+
+def _half_band(task: Task, result: Result, window: tuple[float, float]) -> float | None:
+    """Return (max - min)/(max + min) of the force that is to be constant; None if the analysis does not know it."""
+    if task.contact is None:
+        return measure_metrics(result, window, "half_band")[0]
+    top, bottom = force_extremes(result.state, task.contact, window)
+    return None if top is None or bottom is None or bottom <= 0 else (top - bottom) / (top + bottom)
 
 
 def _confirmed_window(task: Task, result: Result, window: tuple[float, float], asked: float) -> tuple[float, float]:
@@ -78,7 +87,7 @@ def _confirmed_window(task: Task, result: Result, window: tuple[float, float], a
     start, end = window
 
     def kept(micrometres: int) -> bool:
-        (band,) = measure_metrics(result, (1e-6 * micrometres, end), "half_band")
+        band = _half_band(task, result, (1e-6 * micrometres, end))
         return band is not None and band <= task.half_band
 
     if task.objective != "range" or start >= asked:
@@ -100,13 +109,13 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
         yield "it is not stable all the way"
     if audit.crossings:
         yield f"beams cross at {audit.crossings} of the poses"
-    (band,), (stress,) = (
-        measure_metrics(result, window, "half_band"),
-        measure_metrics(result, (0.0, window[1]), "stress_max"),
-    )
-    if band is None:
+    band = _half_band(task, result, window)
+    (stress,) = measure_metrics(result, (0.0, window[1]), "stress_max")
+    if band is None and task.contact is not None and result.status is Status.COMPLETE:
+        yield f"{task.contact!r} is not touched all over the window"
+    elif band is None:
         yield f"the analysis ends before the window does: {result.message}"
-    elif task.objective == "range" and band > task.half_band:
+    elif task.objective == "range" and band is not None and band > task.half_band:
         yield f"over the requested window the force is within ± {percent(band)} only"
     allowed = task.allowable_stress
     if allowed is not None and stress is not None and stress > allowed:
@@ -214,7 +223,7 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
     numbers = (
         _counts(result) | {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)} | _drawn_values(drawn)
     )
-    if task.fidelity != REISSNER:  # else the metrics say it
+    if task.fidelity != REISSNER and task.contact is None:  # else the metrics say it
         numbers |= _reissner(design)
     return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *reported[name]) for name in numbers}
 

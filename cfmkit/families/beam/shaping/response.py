@@ -17,7 +17,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.results import beam_states
 from cfmkit.errors import CfmError
-from cfmkit.families.beam.shaping.variables import Length, has_vanished_beam, lengths
+from cfmkit.families.beam.shaping.variables import Length, has_pad_inside, has_vanished_beam, lengths
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class BeamAtPoses:
 
 @dataclass(frozen=True)
 class NetworkAtPoses:
-    """The network at p poses: the mechanism's force (p,) [N] and its beams by name."""
+    """The network at p poses: the force that is to be constant (p,) [N], and its beams by name."""
 
     force: FloatArray
     lines: dict[str, BeamAtPoses]
@@ -186,7 +186,7 @@ class Response:
             pull = sections.axial_stress[:, at.row] if self.variables.task.total_stress else None
             bending = sections.bending_stress[:, at.row]
             lines[name] = BeamAtPoses(at.place, states.x[:, at.row], states.y[:, at.row], bending, pull)
-        return NetworkAtPoses(self.path.effort[self.keep] * self.variables.task.copies, lines)
+        return NetworkAtPoses(self.variables.task.force(self.path)[self.keep], lines)
 
     @cached_property
     def _gradient(self) -> Gradient:
@@ -206,7 +206,7 @@ class Response:
         NoAnswer
             Where the engine has none.
         """
-        return self._gradient.effort * self.variables.task.copies
+        return self.variables.task.force_slopes(self._gradient)
 
     @cached_property
     def slopes(self) -> dict[str, FloatArray]:
@@ -236,10 +236,10 @@ class Response:
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
     """Return the response of a network at poses that begin with rest [m].
 
-    None if it does not reach them all, or has a beam of no length.
+    None if it does not reach them all, has a beam of no length, or a pad in an obstacle at rest.
     """
     task, network = variables.task, variables.build(x)
-    if has_vanished_beam(network):
+    if has_vanished_beam(network) or has_pad_inside(network):
         return None
     try:
         path = trace(network, Displacement(task.driven, task.direction, poses), CONTROL)
@@ -336,4 +336,4 @@ def looked_at(task: Task, network: Network) -> CloseView | None:
         return None
     keep = path.at_requested
     stress = path.peak_stress(axial=task.total_stress).value[keep]
-    return CloseView(at, path.effort[keep] * task.copies, stress, task.shape, task.layers)
+    return CloseView(at, task.force(path)[keep], stress, task.shape, task.layers)

@@ -7,6 +7,7 @@ by their tolerances. Force and stress are judged by the analysis of the specific
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -111,10 +112,20 @@ def scatter_within_tolerances(variables: Variables, found: Found, spread: Networ
     noise = rng.standard_normal((spread.samples, variables.count)) * sizes
     drive = Displacement(task.driven, task.direction, at)
     networks = (variables.build(found.x + one) for one in noise)
-    outcomes = [one.value for one in trace_many(networks, drive, Control(tolerance=1e-5)) if one.status == "COMPLETE"]
-    bands = np.array([half_band(at, one.effort, found.start) for one in outcomes])
-    ranges = np.array([strict_share(at, one.effort) for one in outcomes])
-    return Drawn(bands, ranges, spread.samples - len(outcomes))
+    if task.contact is None:  # followed together where they can be
+        outcomes = trace_many(networks, drive, Control(tolerance=1e-5))
+        forces = [one.value.effort for one in outcomes if one.status == "COMPLETE"]
+    else:
+        outcomes = trace_many(networks, drive, Control(tolerance=1e-5), partial(_force_at_requested, task))
+        forces = [one.value for one in outcomes if one.status == "COMPLETE"]
+    bands = np.array([half_band(at, force, found.start) for force in forces])
+    ranges = np.array([strict_share(at, force) for force in forces])
+    return Drawn(bands, ranges, spread.samples - len(forces))
+
+
+def _force_at_requested(task: Task, path: Path) -> FloatArray:
+    """Return the force that is to be constant at the requested points of a path."""
+    return task.force(path)[path.at_requested]
 
 
 def crossing(task: Task, path: Path, pose: int) -> bool:

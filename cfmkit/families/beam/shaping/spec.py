@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from cfmkit.families.beam.contact_spec import RotationStop, sides_of
 from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Time
 
@@ -49,7 +50,7 @@ def _check_increasing(x: Range | None, y: Range | None) -> None:
 
 
 class ForceWanted(Model):
-    """The mean force over the window, of all copies together."""
+    """The mean force over the window, of all copies together; of a `contact` on one copy."""
 
     min: Annotated[Force, Field(gt=0)] | None = Field(None, description="smallest value")
     target: Annotated[Force, Field(gt=0)] | None = Field(None, description="value to reach, within `tolerance`")
@@ -96,6 +97,11 @@ class Optimise(Model):
         "range",
         description="widest window with `half_band`, flattest over the window, or F(a)/F(b) - 1 of Lan, ill-posed",
     )
+    contact: str | None = Field(
+        None,
+        description="stop or obstacle whose force is to be constant, such as the workpiece of a gripper; default: the "
+        "force of the drive",
+    )
     half_band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
         0.025,
         description="limit of (max - min)/(max + min), for `range`; 2.5 % keeps the force within 5 % of the maximum",
@@ -140,5 +146,19 @@ def optimise_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tu
     for index, name in enumerate(wanted.beams or ()):
         if name not in mechanism.beams:
             yield ("beams", index), f"there is no beam {name!r}; beams are {', '.join(mechanism.beams)}"
+    yield from _contact_faults(wanted, mechanism)
     if not wanted.free and (wanted.orders[-1] == 0 or wanted.beams == ()):
         yield (), "leaves nothing to vary: name free nodes, or an order of the shapes above 0"
+
+
+def _contact_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what is wrong with the contact whose force is to be constant, and with obstacles of a search."""
+    names = [*mechanism.stops, *mechanism.obstacles]
+    if wanted.contact is not None and wanted.contact not in names:
+        listed = ", ".join(names) or "none"
+        yield ("contact",), f"there is no stop or obstacle {wanted.contact!r}; there are: {listed}"
+    if isinstance(mechanism.stops.get(wanted.contact or ""), RotationStop):
+        yield ("contact",), f"the stop {wanted.contact!r} limits a rotation: its force is a moment"
+    for name, obstacle in mechanism.obstacles.items():
+        if sides_of(mechanism, obstacle):
+            yield (), f"shapes are searched with pads on obstacles only: state 'nodes' alone of 'obstacles.{name}'"

@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from cfmkit.families.beam.contacts import named_force, numbers_of, sense_of
+
 if TYPE_CHECKING:
-    from cfmkit.elastica import Network
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network, Path
+    from cfmkit.elastica.sensitivity import Gradient
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 Objective = Literal["ripple", "range", "paper"]
@@ -84,6 +88,7 @@ class Task:
     safety_factor: float = 1.0  # yield strength over allowable stress [1]
     # how many of the network stand in series in the mechanism: its displacements are so many times as large
     layers: int = 1
+    contact: str | None = None  # stop or obstacle whose force on one copy is to be constant; None: the drive's
     # force over the mechanism's displacements that is wanted, as a share of its mean in the window; None: constant
     shape: TargetCurve | None = None
     # the network with beams that bend only, which a start begins with; None if those of the network do no more
@@ -106,6 +111,17 @@ class Task:
     def allowable_stress(self) -> float | None:
         """The stress that the analysis allows [Pa]; None if it is not limited."""
         return None if self.limits.stress is None else self.limits.stress / (1 - MARGIN)
+
+    def force(self, path: Path) -> FloatArray:
+        """Return the force that is to be constant, of the drive or of a contact, at all points of a path, (n,) [N]."""
+        return path.effort * self.copies if self.contact is None else named_force(path, self.contact)
+
+    def force_slopes(self, slopes: Gradient) -> FloatArray:
+        """Return the derivatives of that force, (p, k)."""
+        if self.contact is None:
+            return slopes.effort * self.copies
+        numbers = numbers_of(self.network.contacts, self.contact)
+        return np.asarray(sum(sense_of(self.network.contacts[k]) * slopes.contact_force(k) for k in numbers))
 
     @cached_property
     def size(self) -> float:

@@ -22,6 +22,7 @@ import numpy as np
 
 from cfmkit.elastica import Network, Polynomial
 from cfmkit.elastica.model.beam import fit
+from cfmkit.elastica.model.contact import NodeOnObstacle
 from cfmkit.families.beam.network_from_spec import thickest_of
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class Variables:
         beams = dict(network.beams)
         for beam, row in zip(self.task.shaped, x[places:].reshape(len(self.task.shaped), self.order), strict=True):
             beams[beam] = replace(beams[beam], shape=Polynomial((0.0, *row)), closure="rotscale")
-        return Network(nodes, beams, network.links, network.springs, network.loads)
+        return replace(network, nodes=nodes, beams=beams)
 
     def read(self) -> FloatArray:
         """Return the variables of the task's own network; terms above the order are dropped."""
@@ -209,6 +210,15 @@ def has_vanished_beam(network: Network) -> bool:
     """Return True if the nodes of a beam coincide but for rounding, as two that are pushed into one corner do."""
     chords = [abs(end - start) for start, end in (_chord(network, name) for name in network.beams)]
     return min(chords) <= _NOTHING * float(np.mean(chords))
+
+
+def has_pad_inside(network: Network) -> bool:
+    """Return True if the pad of a node lies in an obstacle before any load."""
+    return any(
+        contact.outline.distance((network.nodes[contact.node].x, network.nodes[contact.node].y)).value < contact.radius
+        for contact in network.contacts
+        if isinstance(contact, NodeOnObstacle)
+    )
 
 
 def _chord(network: Network, name: str) -> tuple[complex, complex]:

@@ -7,6 +7,7 @@ Reference
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,7 @@ from cfmkit.specs.units import window_places
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
@@ -86,13 +88,16 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         pulled = finding("pulled", "a printed chain is pressed, not pulled: 'analysis.travel' must not begin below 0")
         return no_result(spec, pulled)
     side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
-    pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
+    stops, grid = spec.mechanism.end_stops, np.linspace(low, high, spec.analysis.points)
+    pressed = chain.press(stops.mark_rows([grid])[0] if stops else grid, side, spec.analysis.accuracy)
     pressed = kept_clear(pressed, _thickness(chain))
     usable = len(pressed.travel) > 1 and pressed.ending is not PressingEnd.WRONG_BRANCH
     reported = () if pressed.ending is PressingEnd.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
+    blocked = "" if reported else stops.blocked(float(pressed.travel[-1]))
+    on_stops = tuple(finding(*pair) for pair in stops.sentences(pressed.travel, 0.0)) if usable else ()
     if not usable:
         return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=reported)
-    whole = (float(pressed.travel[0]), float(pressed.travel[-1]))
+    whole = (float(pressed.travel[0]), min(float(pressed.travel[-1]), stops.free_end))
     window = whole if spec.analysis.window is None else window_places(spec.analysis.window, (low, high))
     solution = Solution(
         "lumped" if spec.fidelity == "lumped" else "beam",
@@ -108,20 +113,24 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     )
     return Result(
         spec=spec,
-        status=Status.PARTIAL if reported else Status.COMPLETE,
-        message=reported[0].message if reported else "",
+        status=Status.PARTIAL if reported or blocked else Status.COMPLETE,
+        message=reported[0].message if reported else blocked,
         curves=(_curve(solution),),
-        values=values_of_one(QUANTITIES, solution),
-        warnings=LazySequence(lambda: (*reported, *findings_of_one(RULES, finding, solution))),
+        values=values_of_one(QUANTITIES, solution) | stops.values(solution.travel, False, window),
+        warnings=LazySequence(lambda: (*reported, *on_stops, *findings_of_one(RULES, finding, solution))),
         travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
         effort_error=solution.effort_error,
-        closed=solution.course
-        or interpolate_path(pressed.path, float(solution.legs), allowed=solution.material.allowable_stress),
+        closed=solution.course if stops else solution.course or _interpolated(solution),
         state=solution,
     )
+
+
+def _interpolated(solution: Solution) -> BetweenPoints | None:
+    path, allowed = solution.pressed.path, solution.material.allowable_stress
+    return interpolate_path(path, float(solution.legs), allowed=allowed)
 
 
 def _thickness(chain: Chain) -> float:
@@ -161,5 +170,7 @@ def _curve(solution: Solution) -> Curve:
         "guide_moment": lambda: Column(solution.guide_moment, "torque"),
         "energy": lambda: Column(solution.energy, "energy"),
     }
+    on_stops = solution.stops.columns(solution.travel, False)
+    columns |= {name: partial(on_stops.__getitem__, name) for name in on_stops}
     extra = LazyMapping(columns, lambda name: columns[name]())
     return Curve(solution.travel, solution.force, stable=solution.stable, extra=extra)

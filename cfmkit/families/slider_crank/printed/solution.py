@@ -16,6 +16,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.results.member_efforts import effort_error
+from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
 from cfmkit.metrics.continuous_means_and_extremes import mean
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.end_stops import EndStops
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, Pressed
     from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -54,6 +56,7 @@ class ChainCurve(ShortRepr):
     first: tuple[float, float]  # force [N] and stress [Pa] where it begins
     # force [N], of all legs, and stress [Pa] over the logarithm of the travel [m]
     laws: tuple[ChebyshevPanels, ChebyshevPanels]
+    stops: EndStops = NO_STOPS  # of the slider: their forces are no part of the laws
 
     @cached_property
     def places(self) -> FloatArray:
@@ -61,6 +64,7 @@ class ChainCurve(ShortRepr):
         borders = self.laws[0].ends
         nodes = [nodes_of(ends) for ends in pairwise(borders.tolist())]
         own = np.exp(np.sort(np.concatenate([borders, *nodes])))
+        own = np.union1d(own, self.stops.marks[self.stops.marks > 0]) if self.stops else own
         low, high = self.ends
         return np.concatenate([[low], own[(own > low) & (own < high)], [high]])
 
@@ -87,7 +91,10 @@ class ChainCurve(ShortRepr):
         size = np.clip(np.ravel(places), *self.ends)
         found = law.at(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
         share = np.minimum(size / nearest, 1.0)
-        return np.asarray(np.where(size < nearest, first + (found - first) * share, found).reshape(np.shape(places)))
+        values = np.where(size < nearest, first + (found - first) * share, found)
+        if self.stops and which == 0:
+            values = values + self.stops.force(size)
+        return np.asarray(values.reshape(np.shape(places)))
 
     def mean(self, window: tuple[float, float]) -> float:
         """Return the mean force in a window of the travel [N]."""
@@ -166,9 +173,19 @@ class Solution(ShortRepr):
 
     @cached_property
     def force(self) -> FloatArray:
+        """Force against the travel, of all legs and the stops [N]."""
+        return self.leg_force + self.stops.force(self.travel) if self.stops else self.leg_force
+
+    @cached_property
+    def leg_force(self) -> FloatArray:
         """Force against the travel, of all legs [N]."""
         force: FloatArray = self.legs * self.pressed.force
         return force
+
+    @property
+    def stops(self) -> EndStops:
+        """Stops of the slider."""
+        return NO_STOPS if self.spec is None else self.spec.mechanism.end_stops
 
     @property
     def effort_error(self) -> float:
@@ -232,7 +249,8 @@ class Solution(ShortRepr):
     def course(self) -> ChainCurve | None:
         """Force and stress at every travel; None if the chain cannot be followed to places between its points."""
         low, high = float(self.travel[0]), float(self.travel[-1])
-        return course(self._at_travels, (low, high), (float(self.force[0]), float(self.stress[0])))
+        found = course(self._at_travels, (low, high), (float(self.leg_force[0]), float(self.stress[0])))
+        return None if found is None else replace(found, stops=self.stops)
 
     def _at_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return force [N] and stress [Pa] at other travels than those of the points; None if one is not reached."""
@@ -240,7 +258,7 @@ class Solution(ShortRepr):
         if found.ending not in FOLLOWED or len(found.travel) < len(travel):
             return None
         other = replace(self, pressed=found)
-        return other.force, other.stress
+        return other.leg_force, other.stress
 
     @cached_property
     def level(self) -> float:

@@ -7,6 +7,8 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from cfmkit.families.end_stops import EndStops
+from cfmkit.families.end_stops_spec import EndStop
 from cfmkit.specs.spec import Analysis, Model, PositiveLength
 from cfmkit.specs.units import Length, Ratio
 from cfmkit.stock.material_and_part_spec import MaterialField, PaddedPart, RoundedCorners, SafetyFactor
@@ -120,6 +122,15 @@ class Printed(RoundedCorners, Model):
         "effect of clamped ends is left out",
     )
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
+    stops: dict[str, EndStop] = Field(
+        {},
+        description="stops of the slider of flexures or a strip, by name: {end: {gap: 6 mm, stiffness: 80 N/mm}}",
+    )
+
+    @property
+    def end_stops(self) -> EndStops:
+        """Stops of the slider."""
+        return EndStops(tuple(self.stops.items()))
 
     @property
     def thinnest(self) -> float:
