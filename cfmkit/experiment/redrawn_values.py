@@ -99,7 +99,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     design = getattr(spec, "design", None)
     ranges = {path: _widen(float(spec.at(path)), *ends) for path, ends in free_of(spec, spec).items()}
     if not getattr(design, "free", None):
-        for path in _sections(spec):
+        for path in section_paths(spec):
             value = float(spec.at(path))
             ranges.setdefault(path, (value / MOST_CHANGE, value * MOST_CHANGE))
     ranges = {path: ends for path, ends in ranges.items() if kinds.get(path) not in ("rate", "friction")}
@@ -130,7 +130,7 @@ def _widen(value: float, low: float, high: float) -> tuple[float, float]:
     )
 
 
-def _sections(spec: Spec) -> list[str]:
+def section_paths(spec: Spec) -> list[str]:
     """Return the paths of widths and thicknesses of what bends."""
     made = {f"mechanism.{key}" for key, value in spec.out_of_plane_widths.items() if value is not None}
     beside = {path.removesuffix("width") + "thickness" for path in made}

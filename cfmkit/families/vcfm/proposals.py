@@ -55,8 +55,8 @@ PAIRS = (2, 1, 3, 4)
 THICKER = (1.0, 1.6, 2.4)
 """Thickness of the diamond's leaves over that of the Vs."""
 
-MIDDLE = (0.8, 0.9)
-"""Share of the linear region that is used: the exact leaves depart from the line at its ends."""
+MIDDLE = (0.8, 0.9, 0.98)
+"""Share of the linear region that is used: the exact leaves depart from the line at its ends, which widths correct."""
 
 STRUCTURES = {
     kind.proposal.name: (block, kind.proposal)
@@ -104,7 +104,8 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     found: list[Candidate] = []
     closest: tuple[float, dict[str, float]] | None = None
     for block in request.materials or ({"name": "pom"},):
-        for spec, sizes in _designs(request, dict(block)):
+        for loose, sizes in _designs(request, dict(block)):
+            spec = _with_close_spring(loose, sizes)
             over = _room_over(request, spec, sizes)
             excess = max(over.values())
             if closest is None or excess < closest[0]:
@@ -212,6 +213,24 @@ def _lengths(spec: VcfmSpec, request: Request) -> Any:
             continue
         if min(sizes.leaf.thickness, sizes.side.thickness) >= request.thinnest:
             yield made, sizes
+
+
+def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
+    """Return a design whose diamond stands close below the leaves if it is so short that it passes between the walls.
+
+    As made, the leaves fall from the shuttle to the walls, and the diamond's upper leaves to its corners; a motion only
+    takes them apart.
+    """
+    frame, leaf, side = spec.mechanism.frame, sizes.leaf, sizes.side
+    corner = float(side.reach) + 1.5 * frame.block
+    if corner + frame.block > float(leaf.reach):
+        return spec
+    clearance = frame.block + max(0.0, float(leaf.rise) * corner / float(leaf.reach) - float(side.rise))
+    if clearance >= frame.clearance:
+        return spec
+    # lengths above zero need no other check
+    close = frame.model_copy(update={"clearance": clearance})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"frame": close})})
 
 
 def _room_over(request: Request, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, float]:

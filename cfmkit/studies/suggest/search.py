@@ -358,7 +358,8 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
                 continue
             found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
     reason = f"it needs {OTHER[request.springs]} springs" if offer.candidates and request.springs else ""
-    return FamilyOffer(tuple(found.values()), offer.reason if found else offer.reason or reason)
+    likely_first = tuple(sorted(found.values(), key=lambda candidate: candidate.doubtful))
+    return FamilyOffer(likely_first, offer.reason if found else offer.reason or reason)
 
 
 def _next(
