@@ -365,6 +365,7 @@ def judge_proposal(
     misses = [
         *((topic_of(one.metric), one.sentence) for one in outcomes if not one.ok and one.metric not in ENVELOPE),
         *(("size", text) for text in sides_outside(request, space)),
+        *(("stress", text) for text in (space.faults if space else ())),
         *(("travel", text) for text in too_short(request, result)),
         *disqualifying(result),
     ]
