@@ -86,6 +86,9 @@ SOFTEST = 0.9
 WIDE_LAST = 100.0
 """Promise of designs whose leaves are too wide to curl: they come after all others."""
 
+FARTHEST = 1.2
+"""End of the travel over that of the linear region: the flattest window may lie farther."""
+
 APART = 1.2
 """Room across that a helical spring takes, over its diameter: as they are drawn."""
 
@@ -218,14 +221,18 @@ def _lengths(spec: VcfmSpec, request: Request) -> Any:
 def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     """Return a design whose diamond stands close below the leaves if it is so short that it passes between the walls.
 
-    As made, the leaves fall from the shuttle to the walls, and the diamond's upper leaves to its corners; a motion only
-    takes them apart.
+    Seen from the shuttle, the lowest leaf falls to the wall by what is left of its rise. The diamond's corners are as
+    far below as its leaves rise, less half of what preload and travel compress it by. The corners stay half a block
+    below the leaf before and after the travel.
     """
-    frame, leaf, side = spec.mechanism.frame, sizes.leaf, sizes.side
+    frame, leaf, side, target = spec.mechanism.frame, sizes.leaf, sizes.side, spec.design
     corner = float(side.reach) + 1.5 * frame.block
-    if corner + frame.block > float(leaf.reach):
+    if target is None or corner + frame.block > float(leaf.reach):
         return spec
-    clearance = frame.block + max(0.0, float(leaf.rise) * corner / float(leaf.reach) - float(side.rise))
+    share, rise, preload = corner / float(leaf.reach), float(leaf.rise), float(target.preload_stroke)
+    end = FARTHEST * float(sizes.linear[1])
+    closest = max(0.5 * preload + share * rise, 0.5 * (preload + end) + share * (rise - end))
+    clearance = max(frame.block, closest - float(side.rise) - 0.5 * frame.block)
     if clearance >= frame.clearance:
         return spec
     # lengths above zero need no other check

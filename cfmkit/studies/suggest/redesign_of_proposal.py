@@ -15,7 +15,6 @@ from cfmkit.specs.units import Place, format_short
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.slider_crank.springs.spec import Bought
     from cfmkit.families.suggestion_request import Request
     from cfmkit.specs.spec import Spec
 
@@ -68,7 +67,7 @@ def _of_own_springs(spec: Spec, request: Request) -> Mapping[str, Any] | None:
     }
 
 
-def _as_listed(spring: Bought) -> Mapping[str, Any]:
+def _as_listed(spring: Any) -> Mapping[str, Any]:
     """Return a spring at a pin as a catalogue lists it, in the number that it is built in."""
     wire = {} if spring.wound is None else spring.wound.model_dump(exclude_unset=True)
     known = {"free_length": spring.free_length, "life": spring.life}
