@@ -35,7 +35,7 @@ def reason_not_asked(result, space):
         return f"its {kind} varies by more than {LARGEST_RIPPLE:.0%}"
     if getattr(spec.mechanism, "obstacles", None):
         return "its force is that on a workpiece"
-    if min((factor for factor in factors if factor is not None), default=1.0) < 1.0:
+    if min((factor for factor in factors if factor is not None), default=1.0) < 1.0 / SLACK:
         return "it is stressed above the allowable stress, which no request allows"
     return None
 

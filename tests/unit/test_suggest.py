@@ -31,7 +31,7 @@ from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
-from cfmkit.studies.suggest import figures, proposal_making_and_judging, search, yield_of_proposal
+from cfmkit.studies.suggest import figures, proposal_making_and_judging, relaxed_requests, search, yield_of_proposal
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
     OUT_OF_TIME,
@@ -535,6 +535,20 @@ def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
         again = request(**{"envelope": "[26 mm, 20 mm, 12 mm]", key: text})
         jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
         assert any(make_proposal(job).passes for job in jobs), key
+
+
+def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
+    made = []
+
+    def judge(job):
+        made.append(job)
+        return Proposal(job.family, job.candidate.variant, text="a specification")
+
+    monkeypatch.setattr(relaxed_requests, "make_proposal", judge)
+    monkeypatch.setattr(search, "names", lambda: ("beam",))
+    found = suggest(request(envelope="[26 mm, 20 mm, 12 mm]"), Run())
+    (answer,) = found.answers
+    assert (answer.made, len(answer.nearest), len(made)) == (0, 2, 2)
 
 
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
