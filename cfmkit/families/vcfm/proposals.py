@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.design import DesignSizes
 
 
-SLENDERNESS = (3.7, 4.0, 4.5, 5.5, 7.0)
+SLENDERNESS = (3.7, 4.0, 4.25, 4.5, 5.5, 7.0)
 """Rise over thickness of the leaves: below 3.63 they are no longer buckled half way, above 7 they are thin and wide."""
 
 LONGER = (1.04, 1.15, 1.4, 1.8, 2.4)
