@@ -8,8 +8,10 @@ corrected once so that its solid has that mean.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
@@ -21,6 +23,8 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.arrays import FloatArray
+    from cfmkit.experiment.parameters_to_fit import FitParameter
     from cfmkit.families.run_control import Run
     from cfmkit.metrics.requirements import Outcome
     from cfmkit.results import Result
@@ -33,10 +37,10 @@ FITTED = "the requirements state no {0} that the mechanism could be designed for
 
 @dataclass(frozen=True)
 class AsDrawn:
-    """A part that is made as drawn: an explanation of a recording without errors."""
+    """A part that is made as drawn, without errors."""
 
-    errors: tuple[()] = ()
-    values: tuple[()] = ()
+    errors: tuple[FitParameter, ...] = ()
+    values: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def part_of(self, drawn: Spec) -> Spec:
         """Return the drawing."""

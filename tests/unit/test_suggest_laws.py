@@ -45,9 +45,9 @@ def test_a_tapered_strip_is_offered_for_a_travel_of_nearly_all_the_reach():
 
 
 def test_strips_that_are_probably_too_wide_come_after_those_that_are_not():
-    keys = {"force": "1.506 N", "travel": "26 mm", "ripple": "2 %", "envelope": "[87.4 mm, 136.4 mm, 5.19 mm]"}
+    keys = {"force": "1.506 N", "travel": "33 mm", "ripple": "2 %", "envelope": "[87.4 mm, 136.4 mm, 5.19 mm]"}
     _, full = offered("slider-crank", **keys, material=f"[{ABS}]")
-    _, reserved = offered("slider-crank", **keys | {"safety": "1.25"}, material=f"[{ABS}]")
+    _, reserved = offered("slider-crank", **keys | {"safety": "1.5"}, material=f"[{ABS}]")
     assert not full[0].doubtful
     assert all(one.doubtful for one in reserved if one.variant == "strip")
 
