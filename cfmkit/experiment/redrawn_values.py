@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.aimed_curve import AimedCurve
-    from cfmkit.experiment.errors_of_made_part import Explanation
+    from cfmkit.experiment.parameters_to_fit import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
@@ -99,7 +99,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     design = getattr(spec, "design", None)
     ranges = {path: _widen(float(spec.at(path)), *ends) for path, ends in free_of(spec, spec).items()}
     if not getattr(design, "free", None):
-        for path in _sections(spec):
+        for path in section_paths(spec):
             value = float(spec.at(path))
             ranges.setdefault(path, (value / MOST_CHANGE, value * MOST_CHANGE))
     ranges = {path: ends for path, ends in ranges.items() if kinds.get(path) not in ("rate", "friction")}
@@ -130,7 +130,7 @@ def _widen(value: float, low: float, high: float) -> tuple[float, float]:
     )
 
 
-def _sections(spec: Spec) -> list[str]:
+def section_paths(spec: Spec) -> list[str]:
     """Return the paths of widths and thicknesses of what bends."""
     made = {f"mechanism.{key}" for key, value in spec.out_of_plane_widths.items() if value is not None}
     beside = {path.removesuffix("width") + "thickness" for path in made}
@@ -152,12 +152,27 @@ def _kind(path: str) -> str:
     return path.removesuffix(_index(path)).rpartition(".")[2]
 
 
+class MadeAs(Protocol):
+    """Errors with which parts are made of a drawing."""
+
+    @property
+    def errors(self) -> tuple[FitParameter, ...]:
+        """The values that err."""
+
+    @property
+    def values(self) -> FloatArray:
+        """What they are, (n,) [SI]."""
+
+    def part_of(self, drawn: Spec) -> Spec:
+        """Return the part that is made of a drawing."""
+
+
 @dataclass(frozen=True)
 class Redesign:
     """The drawn values with which the parts of every explanation have the curve that is aimed at."""
 
     drawn: Spec
-    explanations: tuple[Explanation, ...]
+    explanations: tuple[MadeAs, ...]
     aim: AimedCurve
     limits: Mapping[str, DrawnRange]
     missed_before: float = 0.0  # by what share of its bound a requirement is missed by the design itself

@@ -135,6 +135,7 @@ class PosedPart:
     pieces: int = 1  # separate pieces that the mechanism is put together from, bought ones included
     assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
     pin: float | None = None  # diameter of its pins, which rub as they turn [m]; None without pins
+    faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
 
 
 def box(bodies: Iterable[PosedBody], direction: float = 0.5 * math.pi) -> FloatArray:

@@ -144,6 +144,7 @@ class BoundingBox:
     corner: tuple[float, float]  # its lower left corner in the drawings of the mechanism [m]
     sideways: bool  # whether the travel is along x in the drawings, or nearly, not along y
     drawn: tuple[float, float]  # width and height of the box along x and y of the drawings [m]
+    faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
 
     @classmethod
     def around(cls, part: PosedPart) -> BoundingBox:
@@ -154,7 +155,7 @@ class BoundingBox:
         low, high = box(part.bodies).tolist()
         sideways = abs(math.cos(part.direction)) > abs(math.sin(part.direction))
         drawn = (high[0] - low[0], high[1] - low[1])
-        return cls(across, along, part.depth, part.pieces, part.assumed, (low[0], low[1]), sideways, drawn)
+        return cls(across, along, part.depth, part.pieces, part.assumed, (low[0], low[1]), sideways, drawn, part.faults)
 
     @property
     def sides(self) -> tuple[float, float, float | None]:

@@ -81,6 +81,12 @@ class Hardware:
     bodies: tuple[PosedBody, ...] = ()  # guide, ground, fasteners: what stands beside what moves
     drawn: tuple[PosedBody, ...] = ()  # all parts as the assembly drawing shows them, the lowest first
     pin: float | None = None  # diameter of the pins that rub [m]
+    faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
+
+
+def in_sentences(faults: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the faults of parts, by the place of each, as sentences."""
+    return tuple(f"{place}: {fault}" for place, fault in faults.items())
 
 
 def with_faults(parts: Iterable[ListedPart], faults: Mapping[str, str]) -> tuple[ListedPart, ...]:

@@ -108,6 +108,7 @@ class Candidate:
     correct: str = ""
     reserve: float = 1.0  # `Request.reserve` that it was proposed for, and is designed with
     springs: Springs | None = None  # that it is put together with; None if it needs none
+    doubtful: bool = False  # whether its laws say that it probably does not fit: it comes after those that do
 
 
 def name_variant(variant: str, request: Request, block: MaterialBlock) -> str:

@@ -211,7 +211,8 @@ class DesignKeys(Model):
     free: dict[str, tuple[MetricValue, MetricValue]] = Field(
         {},
         description="values of the design that may move for `yield`, and in which ranges: {path: [4 mm, 8 mm]}; "
-        "default: those that the family's design chooses",
+        "default: those that the family's design chooses. Without other targets they move until all requirements are "
+        "met",
     )
     robust: Literal["cvar", "worst"] | None = Field(
         None,
@@ -227,6 +228,11 @@ class DesignKeys(Model):
         400, ge=20, le=1_000_000, description="random parts within the tolerances with which the design is evaluated"
     )
     seed: int | None = Field(None, ge=0, description="of the random parts; default: `--seed`")
+
+    @property
+    def by_requirements(self) -> bool:
+        """Whether the block has no targets of its family: values in `free` move until the requirements are met."""
+        return bool(self.free) and self.model_fields_set <= {*DesignKeys.model_fields, "yield"}
 
     def tolerances_of(self, _spec: Any) -> tuple[Mapping[str, Any], int]:
         """Return the tolerances that are stated for a specification, and how many parts are to be drawn."""

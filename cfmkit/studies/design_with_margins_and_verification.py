@@ -46,6 +46,10 @@ def run_design(spec: Spec, designer: Designer, run: Run) -> Design:
 def _finished_design(spec: Spec, designer: Designer, run: Run) -> Design:
     """Return the design of a specification with its margins, verified."""
     asked = getattr(spec, "design", None)
+    if asked is not None and asked.by_requirements:
+        from cfmkit.studies.redesign_to_requirements import move_free_values
+
+        designer = move_free_values
     plain = getattr(asked, "yield", None) is None
     result = designer(spec, run) if plain else _with_yield(spec, designer, run)
     if getattr(asked, "verify", None) is not None:

@@ -31,7 +31,7 @@ from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
-from cfmkit.studies.suggest import figures, proposal_making_and_judging, search, yield_of_proposal
+from cfmkit.studies.suggest import figures, proposal_making_and_judging, relaxed_requests, search, yield_of_proposal
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
     OUT_OF_TIME,
@@ -39,7 +39,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     ProposalJob,
     make_proposal,
 )
-from cfmkit.studies.suggest.relaxed_requests import nearest
+from cfmkit.studies.suggest.relaxed_requests import confirm, edges
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, order_proposals, suggest
 
 REQUESTS = Path(__file__).parents[1] / "requests"
@@ -402,7 +402,7 @@ def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next
     monkeypatch.setattr(
         search, "make_proposal", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY)
     )
-    monkeypatch.setattr(search, "nearest", lambda *_: {})
+    monkeypatch.setattr(search, "edges", lambda *_: iter(()))
     notes = SimpleNamespace(find=lambda _key: None, add=lambda _key, record: kept.append(record))
     assert not suggest(request(), Run(notes=notes)).proposals
     assert not any("variant" in record for record in kept)
@@ -527,13 +527,28 @@ def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
     asked = request(envelope="[26 mm, 20 mm, 12 mm]")
     propose = function_named(family("beam").propose)
     assert not propose(asked, Run()).candidates
-    found = nearest(asked, "beam", 0, NEVER)
-    assert found
-    for key, value in found.items():
+    found = {edge.key: confirm(asked, 0, NEVER, edge) for edge in edges(asked, ("beam",), 0, NEVER)}
+    confirmed = {key: value for key, value in found.items() if value is not None}
+    assert confirmed
+    for key, value in confirmed.items():
         text = f"[{value.replace(' x ', ', ')}]" if key == "envelope" else value
         again = request(**{"envelope": "[26 mm, 20 mm, 12 mm]", key: text})
         jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
         assert any(make_proposal(job).passes for job in jobs), key
+
+
+def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
+    made = []
+
+    def judge(job):
+        made.append(job)
+        return Proposal(job.family, job.candidate.variant, text="a specification")
+
+    monkeypatch.setattr(relaxed_requests, "make_proposal", judge)
+    monkeypatch.setattr(search, "names", lambda: ("beam",))
+    found = suggest(request(envelope="[26 mm, 20 mm, 12 mm]"), Run())
+    (answer,) = found.answers
+    assert (answer.made, len(answer.nearest), len(made)) == (0, 2, 2)
 
 
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])

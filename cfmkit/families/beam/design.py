@@ -52,8 +52,6 @@ def design(spec: BeamSpec, run: Run) -> Design:
         from cfmkit.families.beam.shaping.design import optimise_shape
 
         return optimise_shape(spec, spec.design.optimise, run)
-    if spec.design is not None and spec.design.free:
-        return Design(spec, Status.COMPLETE)  # as it is: its values move for the yield alone
     return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale' or 'optimise'")
 
 

@@ -159,7 +159,7 @@ class BeamDesign(DesignBlock):
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if (self.rescale and self.optimise) or not (self.rescale or self.optimise or self.free):
-            raise ValueError("give either 'rescale' or 'optimise', or 'free' with 'tolerances' and 'yield'")
+            raise ValueError("give either 'rescale' or 'optimise', or 'free' alone, whose values meet the requirements")
         return self
 
 

@@ -23,6 +23,7 @@ from cfmkit.families.hardware import (
     PartStrength,
     guide_part,
     guide_rod,
+    in_sentences,
     link_width,
     mm,
     pin_for,
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
 BEARING_IN_ROLLER = 0.9
 """Outside diameter of a bearing over that of the roller around it, at most."""
 
+SHAFT_IN_ROLLER = 0.7
+"""Diameter of a plain shaft over that of the roller around it, and of the pin over the slider's side, at most."""
+
 
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
@@ -66,6 +70,12 @@ def hardware(solution: Solution) -> Hardware:
                 f"{length_in_words(least)} ('mechanism.pins.diameter')"
             )
     shaft, bearing = _shaft(solution, press, arm, thick, strength)
+    for place, diameter in (("slider pin", pin), ("shafts of the rollers", shaft)):
+        if diameter > SHAFT_IN_ROLLER * 2.0 * mechanism.roller_radius:
+            faults[place] = (
+                f"{length_in_words(diameter)} thick for {newton(max(pull, press))}, too thick for a roller and a "
+                f"slider of {length_in_words(2.0 * mechanism.roller_radius)}: make them larger"
+            )
     sizes = mechanism.envelope
     stated = sizes.brace_width if sizes else 0.0
     width = stated or link_width(pull, brace, max(pin, shaft), strength)
@@ -86,7 +96,7 @@ def hardware(solution: Solution) -> Hardware:
         parts = (*parts, screw_part("plate to its base", len(holes), screw, thick, "screw"))
     standing = tuple(_standing(solution, rod.bush, rod.diameter, holes, screw))
     drawn = tuple(_drawn_bodies(solution, standing, (width, pin, shaft)))
-    return Hardware(with_faults(parts, faults), standing, drawn, pin)
+    return Hardware(with_faults(parts, faults), standing, drawn, pin, in_sentences(faults))
 
 
 def _largest(solution: Solution, name: str) -> float:

@@ -49,7 +49,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     pieces = 6 + count_of(mechanism.springs)
     joining = hardware(solution)
     all_bodies = (*bodies(solution), *joining.bodies)
-    return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=joining.pin)
+    return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=joining.pin, faults=joining.faults)
 
 
 def bodies(solution: Solution) -> tuple[PosedBody, ...]:

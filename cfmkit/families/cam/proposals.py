@@ -18,10 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
+from cfmkit.families.cam.hardware import SHAFT_IN_ROLLER
 from cfmkit.families.cam.part_sizes import count_of, depth_of
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
+from cfmkit.families.hardware import PIN_STRENGTH
 from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -56,6 +58,9 @@ PLATE_MIN, LOAD = 0.002, 4.5
 
 ROLLER_MIN = 0.0015
 """Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
+
+SHAFT_ARM = 0.004
+"""About how far from the braces a roller presses on its shaft [m]: half of a plate of 5 mm and of a brace."""
 
 COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
 """Numbers of springs that are tried."""
@@ -116,7 +121,9 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
     tab = TAB * along
     width = 2.0 * (end + roller)
     height = stroke + rise + roller + np.maximum(roller, tab)
-    there = (end < 0.97 * brace) & (roller > ROLLER_MIN) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
+    shaft = np.cbrt(32.0 * LOAD * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
+    least = max(ROLLER_MIN, 0.5 * float(shaft) / SHAFT_IN_ROLLER)
+    there = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
     ripple = np.where(there, np.maximum(ripple, down), np.inf)
     hysteresis = np.where(there, 2.0 * loss.mean(axis=0), np.inf)
     return {

@@ -51,6 +51,9 @@ PUSHED = (
 STARTS = (0.04, 0.1)
 """Where the travel begins, over its length: before that the force of an elastic part comes up from zero."""
 
+EARLIEST_START, LATE_START = 0.026, 0.35
+"""The same of a travel nearly as long as the reach of the linkage, and of flexures, whose force is level later."""
+
 SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
 """Sizes that are tried, over the largest that the envelope allows."""
 
@@ -66,6 +69,9 @@ PAIR_GAP = (0.1, 4e-3)
 
 DOUBT = 3.0
 """So much wider than there is room for a part may seem: the estimate is of one proportion and one run-in."""
+
+PROBABLY_TOO_WIDE = 1.3
+"""From so much on it comes after all parts that are not, with whatever reserve of strength."""
 
 FLEXURES_WIDER = 8.0
 """About how much wider than a strip flexures of a tenth of its free length have to be."""
@@ -90,6 +96,10 @@ PART, CORRECT = f"{HERE}:part", f"{HERE}:correct"
 
 FARTHER = 1.1
 """How far a solid is followed, over its travel, to look for a flatter window."""
+
+
+REACH = 1.02
+"""Travel up to which parts of one piece are followed, over the reach of their proportions: nothing ends there."""
 
 
 def propose(request: Request, run: Run) -> FamilyOffer:
@@ -178,32 +188,51 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
     pins = explain_overfilled(request) is None
     found: list[Candidate | float] = []
     for size in SIZES:
-        for start in STARTS:
-            travel = start * request.travel, (1.0 + start) * request.travel * (1.0 + 1e-6)
-            if travel[1] <= lengths.reach * size * printed:
-                found += _parts(request, lengths, size * printed, travel, (size in SIZES[:2], start == STARTS[-1]))
-            pair = size * pair_size(request, lengths)
-            if travel[1] <= lengths.reach * pair:
-                found += _pairs(request, lengths, pair, travel)
-            if travel[1] <= lengths.reach * size * pinned and pins and start == STARTS[0]:
-                found.append(pushed_linkage(request, lengths, size * pinned, travel[0]))
+        pair = size * pair_size(request, lengths)
+        for crank, parts in ((size * printed, _single_parts), (pair, _pairs)):
+            for start in _starts(request, REACH * lengths.reach * crank):
+                found += parts(request, lengths, crank, _window(request, start))
+        if size in SIZES[:2]:
+            found += _slow_parts(request, lengths, size * printed)
+        first, last = _window(request, STARTS[0])
+        if last <= lengths.reach * size * pinned and pins:
+            found.append(pushed_linkage(request, lengths, size * pinned, first))
     return found
 
 
-def _parts(
-    request: Request, lengths: Proportions, crank: float, travel: tuple[float, float], more: tuple[bool, bool]
-) -> list[Candidate]:
-    """Return the parts of one size that are not much wider than there is room for; `more`: large ones, late starts."""
+def _window(request: Request, start: float) -> tuple[float, float]:
+    """Return between which travels the force is to be held [m], of a start over their length."""
+    return start * request.travel, (1.0 + start) * request.travel * (1.0 + 1e-6)
+
+
+def _starts(request: Request, reach: float, wanted: Sequence[float] = STARTS) -> list[float]:
+    """Return starts with which the travel is within a reach [m]: the wanted ones, or else the earliest."""
+    fitting = [start for start in wanted if _window(request, start)[1] <= reach]
+    return fitting or [start for start in (EARLIEST_START,) if _window(request, start)[1] <= reach]
+
+
+def _single_parts(request: Request, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
+    """Return strips of one size that are not much wider than there is room for."""
     deep = request.depth or max(request.envelope)
+    return [
+        _strip(request, block, lengths, crank, travel)
+        for block in _materials(request)
+        if strip_width(request, block, crank) <= DOUBT * deep and _can_be_cut(request, THICKEST * crank)
+    ]
+
+
+def _slow_parts(request: Request, lengths: Proportions, crank: float) -> list[Candidate]:
+    """Return flexures and tapered strips of one size, which take longer to design; they begin late where they can."""
+    deep, reach = request.depth or max(request.envelope), REACH * lengths.reach * crank
     found = []
     for block in _materials(request):
         wide = strip_width(request, block, crank)
-        if wide <= DOUBT * deep and _can_be_cut(request, THICKEST * crank):
-            found.append(_strip(request, block, lengths, crank, travel))
-        if more[0] and FLEXURES_WIDER * wide <= DOUBT * deep:
-            found.append(_flexures(request, block, lengths, crank, travel))
-        if all(more) and wide <= DOUBT * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
-            found.append(_offer_tapered(request, block, lengths, crank, travel))
+        if FLEXURES_WIDER * wide <= DOUBT * deep:
+            for start in _starts(request, reach, (LATE_START, *STARTS))[:2]:
+                found.append(_flexures(request, block, lengths, crank, _window(request, start)))
+        if wide <= DOUBT * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
+            for start in _starts(request, reach)[-1:]:
+                found.append(_offer_tapered(request, block, lengths, crank, _window(request, start)))
     return found
 
 
@@ -226,7 +255,9 @@ def _pairs(request: Request, lengths: Proportions, crank: float, travel: tuple[f
         if wide <= DOUBT * (request.depth or max(request.envelope)) and _can_be_cut(request, THICKEST * crank):
             plain = _strip(request, block, lengths, crank, travel)
             spec = plain.spec.replace({"mechanism.copies": "mirrored"})
-            found.append(replace(plain, variant=plain.variant.replace("strip", "pair of strips"), spec=spec))
+            variant = plain.variant.replace("strip", "pair of strips")
+            doubtful = wide > PROBABLY_TOO_WIDE * (request.depth or math.inf)
+            found.append(replace(plain, variant=variant, spec=spec, doubtful=doubtful))
     return found
 
 
@@ -242,7 +273,7 @@ def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
         return math.inf
     size, way = crank / 0.054, request.travel / 0.034
     stiffer = material.modulus / 1.8e9
-    thicker = strength / 42.5e6 / stiffer * size**2 / way
+    thicker = request.strength_used * strength / 42.5e6 / stiffer * size**2 / way
     return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * way)
 
 
@@ -293,6 +324,7 @@ def _strip(
         "analysis": pushed_analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
+    doubtful = strip_width(request, material, crank) > PROBABLY_TOO_WIDE * (request.depth or math.inf)
     return Candidate(
         name_variant("strip", request, material),
         spec,
@@ -300,6 +332,7 @@ def _strip(
         PART,
         largest_first(crank, request),
         correct=CORRECT,
+        doubtful=doubtful,
     )
 
 
@@ -317,9 +350,7 @@ def _offer_tapered(
     shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
     spec = plain.spec.replace({"design.beam": shape})
     promise = LATER + abs(crank / request.envelope[1] - 0.35)
-    return Candidate(
-        name_variant("tapered strip", request, material), spec, True, plain.finish, promise, correct=CORRECT
-    )
+    return replace(plain, variant=name_variant("tapered strip", request, material), spec=spec, promise=promise)
 
 
 def _flexures(

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.design import DesignSizes
 
 
-SLENDERNESS = (3.7, 4.0, 4.5, 5.5, 7.0)
+SLENDERNESS = (3.7, 4.0, 4.25, 4.5, 5.5, 7.0)
 """Rise over thickness of the leaves: below 3.63 they are no longer buckled half way, above 7 they are thin and wide."""
 
 LONGER = (1.04, 1.15, 1.4, 1.8, 2.4)
@@ -55,8 +55,8 @@ PAIRS = (2, 1, 3, 4)
 THICKER = (1.0, 1.6, 2.4)
 """Thickness of the diamond's leaves over that of the Vs."""
 
-MIDDLE = (0.8, 0.9)
-"""Share of the linear region that is used: the exact leaves depart from the line at its ends."""
+MIDDLE = (0.8, 0.9, 0.98)
+"""Share of the linear region that is used: the exact leaves depart from the line at its ends, which widths correct."""
 
 STRUCTURES = {
     kind.proposal.name: (block, kind.proposal)
@@ -86,6 +86,9 @@ SOFTEST = 0.9
 WIDE_LAST = 100.0
 """Promise of designs whose leaves are too wide to curl: they come after all others."""
 
+FARTHEST = 1.2
+"""End of the travel over that of the linear region: the flattest window may lie farther."""
+
 APART = 1.2
 """Room across that a helical spring takes, over its diameter: as they are drawn."""
 
@@ -104,7 +107,8 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     found: list[Candidate] = []
     closest: tuple[float, dict[str, float]] | None = None
     for block in request.materials or ({"name": "pom"},):
-        for spec, sizes in _designs(request, dict(block)):
+        for loose, sizes in _designs(request, dict(block)):
+            spec = _with_close_spring(loose, sizes)
             over = _room_over(request, spec, sizes)
             excess = max(over.values())
             if closest is None or excess < closest[0]:
@@ -212,6 +216,28 @@ def _lengths(spec: VcfmSpec, request: Request) -> Any:
             continue
         if min(sizes.leaf.thickness, sizes.side.thickness) >= request.thinnest:
             yield made, sizes
+
+
+def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
+    """Return a design whose diamond stands close below the leaves if it is so short that it passes between the walls.
+
+    Seen from the shuttle, the lowest leaf falls to the wall by what is left of its rise. The diamond's corners are as
+    far below as its leaves rise, less half of what preload and travel compress it by. The corners stay half a block
+    below the leaf before and after the travel.
+    """
+    frame, leaf, side, target = spec.mechanism.frame, sizes.leaf, sizes.side, spec.design
+    corner = float(side.reach) + 1.5 * frame.block
+    if target is None or corner + frame.block > float(leaf.reach):
+        return spec
+    share, rise, preload = corner / float(leaf.reach), float(leaf.rise), float(target.preload_stroke)
+    end = FARTHEST * float(sizes.linear[1])
+    closest = max(0.5 * preload + share * rise, 0.5 * (preload + end) + share * (rise - end))
+    clearance = max(frame.block, closest - float(side.rise) - 0.5 * frame.block)
+    if clearance >= frame.clearance:
+        return spec
+    # lengths above zero need no other check
+    close = frame.model_copy(update={"clearance": clearance})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"frame": close})})
 
 
 def _room_over(request: Request, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, float]:

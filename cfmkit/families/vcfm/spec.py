@@ -120,7 +120,9 @@ class VcfmDesign(DesignBlock):
     adjustment: Annotated[Force, Field(gt=0)] | None = Field(
         None, description="increase of the force by the preload; default: no preload, then state 'rise'"
     )
-    stroke: PositiveLength = Field(description="travel over which it is constant")
+    stroke: Annotated[Length, Field(ge=0)] = Field(
+        0.0, description="travel over which it is constant; required, except where `free` alone is stated"
+    )
     preload: PositiveLength | None = Field(None, description="preload that increases the force by that much")
     rise: PositiveLength | None = Field(
         None,
@@ -157,6 +159,10 @@ class VcfmDesign(DesignBlock):
 
     @model_validator(mode="after")
     def _one_target(self) -> Self:
+        if self.by_requirements:
+            return self
+        if self.stroke == 0.0:
+            raise ValueError("give the 'stroke' over which the force is constant, above 0 mm; or 'free' alone")
         if self.target is None:
             if self.force is None:
                 raise ValueError("give either 'force' or 'target', a curve of forces")
@@ -361,7 +367,7 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="after")
     def _design_has_laws(self) -> Self:
-        if self.design is None:
+        if self.design is None or self.design.by_requirements:
             return self
         spring, leaves = self.mechanism.positive, self.mechanism.bistable
         fixed = spring is not None and not self.design.catalogue

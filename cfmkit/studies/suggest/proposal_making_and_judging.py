@@ -31,6 +31,7 @@ from cfmkit.studies.suggest.misses_in_words import (
     too_short,
     topic_of,
 )
+from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
 from cfmkit.studies.suggest.requirements_of_request import LIVES, list_requirements, list_unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
@@ -355,13 +356,16 @@ def judge_proposal(
         return Proposal(name, variant, message=result.message)
     space: BoundingBox | None = record.envelope(result)
     result, values = add_size(result, space), values_of_family(record.values)
-    required = plain.replace({"requirements": list_requirements(request, result, space, values)})
+    required = plain.replace(
+        {"requirements": list_requirements(request, result, space, values), "design": block_for_redesign(spec, request)}
+    )
     text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
     misses = [
         *((topic_of(one.metric), one.sentence) for one in outcomes if not one.ok and one.metric not in ENVELOPE),
         *(("size", text) for text in sides_outside(request, space)),
+        *(("stress", text) for text in (space.faults if space else ())),
         *(("travel", text) for text in too_short(request, result)),
         *disqualifying(result),
     ]

@@ -1,12 +1,13 @@
-"""The nearest requests that a family can meet: one key is relaxed until a mechanism of the family meets all.
+"""The nearest requests that can be met: one key is relaxed until a mechanism of some family meets all.
 
-The scaling laws of the family say from where on it has candidates. These are made and judged as for any other request;
-as long as none is good, the key is relaxed further. Only what a mechanism was found for is named.
+The scaling laws of the families say from where on they have candidates; all keys are relaxed by steps together, so that
+what has to be relaxed least is known first. Its first candidate is made and judged as for any other request; if it is
+not good, the key is relaxed a little further. Only what a mechanism was found for is named.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.families import family
@@ -17,7 +18,7 @@ from cfmkit.specs.units import format_short, read_quantity
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, make_proposal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.suggestion_request import Candidate, Request
@@ -31,11 +32,8 @@ STEPS = (1.0, 1.15, 1.5, 2.5, 6.0, 20.0)
 HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
 
-FURTHER = (1.02, 1.1, 1.3, 1.7, 2.5)
+FURTHER = (1.03, 1.15, 1.5, 2.2)
 """Beyond the first candidates: laws leave out pads, margins, and what stretches."""
-
-TRIED = 3
-"""Candidates that are made of each relaxed request."""
 
 LARGEST = 0.5
 """Ripple and hysteresis above which nobody would speak of a constant force."""
@@ -44,19 +42,66 @@ NAMED = 2
 """Keys that are named, those first that have to be relaxed least."""
 
 
-def nearest(request: Request, name: str, seed: int, clock: Clock) -> dict[str, str]:
-    """Return keys of a request -> values with which, the other keys as they are, a family has a mechanism for it."""
-    edges = []
-    for key, relaxation in _relaxations(request).items():
-        factor = _first_offer(request, (name, seed), relaxation, clock)
-        if factor is not None:
-            edges.append((factor, key, relaxation))
-    found: dict[str, str] = {}
-    for factor, key, relaxation in sorted(edges, key=lambda one: one[0]):
-        reported = None if len(found) == NAMED else _find_met(request, name, (relaxation, factor), seed, clock)
-        if reported is not None:
-            found[key] = reported
-    return found
+@dataclass(frozen=True)
+class Edge:
+    """From where on the laws of a family have candidates, if one key of a request is relaxed."""
+
+    family: str
+    key: str
+    factor: float
+
+
+def edges(request: Request, names: Sequence[str], seed: int, clock: Clock) -> Iterator[Edge]:
+    """Yield for which keys of a request families have candidates, roughly those first that are relaxed least."""
+    relaxations = _relaxations(request)
+    left = [(name, key) for name in names for key in relaxations]
+    below = 1.0
+    for factor in STEPS:
+        for name, key in tuple(left):
+            if clock.late():
+                return
+            if _offers(request, name, relaxations[key], factor, seed):
+                left.remove((name, key))
+                yield Edge(name, key, _bisect(request, name, relaxations[key], (below, factor), seed))
+        below = factor
+
+
+def _offers(request: Request, name: str, relaxation: Relaxation, factor: float, seed: int) -> bool:
+    """Return True if a family has candidates for a request that is relaxed by a factor."""
+    relaxed = relaxation(request, factor)
+    return relaxed is not None and bool(_offer(relaxed[0], name, seed))
+
+
+def _bisect(request: Request, name: str, relaxation: Relaxation, ends: tuple[float, float], seed: int) -> float:
+    """Return nearly the smallest factor between two with which a family has candidates; with the second it has some."""
+    below, factor = ends
+    for _ in range(HALVINGS if factor > below else 0):
+        middle = (below * factor) ** 0.5
+        has_some = _offers(request, name, relaxation, middle, seed)
+        below, factor = (below, middle) if has_some else (middle, factor)
+    return factor
+
+
+def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None:
+    """Return the value of a key with which a family's first candidate is good; None if none is."""
+    relaxation = _relaxations(request)[edge.key]
+    tried: set[str] = set()
+    for more in FURTHER:
+        relaxed = relaxation(request, edge.factor * more)
+        if relaxed is None:
+            return None
+        # the sides that were just enough by the laws may be too little: then all of them
+        larger = relaxation is _larger
+        choices = [_only_needed(request, (edge.family, seed), relaxed), relaxed] if larger else [relaxed]
+        for asked, reported in choices:
+            candidates = () if reported in tried else _offer(asked, edge.family, seed)
+            tried.add(reported)
+            if clock.late():
+                return None
+            job = ProposalJob(edge.family, candidates[0], asked, seed, clock.deadline) if candidates else None
+            if job is not None and make_proposal(job).passes:
+                return reported
+    return None
 
 
 def _relaxations(request: Request) -> dict[str, Relaxation]:
@@ -74,52 +119,13 @@ def _relaxations(request: Request) -> dict[str, Relaxation]:
 
 
 def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
+    """Return a family's candidates, those first that probably fit."""
     propose = family(name).propose
     if not propose:
         return ()
     asked = request.with_strengths[-1]
     candidates: Sequence[Candidate] = function_named(propose)(asked, Run(seed)).candidates
-    return candidates
-
-
-def _first_offer(request: Request, asked: tuple[str, int], relaxation: Relaxation, clock: Clock) -> float | None:
-    """Return the smallest factor with which a family has candidates; None if it has none."""
-
-    def offers(factor: float) -> bool:
-        relaxed = relaxation(request, factor)
-        return relaxed is not None and bool(_offer(relaxed[0], *asked))
-
-    below = 1.0
-    for factor in STEPS:
-        if clock.late():
-            return None
-        if offers(factor):
-            break
-        below = factor
-    else:
-        return None
-    for _ in range(HALVINGS if factor > 1.0 else 0):
-        middle = (below * factor) ** 0.5
-        below, factor = (below, middle) if offers(middle) else (middle, factor)
-    return factor
-
-
-def _find_met(request: Request, name: str, relaxed_by: tuple[Relaxation, float], seed: int, clock: Clock) -> str | None:
-    """Return the value of a key with which one of a family's first candidates is good; None if none is."""
-    relaxation, first = relaxed_by
-    for more in FURTHER:
-        relaxed = relaxation(request, first * more)
-        if relaxed is None:
-            return None
-        # the sides that were just enough by the laws may be too little: then all of them
-        choices = [_only_needed(request, (name, seed), relaxed), relaxed] if relaxation is _larger else [relaxed]
-        for asked, reported in {text: (one, text) for one, text in choices}.values():
-            for candidate in _offer(asked, name, seed)[:TRIED]:
-                if clock.late():
-                    return None
-                if make_proposal(ProposalJob(name, candidate, asked, seed, clock.deadline)).passes:
-                    return reported
-    return None
+    return sorted(candidates, key=lambda candidate: candidate.doubtful)
 
 
 def _only_needed(request: Request, asked: tuple[str, int], relaxed: Relaxed) -> Relaxed:

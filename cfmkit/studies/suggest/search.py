@@ -28,7 +28,7 @@ from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import give_up_at
-from cfmkit.studies.serial_and_cluster_executors import Lost, surviving
+from cfmkit.studies.serial_and_cluster_executors import Lost, lost_to, surviving
 from cfmkit.studies.suggest.proposal_making_and_judging import (
     ENDED_EARLY,
     OUT_OF_TIME,
@@ -36,7 +36,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     ProposalJob,
     make_proposal,
 )
-from cfmkit.studies.suggest.relaxed_requests import nearest
+from cfmkit.studies.suggest.relaxed_requests import NAMED, confirm, edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -278,23 +278,26 @@ class _Making:
 def _with_nearest(
     answers: list[Answered], request: Request, run: Run, deadline: float | None, bugs: list[str]
 ) -> list[Answered]:
-    """Return answers with the nearest request that each family could meet, as far as the time allows."""
-    names = [one.family for one in answers]
-    content = {"suggest": repr(request), "seed": run.seed, "code": code_stamp()}
-    keys = {name: stable_hash(content | {"nearest": name})[:32] for name in names}
-    found = {name: record for name in names if (record := run.notes.find(keys[name])) is not None}
-    left = [name for name in names if name not in found]
-    clock = Clock(deadline)
-    work = partial(_nearest_of, request, run.seed, clock)
-    for name, outcome in surviving_until(run, deadline, bugs)(work, iter(left), clock.late):
-        if isinstance(outcome, dict) and not clock.late():
-            found[name] = outcome
-            run.notes.add(keys[name], outcome)
-    return [replace(one, nearest=found.get(one.family, {})) for one in answers]
-
-
-def _nearest_of(request: Request, seed: int, clock: Clock, name: str) -> dict[str, str]:
-    return nearest(request, name, seed, clock)
+    """Return answers with the nearest requests that a family could meet, as far as the time allows."""
+    families = tuple(answer.family for answer in answers)
+    key = stable_hash({"nearest": repr(request), "of": families, "seed": run.seed, "code": code_stamp()})[:32]
+    record = run.notes.find(key)
+    named: dict[str, dict[str, str]] = {} if record is None else dict(record)
+    if record is None:
+        clock, keys = Clock(deadline), set[str]()
+        waiting = (edge for edge in edges(request, families, run.seed, clock) if edge.key not in keys)
+        executor = surviving_until(run, deadline, bugs)
+        work = partial(confirm, request, run.seed, clock)
+        try:
+            for edge, outcome in executor(work, waiting, lambda: clock.late() or len(keys) >= NAMED):
+                if isinstance(outcome, str):
+                    keys.add(edge.key)
+                    named.setdefault(edge.family, {}).setdefault(edge.key, outcome)
+        except Exception as error:  # the laws of a family have a bug: what was found is kept
+            bugs.append(lost_to(error).bug)
+        if not clock.late():
+            run.notes.add(key, named)
+    return [replace(answer, nearest=named.get(answer.family, {})) for answer in answers]
 
 
 def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
@@ -358,7 +361,8 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
                 continue
             found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
     reason = f"it needs {OTHER[request.springs]} springs" if offer.candidates and request.springs else ""
-    return FamilyOffer(tuple(found.values()), offer.reason if found else offer.reason or reason)
+    likely_first = tuple(sorted(found.values(), key=lambda candidate: candidate.doubtful))
+    return FamilyOffer(likely_first, offer.reason if found else offer.reason or reason)
 
 
 def _next(

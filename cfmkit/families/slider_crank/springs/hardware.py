@@ -19,6 +19,7 @@ from cfmkit.families.hardware import (
     PartStrength,
     guide_part,
     guide_rod,
+    in_sentences,
     mm,
     pin_for,
     pin_part,
@@ -91,7 +92,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
         guide_part(rod, 1, mechanism.guide is None),
         screw_part("ground to its base, countersunk", len(places), screw, sheet, "screw"),
     )
-    return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin)
+    return Hardware(with_faults(parts, faults), bodies, (*bodies, *moving), pin, in_sentences(faults))
 
 
 def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: float) -> Iterator[PosedBody]:

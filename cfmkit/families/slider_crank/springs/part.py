@@ -40,6 +40,7 @@ def part_over_motion(result: Result) -> PosedPart:
         pieces=3 + int(np.count_nonzero(rates)),
         assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
         pin=joining.pin,
+        faults=joining.faults,
     )
 
 

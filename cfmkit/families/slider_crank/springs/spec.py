@@ -286,6 +286,8 @@ class SpringDesign(DesignBlock):
 
     @model_validator(mode="after")
     def _one_target(self) -> Self:
+        if self.by_requirements:
+            return self
         if self.target is not None:
             self._check_curve(self.target)
             return self
@@ -303,6 +305,8 @@ class SpringDesign(DesignBlock):
 
     @model_validator(mode="after")
     def _window_or_tolerance(self) -> Self:
+        if self.by_requirements:
+            return self
         if self.window is None and self.tolerance is None:
             raise ValueError("give a window ('angle' or 'travel'), or a 'tolerance' for the widest one, or both")
         if self.window is None and self.objective == "least-squares":

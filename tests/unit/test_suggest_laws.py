@@ -1,0 +1,60 @@
+"""Laws of `suggest` reach what is known to exist: tight envelopes, late starts, travels of nearly all the reach."""
+
+from __future__ import annotations
+
+import pytest
+
+import cfmkit
+from cfmkit.families import family
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
+from cfmkit.runs.read_suggest_file import read_request
+from cfmkit.studies.suggest.proposal_making_and_judging import judge_proposal
+
+ABS = "{youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}"
+
+
+def offered(name, **keys):
+    asked = read_request(None, {"safety": "1", **keys}).request()
+    return asked, function_named(family(name).propose)(asked, Run()).candidates
+
+
+def test_a_diamond_shorter_than_the_leaves_stands_close_below_them():
+    """The shipped finger of PLA is 51 mm high; with the diamond a rise below the leaves it needed 60 mm."""
+    envelope = "[219 mm, 51.4 mm, 13.2 mm]"
+    asked, candidates = offered(
+        "vcfm", force="20 N", travel="9.9 mm", ripple="0.5 %", envelope=envelope, material="pla"
+    )
+    assert candidates
+    frames = [candidate.spec.mechanism.frame for candidate in candidates]
+    assert all(frame.clearance >= frame.block for frame in frames)
+    assert asked.envelope[1] > 0.05
+
+
+def test_flexures_for_a_short_travel_begin_late():
+    keys = {"force": "1.5 N", "travel": "2.97 mm", "ripple": "0.73 %", "envelope": "[87.4 mm, 136.4 mm, 2.65 mm]"}
+    asked, candidates = offered("slider-crank", **keys, material=f"[{ABS}]")
+    starts = [float(one.spec.analysis.window[0]) for one in candidates if one.variant == "flexures"]
+    assert max(starts) == pytest.approx(0.35 * asked.travel)
+
+
+def test_a_tapered_strip_is_offered_for_a_travel_of_nearly_all_the_reach():
+    keys = {"force": "1.506 N", "travel": "36.95 mm", "ripple": "2 %", "envelope": "[87.4 mm, 136.4 mm, 5.19 mm]"}
+    _, candidates = offered("slider-crank", **keys, material=f"[{ABS}]")
+    assert "tapered strip" in {one.variant for one in candidates}
+
+
+def test_strips_that_are_probably_too_wide_come_after_those_that_are_not():
+    keys = {"force": "1.506 N", "travel": "33 mm", "ripple": "2 %", "envelope": "[87.4 mm, 136.4 mm, 5.19 mm]"}
+    _, full = offered("slider-crank", **keys, material=f"[{ABS}]")
+    _, reserved = offered("slider-crank", **keys | {"safety": "1.5"}, material=f"[{ABS}]")
+    assert not full[0].doubtful
+    assert all(one.doubtful for one in reserved if one.variant == "strip")
+
+
+def test_a_cam_whose_shafts_are_too_thick_for_its_rollers_is_no_proposal():
+    spec = cfmkit.load("configs/cam.yaml").replace({"mechanism.roller_radius": "2 mm"})
+    asked = read_request(None, {"force": "50 N", "travel": "230 mm", "envelope": "[500 mm, 700 mm]"}).request()
+    proposal = judge_proposal("cam", "small rollers", spec, asked)
+    assert "stress" in proposal.fails
+    assert any(text.startswith("shafts of the rollers: ") for text in proposal.missed)
