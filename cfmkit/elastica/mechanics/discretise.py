@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
-    from cfmkit.elastica.model.contact import Contact
+    from cfmkit.elastica.model.contact import Contact, FrictionState
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
 
@@ -103,7 +103,16 @@ class ContactAt(NamedTuple):
     slide: int = -1  # unknown that is the parameter of the beam's shape at which it touches; -1: a node touches
     element: int = -1  # that ends there
     laid: int = 0  # -1 or 1: the element before or behind it lies on the obstacle
-    flag: int = -1  # unknown that says the same of a state
+    # unknown that says the same of a state; of a node with friction: 0 where it sticks, the sense in which it slips
+    flag: int = -1
+    rub: int = -1  # unknown that is the tangential force; -1: there is no friction
+    anchor: int = -1  # unknown that is the place along the obstacle at which it sticks
+    friction: FrictionState | None = None  # None: as the state's flag says
+
+    @property
+    def own_unknowns(self) -> tuple[int, ...]:
+        """Unknowns of the contact of a node: its force, then with friction tangential force, flag and anchor."""
+        return (self.unknown,) if self.rub < 0 else (self.unknown, self.rub, self.flag, self.anchor)
 
 
 class FlankPlace(NamedTuple):
@@ -267,6 +276,14 @@ class _ArrayBuilder:
             ContactAt(self.network.contacts[number], place, size + k, number)
             for k, (number, place) in enumerate(touching)
         )
+        behind = size + len(contacts) + 3 * len(flanks)
+        rubbing = [k for k, contact in enumerate(contacts) if contact.item.friction]
+        contacts = tuple(
+            contact._replace(rub=first, flag=first + 1, anchor=first + 2)
+            if (first := behind + 3 * rubbing.index(k) if k in rubbing else -1) >= 0
+            else contact
+            for k, contact in enumerate(contacts)
+        )
         contacts += self._flank_contacts(flanks, elements, size + len(contacts))
         acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
         free, base, rate = self._constraints(size, elements, attachments, acting)
@@ -276,6 +293,7 @@ class _ArrayBuilder:
                 [contact.unknown for contact in contacts]
                 + [contact.slide for contact in sides]
                 + [contact.flag for contact in sides]
+                + list(range(behind, behind + 3 * len(rubbing)))
             )
             size += len(more)
             free = np.append(free, more)
