@@ -40,6 +40,7 @@ FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
 FAR = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
 STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
+NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
 
@@ -455,13 +456,17 @@ class StepBetween:
             row_values = self.values[number]
             behind = np.flatnonzero(row_values[1:] < -part.roundings(self.values)[number])
             end = int(behind[0]) + 1 if len(behind) else len(row_values) - 1
-            begin = next((k for k in range(end - 1, -1, -1) if value(float(self.shares[k])) > 0), None)
+            begins = self.shares[end - 1 :: -1].tolist()
+            if number >= len(part.whole.mesh.contacts) + len(part.sides.all):
+                # what sticks begins at its limit, where the drive turns, and may soon reach the other one
+                begins += [float(self.shares[end]) * 0.5**k for k in range(1, NEARER)]
+            begin = next((share for share in begins if value(share) > 0), None)
             if begin is None:
                 return self.first
             last = next((k for k in range(end, len(row_values)) if value(float(self.shares[k])) <= 0), None)
             if last is None:
                 return None
-            share = float(brentq(value, self.shares[begin], self.shares[last], xtol=1e-15, rtol=1e-14))
+            share = float(brentq(value, begin, self.shares[last], xtol=1e-15, rtol=1e-14))
         except ArithmeticError:
             return None
         at = self.solve(share)

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 AT_LIMIT = 1e-7  # share of the friction by which the tangential force may miss its limit where slip may begin
-RATE_ROUNDING = 1e-9  # share of the largest rate by which a rate may have the wrong sign
+UNDECIDED = 1e-6  # share of the largest rate below which a rate does not say how a condition goes on: a step does
+TRIAL = 1e-4  # of the range: that step
 RIGID_RATE = 1e9  # motion or force per drive beyond which the contacts leave no way to move
 MAX_TOGETHER = 5  # contacts whose states are chosen together: three to this power are tried
 
@@ -104,21 +105,39 @@ def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int) -> Iter
 
 def _goes_on(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> bool:
     """Return True if no force, no gap and no way of slip of a contact at its limit goes the wrong way."""
-    mesh, z, moved = piece.whole.mesh, piece.whole.values(at.x, at.drive), sense * piece.moved_by_drive(at)
-    rounding = RATE_ROUNDING * float(np.abs(moved).max())
-    if changed is not None and not sense * piece.grows_along(at, changed) > 0:
+    rates = list(_margin_rates(piece, at, sense, changed))
+    if any(rate < -UNDECIDED for rate in rates):
         return False
+    return all(rate > UNDECIDED for rate in rates) or _steps_on(piece, at, sense)
+
+
+def _margin_rates(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> Iterator[float]:
+    """Yield how the conditions change that are just met, each as a share of the largest rate."""
+    mesh, z, moved = piece.whole.mesh, piece.whole.values(at.x, at.drive), sense * piece.moved_by_drive(at)
+    largest, rounding = float(np.abs(moved).max()), piece.roundings_of_force(at)
+    if changed is not None:
+        yield sense * piece.grows_along(at, changed) / largest
     for number, state in piece.friction.items():
         contact = mesh.contacts[number]
         if state.sense:
-            if sense * piece.slip_rate(at, number) < -rounding:
-                return False
+            yield sense * piece.slip_rate(at, number) / largest
             continue
         limit, rub = contact.item.friction * float(z[contact.unknown]), float(z[contact.rub])
-        if abs(rub) < limit - AT_LIMIT * limit - piece.roundings_of_force(at):
+        if abs(rub) < (1 - AT_LIMIT) * limit - rounding:
             continue
         grown = float(moved[contact.rub])
-        excess = abs(grown) if limit <= piece.roundings_of_force(at) else np.sign(rub) * grown
-        if contact.item.friction * float(moved[contact.unknown]) - excess < -rounding:
-            return False
-    return True
+        excess = abs(grown) if limit <= rounding else float(np.sign(rub)) * grown
+        yield (contact.item.friction * float(moved[contact.unknown]) - excess) / largest
+
+
+def _steps_on(piece: PieceOfPath, at: PathEquilibrium, sense: float) -> bool:
+    """Return True if all conditions are met a small step further on."""
+    start, step = piece.shrink(at), sense * TRIAL * piece.options.span
+    new = piece.own.solve(start.x + step * start.rate, start.drive + step)
+    if new is None:
+        return False
+    grown = piece.grow(new)
+    values = piece.values(grown.x[None], np.array([grown.drive]))
+    for row in piece.slipping_rows:
+        values[row] = piece.row_value(grown, row, sense)
+    return bool((values[:, 0] >= -piece.roundings(values)).all())
