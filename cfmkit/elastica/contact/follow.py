@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.changes import FORCE_ROUNDING, ContactChange, PieceOfPath
 from cfmkit.elastica.contact.first_change import find_change, find_change_before_end
-from cfmkit.elastica.contact.friction import RIGID_RATE, ChosenState, choose_friction
+from cfmkit.elastica.contact.friction import RIGID_RATE, ChosenState, choose_friction, is_jammed
 from cfmkit.elastica.contact.side_changes import enter_side_change
 from cfmkit.elastica.contact.terms import slip_way
 from cfmkit.elastica.model.contact import FrictionState
@@ -129,7 +129,7 @@ def _follow(
         if isinstance(outcome, EndOfPiece) and outcome.stop.end is WhyStopped.COMPLETE and turns[1:]:
             # the drive turns back: what slips sticks from there on
             at, sense = outcome.at, float(np.sign(targets[turns[0]] - outcome.at.drive))
-            chosen = choose_friction(part, at, (sense,))
+            chosen = choose_friction(part, at, (sense,), turns=True)
             if chosen is None:
                 yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
                 return
@@ -183,7 +183,10 @@ def _follow(
         if walk.done and not turns[1:]:
             yield PathStop(WhyStopped.COMPLETE, place)
             return
-        items, previous = iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense), at
+        items, previous = (
+            iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
+            at,
+        )
 
 
 def _change_friction(chosen: ChosenState, number: int, at: PathEquilibrium) -> ContactChange:
@@ -324,7 +327,6 @@ def _enter_friction(
     chosen = choose_friction(beyond, change.at, (sense, -sense), changed, settled)
     if chosen is not None:
         return chosen.piece, chosen.at, chosen.sense, chosen.sense != sense, chosen.count
-    if change.kind == "begins" and beyond.own.solve(beyond.shrink(change.at).x, change.at.drive) is None:
+    if is_jammed(beyond, change.at):
         return PathStop(WhyStopped.BLOCKED, change.at.drive, BLOCKED.format(names=beyond.say_all(change.number)))
     return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.say_rubbing()))
-

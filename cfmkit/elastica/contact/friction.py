@@ -46,6 +46,7 @@ def choose_friction(
     senses: tuple[float, ...],
     changed: int | None = None,
     settled: int | None = None,
+    turns: bool = False,
 ) -> ChosenState | None:
     """Return the first combination of states of friction that can go on from an equilibrium; None if none can.
 
@@ -61,9 +62,11 @@ def choose_friction(
         Contact that begins or ends there.
     settled : int, optional
         Contact that can only go on as the piece says.
+    turns : bool
+        Whether the drive turns back: what slips is tried to stick first.
     """
     numbers = [k for k in sorted(piece.closed) if piece.whole.mesh.contacts[k].rub >= 0]
-    choices = [[piece.friction[k]] if k == settled else list(_continuations(piece, at, k)) for k in numbers]
+    choices = [[piece.friction[k]] if k == settled else list(_continuations(piece, at, k, turns)) for k in numbers]
     several = [k for k, states in enumerate(choices) if len(states) > 1]
     for k in several[MAX_TOGETHER:]:
         del choices[k][1:]
@@ -82,7 +85,18 @@ def choose_friction(
     return None
 
 
-def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int) -> Iterator[FrictionState]:
+def is_jammed(piece: PieceOfPath, at: PathEquilibrium) -> bool:
+    """Return True if nothing can move with the drive where all contacts with friction stick."""
+    mesh, z = piece.whole.mesh, piece.whole.values(at.x, at.drive)
+    rubbing = [number for number in piece.closed if mesh.contacts[number].rub >= 0]
+    stuck = {k: FrictionState(0.0, float(slip_way(mesh, mesh.contacts[k], z).value)) for k in rubbing}
+    beyond = replace(piece, friction=stuck)
+    near = beyond.shrink(at)
+    start = beyond.own.solve(near.x, near.drive)
+    return start is None or not np.abs(start.rate).max(initial=0.0) < RIGID_RATE
+
+
+def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: bool) -> Iterator[FrictionState]:
     """Yield the states in which the friction of a closed contact may go on, the likelier ones first."""
     mesh, z = piece.whole.mesh, piece.whole.values(at.x, at.drive)
     contact, before = mesh.contacts[number], piece.friction.get(number, NO_FRICTION)
@@ -99,8 +113,7 @@ def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int) -> Iter
             yield FrictionState(1.0)
             yield FrictionState(-1.0)
         return
-    yield before
-    yield sticks
+    yield from (sticks, before) if turns else (before, sticks)
 
 
 def _goes_on(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> bool:

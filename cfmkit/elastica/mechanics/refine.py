@@ -31,9 +31,7 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     ahead = forces_end - _first_behind_forces(mesh)
     size = mesh.size + ahead
     contacts = tuple(
-        one._replace(
-            **{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(one, name)) >= 0}  # type: ignore[arg-type]
-        )
+        one._replace(**{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(one, name)) >= 0})
         for one in mesh.contacts
     )
     moving = mesh.moving

@@ -131,7 +131,7 @@ class ObstacleEdge(ShortRepr):
         Of a closed one it is known but for whole rounds; see `round_length`.
         """
         places = np.asarray(places)
-        ways, near = [], []
+        ways = list[WayAlong]()
         begins = self._part_begins(offset)
         found = [*self._from_segments(places), *self._from_arcs(places)]
         near = np.array([np.where(inside, np.abs(np.real(gap.value)), np.inf) for gap, inside in found])

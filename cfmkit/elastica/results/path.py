@@ -203,7 +203,9 @@ class EquilibriumPath(ShortRepr):
             return read_only(np.zeros(len(self))), read_only(np.full(len(self), ""), np.str_)
         z = self.at.z
         flags = np.rint(z[:, contact.flag])
-        said = np.where(z[:, contact.unknown] > 0, np.where(flags == 0, "stick", np.where(np.abs(flags) == 1, "slip", "")), "")
+        said = np.where(
+            z[:, contact.unknown] > 0, np.where(flags == 0, "stick", np.where(np.abs(flags) == 1, "slip", "")), ""
+        )
         return read_only(z[:, contact.rub] * self.mesh.scales.force), read_only(said, np.str_)
 
     def contact_places(self, number: int) -> FloatArray:

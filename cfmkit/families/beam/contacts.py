@@ -279,7 +279,6 @@ def change_sentences(
             yield "blocked", f"the drive is blocked by {who} at {say(event.drive)}"
 
 
-
 def _state_taken(path: Path, event: ContactEvent) -> str:
     """Return which of several states of friction the curve goes on with: that of the next point."""
     at = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
