@@ -1,19 +1,18 @@
 """Results of Python functions, which measure, draw and show themselves when they are asked to.
 
-`cfmkit.analyze` returns an `AnalysisView`, which is a `Result`; `cfmkit.suggest` returns a `SuggestionsView`.
-A notebook shows them by the documents that the command line prints.
+`cfmkit.analyze` returns an `AnalysisView`, which is a `Result`. A notebook shows it by the document that the command
+line prints.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from cfmkit.arrays import Named, Several
 from cfmkit.families import family
 from cfmkit.results import Quantity, Result
-from cfmkit.studies.suggest.search import Suggestions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from cfmkit.metrics import Outcome
-    from cfmkit.studies.suggest.spec import SuggestBlock
 
 
 class Metrics(Named[Quantity]):
@@ -106,33 +104,3 @@ class AnalysisView(Result):
 
         report = Report(self, self.metrics, tuple(self.requirements))
         return show_html(document_of(report), figures(family(self.spec.family), self))
-
-
-@dataclass(frozen=True, repr=False)
-class SuggestionsView(Suggestions):
-    """Proposals with what was requested; a notebook shows their table and the mechanisms to one scale."""
-
-    block: SuggestBlock | None = field(default=None, compare=False)  # always there; it follows fields with defaults
-
-    @classmethod
-    def of(cls, suggestions: Suggestions, block: SuggestBlock) -> SuggestionsView:
-        """Return suggestions with the block `suggest` that they answer."""
-        return cls(**{item.name: getattr(suggestions, item.name) for item in fields(suggestions)}, block=block)
-
-    def __repr__(self) -> str:
-        """Return the proposals in a line: family and variant of the first ten."""
-        from cfmkit.runs.suggestion_record import message
-
-        listed = [f"{proposal.family} {proposal.variant}"[:100] for proposal in self.listed[:10]]
-        return f"<Suggestions: {'; '.join([message(self), *listed])}>"
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        from cfmkit.documents.notebook import show_html
-        from cfmkit.documents.suggestion_document import document_of
-        from cfmkit.runs.suggestion_record import as_json, exit_code
-        from cfmkit.studies.suggest.figures import to_one_scale
-
-        assert self.block is not None  # `of`
-        figures = {"proposals": lambda: to_one_scale(self.listed, self.request)} if self.listed else {}
-        return show_html(document_of(as_json(self, self.block), exit_code(self)), figures)

@@ -11,7 +11,7 @@ from cfmkit.families.run_control import Run, read_time
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.runs.notebook_result import SuggestionsView
+    from cfmkit.runs.notebook_suggestions import SuggestionsView
 
 
 def suggest(
@@ -87,7 +87,7 @@ def suggest(
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    from cfmkit.runs.notebook_result import SuggestionsView
+    from cfmkit.runs.notebook_suggestions import SuggestionsView
     from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
