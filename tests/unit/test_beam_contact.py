@@ -299,8 +299,9 @@ def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
 
 
 def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
-    smooth, rough = (cfmkit.analyze(with_floor(FLOOR.replace("}}", "}, " + own + "}"), "support: guided, direction: 90 deg"))
-                     for own in ("friction: 0", "friction: 0.3"))  # fmt: skip
+    own = "support: guided, direction: 90 deg"
+    lines = (FLOOR.replace("mm}}", f"mm}}, friction: {friction}}}") for friction in (0, 0.3))
+    smooth, rough = (cfmkit.analyze(with_floor(line, own)) for line in lines)
     assert smooth.curve.branches == ("load",)
     assert rough.curve.branches == ("load", "unload")
     assert "work_tip_state" not in smooth.curve.extra
@@ -313,6 +314,8 @@ def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
     slips = columns["work_tip_state"].values == "slip"
     assert np.abs(rubbing)[slips] == pytest.approx(0.3 * force[slips], rel=1e-9)
     marks = [mark for mark in columns["event"].values.tolist() if mark]
-    assert marks == ["work tip begins", "work tip sticks", "work tip slips", "work tip ends"]
+    assert (marks[0], marks[-1]) == ("work tip begins", "work tip ends")
+    assert set(marks[1:-1:2]) == {"work tip sticks"}  # where its sliding turns round, and where the drive does
+    assert set(marks[2:-1:2]) == {"work tip slips"}
     assert cfmkit.metrics(rough)["hysteresis_area"].value > 0
     assert any("on the way back: 'tip' sticks to 'work'" in finding.message for finding in rough.warnings)

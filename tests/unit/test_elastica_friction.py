@@ -118,9 +118,9 @@ def test_sliding_on_a_disc_agrees_with_shooting(friction, radius, place):
 
 def test_a_rounded_corner_rubs_as_the_disc_of_its_fillet():
     radius, turn = 0.3, np.radians(50)
-    corner = np.array(CENTRE) + [-radius * np.tan(turn / 2), radius]
+    corner = np.add(CENTRE, [-radius * np.tan(turn / 2), radius])
     before = corner - [0.3 * np.cos(turn), 0.3 * np.sin(turn)]
-    edge = polyline([before, corner, corner + [0.5, 0.0]], radius)
+    edge = polyline([before, corner, np.add(corner, [0.5, 0.0])], radius)
     places = [0.2, 0.25, 0.2]
     paths = [
         lower(NodeOnObstacle("edge", "tip", outline, 0.0, friction=0.2), places, angle=0.0)

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.contact import Contact, FrictionState
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -242,7 +243,7 @@ class PieceOfPath:
         return moved
 
     def row_value(self, at: PathEquilibrium, number: int, travel: float = 1.0) -> float:
-        """Return one row of `values` at an equilibrium: of a way of slip by how much it grows in the sense of travel."""
+        """Return one row of `values` at an equilibrium: of a way of slip how much it grows in the sense of travel."""
         mesh, drives = self.whole.mesh, np.array([at.drive])
         z = self.whole.values(at.x, at.drive)[None]
         if number in self.slipping_rows:

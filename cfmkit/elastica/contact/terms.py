@@ -11,7 +11,8 @@ from cfmkit.elastica.mechanics.terms import Contribution
 from cfmkit.elastica.model.contact import FrictionState, NodeOnObstacle, Stop
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+    from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
 class ContactGap(NamedTuple):
@@ -91,7 +92,8 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
     hessian[2, 2] -= along @ at.arm[0]
     gradient = np.append(along @ jacobian, radius)
     if unknowns[2] == unknowns[3]:  # the node turns with its body
-        gradient, hessian, unknowns = gradient[:3] + [0.0, 0.0, radius], hessian[:3, :3], unknowns[:3]
+        gradient, hessian, unknowns = gradient[:3], hessian[:3, :3], unknowns[:3]
+        gradient[2] += radius
     return SlipWay(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
 
 

@@ -23,7 +23,8 @@ from cfmkit.numerics.dual_array import cos_sin, stack
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding

@@ -141,7 +141,7 @@ def _columns(solution: Solution) -> dict[str, Column]:
             tangential, state = friction_columns(column)
             rubbing = [path.contact_friction(number) for number in numbers]
             signs = [getattr(path.network.contacts[number], "sense", 1.0) for number in numbers]
-            total: Any = sum(sign * force for sign, (force, _) in zip(signs, rubbing, strict=True))
+            total = np.sum([sign * force for sign, (force, _) in zip(signs, rubbing, strict=True)], axis=0)
             columns[tangential] = Column(total[keep], "force")
             said = [np.asarray(states)[keep] for _, states in rubbing]
             columns[state] = Column(np.array(["".join(each) for each in zip(*said, strict=True)], np.str_), "text")
