@@ -317,5 +317,5 @@ def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
     assert (marks[0], marks[-1]) == ("work tip begins", "work tip ends")
     assert set(marks[1:-1:2]) == {"work tip sticks"}  # where its sliding turns round, and where the drive does
     assert set(marks[2:-1:2]) == {"work tip slips"}
-    assert cfmkit.evaluate(rough, ["hysteresis_area"])["hysteresis_area"] > 0
+    assert cfmkit.evaluate(rough, ["hysteresis_area"])["hysteresis_area"].value > 0
     assert any("on the way back: 'tip' sticks to 'work'" in finding.message for finding in rough.warnings)

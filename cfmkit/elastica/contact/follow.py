@@ -25,7 +25,7 @@ from cfmkit.numerics.continuation.follow import LOCKED, follow, follow_on
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -127,15 +127,10 @@ def _follow(
     while True:
         outcome = yield from _follow_part(part, items, walk, previous)
         if isinstance(outcome, EndOfPiece) and outcome.stop.end is WhyStopped.COMPLETE and turns[1:]:
-            # the drive turns back: what slips sticks from there on
             at, sense = outcome.at, float(np.sign(targets[turns[0]] - outcome.at.drive))
-            chosen = choose_friction(part, at, (sense,), turns=True)
+            chosen = yield from _turn_back(part, at, sense)
             if chosen is None:
-                yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
                 return
-            for number, state in chosen.piece.friction.items():
-                if state.sense != part.friction[number].sense:
-                    yield _change_friction(chosen, number, at)
             step = options.first_step * options.span
             walk = replace(outcome.walk, targets=targets[: turns[1]], number=turns[0], step=step)
             part, previous, turns = chosen.piece, chosen.at, turns[1:]
@@ -160,9 +155,7 @@ def _follow(
         before = part.friction
         part, at, sense, turned, states = after
         yield change._replace(after=at.unstable, states=states)
-        for number, state in part.friction.items():  # of other contacts, whose rates change with those of this one
-            if number in before and number != change.number and before[number].sense != state.sense:
-                yield _change_friction(ChosenState(part, at, sense, 1), number, at)
+        yield from _change_others(ChosenState(part, at, sense, 1), before, change.number)
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
@@ -187,6 +180,27 @@ def _follow(
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
         )
+
+
+def _turn_back(
+    part: PieceOfPath, at: PathEquilibrium, sense: float
+) -> Generator[ContactChange | PathStop, None, ChosenState | None]:
+    """Yield what changes where the drive turns back, and return what goes on: what slips sticks from there on."""
+    chosen = choose_friction(part, at, (sense,), turns=True)
+    if chosen is None:
+        yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
+        return None
+    for number, state in chosen.piece.friction.items():
+        if state.sense != part.friction[number].sense:
+            yield _change_friction(chosen, number, at)
+    return chosen
+
+
+def _change_others(chosen: ChosenState, before: Mapping[int, FrictionState], changed: int) -> Iterator[ContactChange]:
+    """Yield what friction of other contacts changes with that of one, by which their rates change."""
+    for number, state in chosen.piece.friction.items():
+        if number in before and number != changed and before[number].sense != state.sense:
+            yield _change_friction(chosen, number, chosen.at)
 
 
 def _change_friction(chosen: ChosenState, number: int, at: PathEquilibrium) -> ContactChange:

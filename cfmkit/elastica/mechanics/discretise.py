@@ -254,13 +254,7 @@ class _ArrayBuilder:
             for k, (number, place) in enumerate(touching)
         )
         behind = size + len(contacts) + 3 * len(flanks)
-        rubbing = [k for k, contact in enumerate(contacts) if contact.item.friction]
-        contacts = tuple(
-            contact._replace(rub=first, flag=first + 1, anchor=first + 2)
-            if (first := behind + 3 * rubbing.index(k) if k in rubbing else -1) >= 0
-            else contact
-            for k, contact in enumerate(contacts)
-        )
+        contacts, n_friction = _number_friction(contacts, behind)
         contacts += self._flank_contacts(flanks, elements, size + len(contacts))
         acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
         free, base, rate = self._constraints(size, elements, attachments, acting)
@@ -270,7 +264,7 @@ class _ArrayBuilder:
                 [contact.unknown for contact in contacts]
                 + [contact.slide for contact in sides]
                 + [contact.flag for contact in sides]
-                + list(range(behind, behind + 3 * len(rubbing)))
+                + list(range(behind, behind + n_friction))
             )
             size += len(more)
             free = np.append(free, more)
@@ -461,6 +455,18 @@ class _ArrayBuilder:
             unknown = self.bodies[node][local % FRAME_OF_DRIVE]
             held[unknown], rate[unknown], base[unknown] = True, sense, 0.0
         return np.flatnonzero(~held), base, rate
+
+
+def _number_friction(contacts: tuple[ContactAt, ...], first: int) -> tuple[tuple[ContactAt, ...], int]:
+    """Return contacts with the unknowns of their friction, numbered from `first` on, and how many these are."""
+    numbered, count = list[ContactAt](), 0
+    for contact in contacts:
+        if contact.item.friction:
+            own = first + count
+            contact = contact._replace(rub=own, flag=own + 1, anchor=own + 2)
+            count += 3
+        numbered.append(contact)
+    return tuple(numbered), count
 
 
 def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:
