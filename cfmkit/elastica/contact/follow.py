@@ -173,9 +173,6 @@ def _follow(
                 break
             yield Point(part.grow(reached), walk.number, walk.branch)
             walk = replace(walk, number=walk.number + 1)
-        if walk.done and not turns[1:]:
-            yield PathStop(WhyStopped.COMPLETE, place)
-            return
         items, previous = (
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
