@@ -176,6 +176,6 @@ def test_it_is_counted_how_many_states_of_friction_can_go_on():
     count = len(problem.mesh.free)
     touch = PathEquilibrium(np.zeros(count), 0.0, np.zeros(count), 0)
     away, towards = (choose_friction(piece, touch, (sense,), 0) for sense in (1.0, -1.0))
-    assert away.count == 2
+    assert away.n_states == 2
     assert away.piece.friction[0].sense == 0  # sticking is taken
-    assert towards.count == 1
+    assert towards.n_states == 1

@@ -204,7 +204,7 @@ def _change_friction(chosen: ChosenState, number: int, at: PathEquilibrium) -> C
     """Return the change of a contact that begins to stick or to slip with another one, or where the drive turns."""
     kind: Literal["slips", "sticks"] = "slips" if chosen.piece.friction[number].sense else "sticks"
     contact = chosen.piece.whole.mesh.contacts[number].number
-    return ContactChange(kind, number, at, at.unstable, chosen.at.unstable, contact, states=chosen.count)
+    return ContactChange(kind, number, at, at.unstable, chosen.at.unstable, contact, states=chosen.n_states)
 
 
 def _lies_between(target: float, first: float, last: float) -> bool:
@@ -337,7 +337,7 @@ def _enter_friction(
     settled = change.number if changed is None else None
     chosen = choose_friction(beyond, change.at, (sense, -sense), changed, settled)
     if chosen is not None:
-        return chosen.piece, chosen.at, chosen.sense, chosen.sense != sense, chosen.count
+        return chosen.piece, chosen.at, chosen.sense, chosen.sense != sense, chosen.n_states
     if is_jammed(beyond, change.at):
         return PathStop(WhyStopped.BLOCKED, change.at.drive, BLOCKED.format(names=beyond.say_all(change.number)))
     return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.say_rubbing()))

@@ -37,7 +37,7 @@ class ChosenState(NamedTuple):
     piece: PieceOfPath
     at: PathEquilibrium
     sense: float
-    count: int
+    n_states: int
 
 
 def choose_friction(
