@@ -124,7 +124,17 @@ def test_a_rotation_that_is_stopped_has_a_moment():
         ("  stops: {s: {node: tip, direction: 0 deg, gap: -1 mm}}\n", "stops.s", "must be >= 0"),
         ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 deg}}\n", "stops.s", "length"),
         ("  stops: {s: {node: tip, rotation: true, gap: 1 mm}}\n", "stops.s", "angle"),
-        ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 0.2}}\n", "stops.s", "friction"),
+        ("  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 2}}\n", "stops.s", "must be >= 0 and < 2"),
+        ("  stops: {s: {node: tip, rotation: true, gap: 1 deg, friction: 0.2}}\n", "stops.s", "friction"),
+        (
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg, beams: [beam], friction: 0.2}}\n",
+            "obstacles.o", "friction along a beam's flank is not modelled: state 'nodes', or leave out 'friction'",
+        ),
+        (
+            "  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 0.2}}\n"
+            "  obstacles: {o: {kind: line, through: [0 mm, -50 mm], direction: 0 deg}}\n",
+            "obstacles.o", "flanks of beams beside contacts with friction are not modelled",
+        ),
         ("  stops: {s: {node: tip, gap: 1 mm}}\n", "stops.s", "direction"),
         (
             "  obstacles: {o: {kind: disc, centre: [400 mm, -10 mm], radius: 12 mm, nodes: {tip: 1 mm}}}\n",
@@ -286,3 +296,26 @@ def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
     said = {warning.name: warning.message for warning in result.warnings}
     assert "list it in 'beams'" in said["side_in_obstacle"]
     assert "pin_leaf_force" not in result.curve.extra
+
+
+def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
+    own = "support: guided, direction: 90 deg"
+    lines = (FLOOR.replace("mm}}", f"mm}}, friction: {friction}}}") for friction in (0, 0.3))
+    smooth, rough = (cfmkit.analyze(with_floor(line, own)) for line in lines)
+    assert smooth.curve.branches == ("load",)
+    assert rough.curve.branches == ("load", "unload")
+    assert "work_tip_state" not in smooth.curve.extra
+    motion, unload = rough.curve.displacement, rough.curve.branch == "unload"
+    assert motion[unload][0] == motion[~unload][-1]
+    assert motion[unload][-1] == motion[0]
+    columns = rough.curve.extra
+    force, rubbing = columns["work_tip_force"].values, columns["work_tip_tangential"].values
+    assert (np.abs(rubbing) <= 0.3 * force + 1e-9 * force.max()).all()
+    slips = columns["work_tip_state"].values == "slip"
+    assert np.abs(rubbing)[slips] == pytest.approx(0.3 * force[slips], rel=1e-9)
+    marks = [mark for mark in columns["event"].values.tolist() if mark]
+    assert (marks[0], marks[-1]) == ("work tip begins", "work tip ends")
+    assert set(marks[1:-1:2]) == {"work tip sticks"}  # where its sliding turns round, and where the drive does
+    assert set(marks[2:-1:2]) == {"work tip slips"}
+    assert cfmkit.evaluate(rough, ["hysteresis_area"])["hysteresis_area"].value > 0
+    assert any("on the way back: 'tip' sticks to 'work'" in finding.message for finding in rough.warnings)

@@ -6,16 +6,16 @@ is passed. Where one becomes negative, the change is solved for: gap and force o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.equations import with_closed
+from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
 from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
 from cfmkit.elastica.contact.side_gaps import LoadStage, carry
-from cfmkit.elastica.contact.terms import gaps, measure
+from cfmkit.elastica.contact.terms import gaps, measure, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
@@ -25,20 +25,23 @@ from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import hermite
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
-    from cfmkit.elastica.model.contact import Contact
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.contact import Contact, FrictionState
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
 """Gap, in mean beam lengths, and force, as a share of the largest and of one, that may be negative by rounding."""
+SLIP_ROUNDING = 1e-13  # way of slip in one sample, in mean beam lengths, by which it may go back by rounding
 FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may close and open again
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
 FAR = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
 STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
+NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
 
@@ -46,7 +49,7 @@ BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is
 class ContactChange(NamedTuple):
     """The begin or end of a contact; unstable directions before and after it."""
 
-    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes"]
+    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes", "slips", "sticks"]
     number: int  # of the contact in the arrays of its piece
     at: PathEquilibrium
     before: int
@@ -54,6 +57,7 @@ class ContactChange(NamedTuple):
     contact: int = -1  # in `Network.contacts`
     condition: SideCondition | None = None  # on the side of a beam, that is met
     piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
+    states: int = 1  # of friction that are possible behind it
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +67,12 @@ class PieceOfPath:
     whole: NetworkProblem
     closed: frozenset[int]
     options: Options
+    friction: Mapping[int, FrictionState] = field(default_factory=dict)  # of closed contacts that rub
 
     @cached_property
     def own(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
-        mesh = with_closed(self.whole.mesh, self.closed)
+        mesh = with_closed(self.whole.mesh, self.closed, self.friction)
         return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, piece=self)
 
     @cached_property
@@ -126,12 +131,14 @@ class PieceOfPath:
             yield seen[contact.number], contact
 
     def with_closed(self, closed: frozenset[int]) -> PieceOfPath:
-        """Return the problem with another set of closed contacts."""
-        return PieceOfPath(self.whole, closed, self.options)
+        """Return the problem with another set of closed contacts; what friction does at a new one is left open."""
+        return PieceOfPath(self.whole, closed, self.options, {k: v for k, v in self.friction.items() if k in closed})
 
     def say(self, number: int) -> str:
         """Return what the contact of a row of `values` is called."""
         count = len(self.whole.mesh.contacts)
+        if number >= count + len(self.sides.all):
+            number = self.rubbing[number - count - len(self.sides.all)]
         return describe(
             self.whole.mesh.contacts[number].item if number < count else self.sides.all[number - count].item
         )
@@ -140,6 +147,11 @@ class PieceOfPath:
         """Return what a contact and those that are closed with it are called, where they block the drive together."""
         others = [self.say(index) for index in sorted(self.closed - {number})]
         return " with ".join([self.say(number), *others[:2]])
+
+    def say_rubbing(self) -> str:
+        """Return what the closed contacts with friction are called."""
+        contacts = self.whole.mesh.contacts
+        return ", ".join(describe(contacts[k].item) for k in sorted(self.closed) if contacts[k].rub >= 0)
 
     # -- unknowns ------------------------------------------------------------------------------------------------------
     @cached_property
@@ -151,6 +163,19 @@ class PieceOfPath:
         """Return an equilibrium without the forces of open contacts."""
         return at._replace(x=at.x[self.own_mask], rate=at.rate[self.own_mask])
 
+    @cached_property
+    def _kept(self) -> FloatArray:
+        """Free unknowns of the whole that say what friction does, (n,); the others are zero."""
+        kept = np.zeros(len(self.own_mask))
+        for number, state in self.friction.items():
+            contact = self.whole.mesh.contacts[number]
+            kept[np.searchsorted(self.whole.mesh.free, [contact.flag, contact.anchor])] = state
+        return kept
+
+    def expand_state(self, values: FloatArray) -> FloatArray:
+        """Return a state of the own unknowns among those of all."""
+        return np.asarray(self.expand(values) + self._kept)
+
     def expand(self, values: Any) -> Any:
         """Return values of the own unknowns among those of all, zero for the others."""
         spread_values = np.zeros((len(self.own_mask), *np.shape(values)[1:]))
@@ -159,7 +184,7 @@ class PieceOfPath:
 
     def grow(self, at: PathEquilibrium) -> PathEquilibrium:
         """Return an equilibrium with the forces of all contacts."""
-        return at._replace(x=self.expand(at.x), rate=self.expand(at.rate))
+        return at._replace(x=self.expand_state(at.x), rate=self.expand(at.rate))
 
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
@@ -183,16 +208,50 @@ class PieceOfPath:
         mesh, way = self.whole.mesh, drives[:, None]
         z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
         z[:, mesh.free] = x
-        spread_values = np.empty((len(mesh.contacts) + len(self.sides.all), len(z)))
+        count = len(mesh.contacts) + len(self.sides.all)
+        spread_values = np.empty((count + len(self.rubbing), len(z)))
         for number, contact in enumerate(mesh.contacts):
             spread_values[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
-        spread_values[len(mesh.contacts) :] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
+        spread_values[len(mesh.contacts) : count] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
+        for row, number in enumerate(self.rubbing, count):
+            spread_values[row] = rub_values(mesh, mesh.contacts[number], self.friction[number], z)
         return spread_values
 
-    def row_value(self, at: PathEquilibrium, number: int) -> float:
-        """Return one row of `values` at an equilibrium."""
+    @cached_property
+    def rubbing(self) -> tuple[int, ...]:
+        """Closed contacts with friction."""
+        return tuple(number for number, state in sorted(self.friction.items()) if state.sense != NO_FRICTION.sense)
+
+    @cached_property
+    def slipping_rows(self) -> dict[int, int]:
+        """Rows of `values` that are ways of slip, which must grow, with their contacts."""
+        first = len(self.whole.mesh.contacts) + len(self.sides.all)
+        return {first + k: number for k, number in enumerate(self.rubbing) if self.friction[number].sense}
+
+    def slip_rate(self, at: PathEquilibrium, number: int) -> float:
+        """Return how far a contact slips in its sense by the drive, at an equilibrium."""
+        mesh = self.whole.mesh
+        way = slip_way(mesh, mesh.contacts[number], self.whole.values(at.x, at.drive))
+        moved = self.moved_by_drive(at)
+        return float(self.friction[number].sense * (way.gradient @ moved[way.unknowns]))
+
+    def moved_by_drive(self, at: PathEquilibrium) -> FloatArray:
+        """Return the change of all unknowns by the drive at an equilibrium, (size,)."""
+        mesh = self.whole.mesh
+        moved = np.array(mesh.base if self.whole.ramp else mesh.rate, float)
+        moved[mesh.free] = at.rate
+        return moved
+
+    def row_value(self, at: PathEquilibrium, number: int, travel: float = 1.0) -> float:
+        """Return one row of `values` at an equilibrium: of a way of slip how much it grows in the sense of travel."""
         mesh, drives = self.whole.mesh, np.array([at.drive])
         z = self.whole.values(at.x, at.drive)[None]
+        if number in self.slipping_rows:
+            return travel * self.slip_rate(at, self.slipping_rows[number])
+        first = len(mesh.contacts) + len(self.sides.all)
+        if number >= first:
+            rubs = self.rubbing[number - first]
+            return float(rub_values(mesh, mesh.contacts[rubs], self.friction[rubs], z)[0])
         if number >= len(mesh.contacts):
             condition = self.sides.all[number - len(mesh.contacts)]
             return float(self.sides.value(condition, z, LoadStage.from_problem(self.whole, drives))[0])
@@ -205,8 +264,16 @@ class PieceOfPath:
         largest = np.abs(values[closed]).max(axis=(0, -1), initial=1.0)
         shape = -1, *(1,) * (values.ndim - 2)
         spread_values = np.where(closed.reshape(shape), FORCE_ROUNDING * largest, GAP_ROUNDING)
-        spread_values[len(self.whole.mesh.contacts) :] = self.sides.roundings.reshape(shape)
+        count = len(self.whole.mesh.contacts)
+        spread_values[count : count + len(self.sides.all)] = self.sides.roundings.reshape(shape)
+        for row in range(count + len(self.sides.all), len(values)):
+            spread_values[row] = SLIP_ROUNDING if row in self.slipping_rows else FORCE_ROUNDING * largest
         return spread_values
+
+    def roundings_of_force(self, at: PathEquilibrium) -> float:
+        """Return which force of a contact is rounding at an equilibrium."""
+        z = self.whole.values(at.x, at.drive)
+        return FORCE_ROUNDING * max(1.0, *(abs(float(z[contact.unknown])) for contact in self.whole.mesh.contacts))
 
     def are_quiet(self, states: Sequence[PathEquilibrium]) -> Any:
         """Return between which of m + 1 states certainly no contact changes, (m,): seen in all steps together."""
@@ -224,6 +291,10 @@ class PieceOfPath:
         drives = drive[:-1] + s[:, :, 0] * width[:, 0]
         values = self.values(between.reshape(-1, len(kept)), drives.ravel())
         values = values.reshape(len(values), n_samples, -1).swapaxes(1, 2)
+        for row, number in self.slipping_rows.items():
+            grown = np.array([self.slip_rate(self.grow(at), number) for at in states[1:]]) * width[:, 0]
+            values[row] = np.diff(values[row], axis=-1, prepend=values[row, :, :1])
+            values[row, :, -1] = np.minimum(values[row, :, -1], grown)
         calm = (values[..., 1:] >= -self.roundings(values)[..., None]).all(axis=(0, 2))
         return calm & dense & smooth
 
@@ -238,8 +309,7 @@ class PieceOfPath:
         """Return how force or gap of a contact changes with the drive at an equilibrium."""
         mesh = self.whole.mesh
         contact = mesh.contacts[number]
-        moved = np.array(mesh.base if self.whole.ramp else mesh.rate, float)
-        moved[mesh.free] = at.rate
+        moved = self.moved_by_drive(at)
         if number in self.closed:
             return float(moved[contact.unknown])
         gap = measure(mesh, contact, self.whole.values(at.x, at.drive))
@@ -317,7 +387,17 @@ class StepBetween:
     @cached_property
     def values(self) -> FloatArray:
         """Forces of closed and gaps of open contacts there, (contacts, shares)."""
-        return self.part.values(*self.at(self.shares[:, None]))
+        part, values = self.part, self.part.values(*self.at(self.shares[:, None]))
+        for row in part.slipping_rows:
+            values[row] = np.diff(values[row], prepend=values[row, :1])
+            grown = abs(self.last.drive - self.first.drive) * part.row_value(self.last, row, self.travel)
+            values[row, -1] = min(values[row, -1], grown)
+        return values
+
+    @property
+    def travel(self) -> float:
+        """Sense in which the drive goes."""
+        return 1.0 if self.last.drive >= self.first.drive else -1.0
 
     def at(self, share: Any) -> tuple[FloatArray, Any]:
         """Return the unknowns (n,) and the drive at a share of the step, or (m, n) and (m,) at m of them, (m, 1)."""
@@ -332,7 +412,7 @@ class StepBetween:
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.at(share)
-        at = correct(self.part.own, x[self.part.own_mask], drive)
+        at = correct(self.part.own, x[self.part.own_mask], float(drive))
         if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
@@ -371,23 +451,41 @@ class StepBetween:
             at = self.solve(share)
             if at is None:
                 raise ArithmeticError
-            return part.row_value(part.grow(at), number)
+            return part.row_value(part.grow(at), number, self.travel)
 
         try:
             row_values = self.values[number]
             behind = np.flatnonzero(row_values[1:] < -part.roundings(self.values)[number])
             end = int(behind[0]) + 1 if len(behind) else len(row_values) - 1
-            begin = next((k for k in range(end - 1, -1, -1) if value(float(self.shares[k])) > 0), None)
+            begins = self.shares[end - 1 :: -1].tolist()
+            if number >= len(part.whole.mesh.contacts) + len(part.sides.all):
+                # what sticks begins at its limit, where the drive turns, and may soon reach the other one
+                begins += [float(self.shares[end]) * 0.5**k for k in range(1, NEARER)]
+            begin = next((share for share in begins if value(share) > 0), None)
             if begin is None:
                 return self.first
             last = next((k for k in range(end, len(row_values)) if value(float(self.shares[k])) <= 0), None)
             if last is None:
                 return None
-            share = float(brentq(value, self.shares[begin], self.shares[last], xtol=1e-15, rtol=1e-14))
+            share = float(brentq(value, begin, self.shares[last], xtol=1e-15, rtol=1e-14))
         except ArithmeticError:
             return None
         at = self.solve(share)
         return None if at is None else part.grow(at)
+
+
+def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:
+    """Return what must not become negative in states (n, size), (n,): what is left of the friction where it sticks.
+
+    Where it slips it is how far it has come in its sense, which must grow.
+    """
+    if state.sense == 0:
+        return np.asarray(contact.item.friction * z[:, contact.unknown] - np.abs(z[:, contact.rub]))
+    ways = [float(slip_way(mesh, contact, one, state.anchor).value) for one in z]
+    round_length = np.inf
+    if isinstance(contact.item, NodeOnObstacle):
+        round_length = contact.item.outline.round_length(contact.item.radius) / mesh.scales.length
+    return state.sense * (np.array(ways) if np.isinf(round_length) else np.unwrap(ways, period=round_length))
 
 
 def describe(item: Contact) -> str:

@@ -14,8 +14,11 @@ import numpy as np
 from cfmkit.elastica.contact.terms import gaps, press
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.contact import FrictionState
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
@@ -27,13 +30,26 @@ def open_all_contacts(mesh: Discretisation) -> Discretisation:
     return replace(mesh, contacts=(), moving=None, free=mesh.free[mesh.free < _first_contact(mesh)])
 
 
-def with_closed(mesh: Discretisation, closed: frozenset[int]) -> Discretisation:
-    """Return the arrays of a network in which some contacts are closed, by their numbers, and all others open."""
+def with_closed(
+    mesh: Discretisation, closed: frozenset[int], friction: Mapping[int, FrictionState] | None = None
+) -> Discretisation:
+    """Return the arrays of a network in which some contacts are closed, by their numbers, and all others open.
+
+    `friction` says what closed contacts that rub do, by their numbers: nothing, if they are not in it.
+    """
     if not closed:
         return open_all_contacts(mesh)
-    contacts = tuple(contact._replace(closed=number in closed) for number, contact in enumerate(mesh.contacts))
-    held = [contact.unknown for contact in contacts if not contact.closed]
+    states = friction or {}
+    contacts = tuple(
+        contact._replace(closed=number in closed, friction=states.get(number, NO_FRICTION))
+        for number, contact in enumerate(mesh.contacts)
+    )
+    held = [unknown for contact in contacts if not contact.closed for unknown in contact.own_unknowns]
+    held += [unknown for contact in contacts if contact.rub >= 0 for unknown in (contact.flag, contact.anchor)]
     return replace(mesh, contacts=contacts, free=np.setdiff1d(mesh.free, held))
+
+
+NO_FRICTION = FrictionState(2.0)
 
 
 def _first_contact(mesh: Discretisation) -> int:
@@ -162,10 +178,11 @@ class ContactEquations(NumpyEquations):
         z, moved = np.asarray(self.values(free, way)), mesh.base if self.ramp else mesh.rate
         far = self.watched.are_open(z)
         for number, contact in enumerate(mesh.contacts):
-            slot = self.slots[contact.unknown]
             if far[number] or contact.closed is False:
-                if slot >= 0:
-                    residual[slot], tangent[slot, slot] = -free[slot], -1.0
+                own = self.slots[list(contact.own_unknowns)]
+                held = own[own >= 0]
+                tangent[held, held] = -1.0
+                residual[held[:2]] = -free[held[:2]]  # flag and anchor of one with friction stay
                 continue
             term = press(mesh, contact, z)
             slots = self.slots[term.unknowns]

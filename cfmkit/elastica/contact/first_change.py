@@ -70,10 +70,12 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
 def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:
     """Return True if a row is a side that touches where another of its contacts changes, too."""
     count = len(piece.whole.mesh.contacts)
-    if row < count or piece.sides.all[row - count].kind != "touch":
+    rubs = row - count >= len(piece.sides.all)
+    if row < count or rubs or piece.sides.all[row - count].kind != "touch":
         return False
     item = piece.sides.all[row - count].item
-    return any(k >= count and k != row and piece.sides.all[k - count].item is item for k in rows)
+    sides = [k for k in rows if count <= k < count + len(piece.sides.all)]
+    return any(k != row and piece.sides.all[k - count].item is item for k in sides)
 
 
 def _find_change_at_end(
@@ -81,11 +83,22 @@ def _find_change_at_end(
 ) -> ContactChange | PathStop | None:
     """Return the first change up to a point that may violate a condition; None if it does not."""
     values = piece.values(last.x[None], np.array([last.drive]))[:, 0]
+    travel = StepBetween(piece, first, last).travel
+    values[list(piece.slipping_rows)] = [piece.row_value(last, row, travel) for row in piece.slipping_rows]
     return find_change(piece, first, last) if (values < -rounding).any() else None
 
 
 def _locate(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | PathStop | None:
     """Return where a contact changes within a step: where its gap and its force are both zero."""
+    first_rub = len(piece.whole.mesh.contacts) + len(piece.sides.all)
+    if row >= first_rub:
+        number, at = piece.rubbing[row - first_rub], step.bisect(row)
+        if at is None:
+            return None
+        what: Literal["slips", "sticks"] = "sticks" if row in piece.slipping_rows else "slips"
+        return ContactChange(
+            what, number, at, step.first.unstable, step.first.unstable, piece.whole.mesh.contacts[number].number
+        )
     if row >= len(piece.whole.mesh.contacts):
         return locate_side_change(piece, step, row)
     contact, unstable = piece.whole.mesh.contacts[row].number, step.first.unstable
@@ -100,7 +113,7 @@ def _locate(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | 
     border[int(both.own_mask[: piece.slot(row)].sum())] = 1.0
     state = both.own.equations.solve(x, drive, border, 0.0)
     if state is not None and np.isfinite(state.rate).all():
-        free = both.expand(state.free)
+        free = both.expand_state(state.free)
         free[piece.slot(row)] = 0.0
         at = step.first._replace(x=free, drive=float(state.way), effort=np.nan, stiffness=np.nan)
         if step.contains(at, guess):

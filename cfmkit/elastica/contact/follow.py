@@ -9,20 +9,23 @@ has a limit point at the change. A contact between whose change and the drive no
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.contact.changes import FORCE_ROUNDING, ContactChange, PieceOfPath
 from cfmkit.elastica.contact.first_change import find_change, find_change_before_end
+from cfmkit.elastica.contact.friction import RIGID_RATE, ChosenState, choose_friction, is_jammed
 from cfmkit.elastica.contact.side_changes import enter_side_change
+from cfmkit.elastica.contact.terms import slip_way
+from cfmkit.elastica.model.contact import FrictionState
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.folds import pass_fold
 from cfmkit.numerics.continuation.follow import LOCKED, follow, follow_on
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -30,14 +33,22 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 SAME_PLACE = 1e-11  # share of the range within which a change is at a point
-RIGID_RATE = 1e9  # motion or force per drive beyond which the contacts leave no way to move
 MAX_CHANGES_AT_ONE_PLACE = 20
 FIRST_ARC = 0.1  # of the step before, behind a limit point at a change
 SHORTEST_STEP = 1e-6  # share of the range
 BLOCKED = "the drive is blocked by {names} at {{place}}"
 SNAPS = "the drive cannot go on at {{place}}, where {names} {what}: a limit point; follow it by through_folds"
 BUCKLES_AWAY = "stability is lost at {place}, where a part that an obstacle holds buckles away from it"
+NO_FRICTION_STATE = "friction of {names} leaves no state that can go on at {{place}}: neither sticking nor slipping"
 LOSES = "stability is lost at {{place}}, where {names} {what}"
+
+
+class EndOfPiece(NamedTuple):
+    """Why a piece ends, where the walk is then, and the last point."""
+
+    stop: PathStop
+    walk: Walk
+    at: PathEquilibrium
 
 
 class Remeshed(NamedTuple):
@@ -68,7 +79,29 @@ def follow_in_contact(
         for number, contact in enumerate(problem.mesh.contacts)
         if contact.slide >= 0 or problem.values(start.x, start.drive)[contact.unknown] > FORCE_ROUNDING
     )
-    yield from _limit_points(_follow(problem, start, targets, options, branch, closed), options)
+    part = PieceOfPath(problem, closed, options)
+    if any(contact.rub >= 0 for contact in problem.mesh.contacts) and not problem.ramp:
+        part, start = _begin_friction(part, start)
+    yield from _limit_points(_follow(part, start, targets, branch), options)
+
+
+def _begin_friction(part: PieceOfPath, start: PathEquilibrium) -> tuple[PieceOfPath, PathEquilibrium]:
+    """Return the piece and its start, at which what is closed sticks: constant loads have come on without friction."""
+    mesh, z = part.whole.mesh, part.whole.values(start.x, start.drive)
+    rubbing = [number for number in part.closed if mesh.contacts[number].rub >= 0]
+    friction = {k: FrictionState(0.0, float(slip_way(mesh, mesh.contacts[k], z).value)) for k in rubbing}
+    part = replace(part, friction=friction)
+    return part, part.grow(part.shrink(start))
+
+
+def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> list[int]:
+    """Return behind how many requested values the drive turns back, and how many there are; with friction only."""
+    if not any(contact.rub >= 0 for contact in problem.mesh.contacts):
+        return [len(targets)]
+    ways = np.sign(np.diff(np.append(start, targets)))
+    moving = np.flatnonzero(ways)
+    turns = moving[1:][ways[moving[1:]] != ways[moving[:-1]]]
+    return [*turns.tolist(), len(targets)]
 
 
 def _limit_points(items: Iterator[Item], options: Options) -> Iterator[Item]:
@@ -84,17 +117,27 @@ def _limit_points(items: Iterator[Item], options: Options) -> Iterator[Item]:
 
 
 def _follow(
-    problem: NetworkProblem, start: PathEquilibrium, targets: FloatArray, options: Options, branch: PathBranch | None,
-    closed: frozenset[int],
-) -> Iterator[Item]:  # fmt: skip
-    part = PieceOfPath(problem, closed, options)
-    items = follow(part.own, part.shrink(start), targets, options, branch)
-    walk, count, place = Walk(part.own, options, targets, start, 0.0, branch=branch), 0, np.inf
+    part: PieceOfPath, start: PathEquilibrium, targets: FloatArray, branch: PathBranch | None
+) -> Iterator[Item]:
+    options, turns = part.options, _find_turns(part.whole, start.drive, targets)
+    first = targets[: turns[0]]
+    items = follow(part.own, part.shrink(start), first, options, branch)
+    walk, count, place = Walk(part.own, options, first, start, 0.0, branch=branch), 0, np.inf
     previous: PathEquilibrium | None = None
     while True:
         outcome = yield from _follow_part(part, items, walk, previous)
-        if isinstance(outcome, PathStop):
-            yield outcome
+        if isinstance(outcome, EndOfPiece) and outcome.stop.end is WhyStopped.COMPLETE and turns[1:]:
+            at, sense = outcome.at, float(np.sign(targets[turns[0]] - outcome.at.drive))
+            chosen = yield from _turn_back(part, at, sense)
+            if chosen is None:
+                return
+            step = options.first_step * options.span
+            walk = replace(outcome.walk, targets=targets[: turns[1]], number=turns[0], step=step)
+            part, previous, turns = chosen.piece, chosen.at, turns[1:]
+            items, count = _go_on(part, walk, chosen.at, sense), 0
+            continue
+        if isinstance(outcome, EndOfPiece):
+            yield outcome.stop
             return
         walk, change, sense = outcome
         near = abs(change.at.drive - place) <= SAME_PLACE * options.span
@@ -109,8 +152,10 @@ def _follow(
             yield after
             return
         names, what = (change.piece or part).say(change.number), change.kind
-        part, at, sense, turned = after
-        yield change._replace(after=at.unstable)
+        before = part.friction
+        part, at, sense, turned, states = after
+        yield change._replace(after=at.unstable, states=states)
+        yield from _change_others(ChosenState(part, at, sense, 1), before, change.number)
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
@@ -128,10 +173,38 @@ def _follow(
                 break
             yield Point(part.grow(reached), walk.number, walk.branch)
             walk = replace(walk, number=walk.number + 1)
-        if walk.done:
-            yield PathStop(WhyStopped.COMPLETE, place)
-            return
-        items, previous = _go_on(part, walk, at, sense), at
+        items, previous = (
+            iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
+            at,
+        )
+
+
+def _turn_back(
+    part: PieceOfPath, at: PathEquilibrium, sense: float
+) -> Generator[ContactChange | PathStop, None, ChosenState | None]:
+    """Yield what changes where the drive turns back, and return what goes on: what slips sticks from there on."""
+    chosen = choose_friction(part, at, (sense,), turns=True)
+    if chosen is None:
+        yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
+        return None
+    for number, state in chosen.piece.friction.items():
+        if state.sense != part.friction[number].sense:
+            yield _change_friction(chosen, number, at)
+    return chosen
+
+
+def _change_others(chosen: ChosenState, before: Mapping[int, FrictionState], changed: int) -> Iterator[ContactChange]:
+    """Yield what friction of other contacts changes with that of one, by which their rates change."""
+    for number, state in chosen.piece.friction.items():
+        if number in before and number != changed and before[number].sense != state.sense:
+            yield _change_friction(chosen, number, chosen.at)
+
+
+def _change_friction(chosen: ChosenState, number: int, at: PathEquilibrium) -> ContactChange:
+    """Return the change of a contact that begins to stick or to slip with another one, or where the drive turns."""
+    kind: Literal["slips", "sticks"] = "slips" if chosen.piece.friction[number].sense else "sticks"
+    contact = chosen.piece.whole.mesh.contacts[number].number
+    return ContactChange(kind, number, at, at.unstable, chosen.at.unstable, contact, states=chosen.n_states)
 
 
 def _lies_between(target: float, first: float, last: float) -> bool:
@@ -162,7 +235,7 @@ def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> 
 
 def _follow_part(
     part: PieceOfPath, items: Iterator[Point | PathEvent | PathStop], walk: Walk, previous: PathEquilibrium | None
-) -> Generator[Point | PathEvent | ContactChange | Remeshed, None, PathStop | tuple[Walk, ContactChange, float]]:
+) -> Generator[Point | PathEvent | ContactChange | Remeshed, None, EndOfPiece | tuple[Walk, ContactChange, float]]:
     """Yield the items of a piece up to a change; return the walk there, the change and the sense of travel.
 
     `previous` is where the piece begins if that was yielded before.
@@ -177,7 +250,7 @@ def _follow_part(
             found = find_change_before_end(part, previous, item)
             if found is None:
                 yield from waiting
-                return item
+                return EndOfPiece(item, walk, previous or walk.here)
             at, step = None, item.drive
         else:
             at, step = part.grow(item.at), item.at.drive
@@ -188,9 +261,9 @@ def _follow_part(
             if isinstance(found, PathStop):
                 lost = next((event for event in waiting if event.after > event.before), None)
                 if lost is None:
-                    return found
+                    return EndOfPiece(found, walk, previous)
                 yield from waiting  # the way on from there goes through an obstacle
-                return PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES_AWAY)
+                return EndOfPiece(PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES_AWAY), walk, previous)
             sense = 1.0 if step >= previous.drive else -1.0
             place = found.at.drive
             yield from (event for event in waiting if (place - event.drive) * sense > 0)
@@ -211,22 +284,30 @@ def _follow_part(
         assert at is not None
         yield item._replace(at=at)
         if previous is not None and part.is_locked(previous, at):
-            return PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED)
+            return EndOfPiece(PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED), walk, at)
         if item.target >= 0:
             walk = replace(walk, number=item.target + 1)
         walk, previous = replace(walk, branch=item.branch), at
-    return PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}")
+    return EndOfPiece(PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}"), walk, walk.here)
 
 
 def _enter(
     part: PieceOfPath, change: ContactChange, sense: float
-) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool]:
-    """Return the piece behind a change, its start, the sense of the drive there, and whether it has turned."""
+) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool, int]:
+    """Return the piece behind a change, its start, the sense of the drive there, and whether it has turned.
+
+    Behind them stands how many states of friction are possible.
+    """
     if change.condition is not None or part.whole.mesh.contacts[change.number].slide >= 0:
-        return enter_side_change(part, change, sense)
+        side = enter_side_change(part, change, sense)
+        return side if isinstance(side, PathStop) else (*side, 1)
     begins, number = change.kind == "begins", change.number
+    if change.kind in ("slips", "sticks"):
+        return _enter_friction(_mark_limit(part, change), change, sense, None)
     closed = part.closed | {number} if begins else part.closed - {number}
     beyond = part.with_closed(closed)
+    if not part.whole.ramp and any(part.whole.mesh.contacts[k].rub >= 0 for k in closed):
+        return _enter_friction(beyond, change, sense, number)
     near = beyond.shrink(change.at)
     at = beyond.own.solve(near.x, near.drive)
     names = beyond.say(number)
@@ -236,4 +317,27 @@ def _enter(
         return PathStop(WhyStopped.BLOCKED, near.drive, BLOCKED.format(names=beyond.say_all(number)))
     whole = beyond.grow(at)
     turned = bool(beyond.grows_along(whole, number) * sense < 0)
-    return beyond, whole, (-sense if turned else sense), turned
+    return beyond, whole, (-sense if turned else sense), turned, 1
+
+
+def _mark_limit(part: PieceOfPath, change: ContactChange) -> PieceOfPath:
+    """Return the piece without the state that ends at a change of friction: it slips against its force, or sticks."""
+    mesh, number = part.whole.mesh, change.number
+    z = part.whole.values(change.at.x, change.at.drive)
+    contact = mesh.contacts[number]
+    sticks = FrictionState(0.0, float(slip_way(mesh, contact, z).value))
+    slips = FrictionState(-float(np.sign(z[contact.rub])))
+    return replace(part, friction={**part.friction, number: slips if change.kind == "slips" else sticks})
+
+
+def _enter_friction(
+    beyond: PieceOfPath, change: ContactChange, sense: float, changed: int | None
+) -> PathStop | tuple[PieceOfPath, PathEquilibrium, float, bool, int]:
+    """Return the same where a closed contact has friction."""
+    settled = change.number if changed is None else None
+    chosen = choose_friction(beyond, change.at, (sense, -sense), changed, settled)
+    if chosen is not None:
+        return chosen.piece, chosen.at, chosen.sense, chosen.sense != sense, chosen.n_states
+    if is_jammed(beyond, change.at):
+        return PathStop(WhyStopped.BLOCKED, change.at.drive, BLOCKED.format(names=beyond.say_all(change.number)))
+    return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.say_rubbing()))

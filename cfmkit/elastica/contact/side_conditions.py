@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+    from cfmkit.elastica.mechanics.discretise import Discretisation
 
 ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
 NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins

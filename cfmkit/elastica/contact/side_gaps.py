@@ -359,10 +359,10 @@ def carry(
             rest = turn[:-2] - turn[-2] * rule.values[:, 0] - turn[-1] * rule.values[:, 1]
             values[indices[columns[2:]]] = bubbles @ rest
             values[indices[-2:]] = force[-1]
-    number_of = {contact.number: contact.unknown for contact in old.contacts if contact.slide < 0}
+    number_of = {contact.number: contact.own_unknowns for contact in old.contacts if contact.slide < 0}
     for contact in new.contacts:
         if contact.slide < 0:
-            values[contact.unknown] = z[number_of[contact.number]]
+            values[list(contact.own_unknowns)] = z[list(number_of[contact.number])]
         else:
             values[contact.slide], values[contact.flag] = fresh[contact.element, 1], contact.laid
     return values

@@ -1,4 +1,4 @@
-"""Gaps of contacts with their derivatives, and the term of a contact in the functional; dimensionless."""
+"""Gaps and ways of slip of contacts with derivatives, and the term of a contact in the functional; dimensionless."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import Contribution
-from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
+from cfmkit.elastica.model.contact import FrictionState, NodeOnObstacle, Stop
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
+    from cfmkit.elastica.mechanics.discretise import Discretisation
 
 
 class ContactGap(NamedTuple):
@@ -57,6 +58,52 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
     return (item.outline.distance(place * length).value - item.radius) / length
 
 
+class SlipWay(NamedTuple):
+    """How far a contact has slipped along what it touches, with its derivatives by the n unknowns that change it."""
+
+    value: Any
+    unknowns: Any  # (n,)
+    gradient: Any  # (n,)
+    hessian: Any  # (n, n)
+
+
+def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> SlipWay:
+    """Return how far the point of a pad that touches has come along an obstacle or a stop, rolling counted.
+
+    The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `near`.
+    """
+    item, length = contact.item, mesh.scales.length
+    at = poses(mesh.attachments, z, [contact.place])
+    place, jacobian, radius = at.place[0], at.jacobian[0], 0.0
+    if isinstance(item, Stop):
+        normal = -_direction(item)
+        along = np.array([normal[1], -normal[0]])
+        value, bend = along @ (place - _place_at_rest(mesh, contact)), np.zeros((2, 2))
+    else:
+        assert isinstance(item, NodeOnObstacle)
+        way, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
+        value, along, bend = way.value / length, way.gradient, way.hessian * length
+        if near is not None and np.isfinite(round_length):
+            value = value - np.rint((np.real(value) - near) * length / round_length) * round_length / length
+        radius = item.radius / length
+    unknowns = at.unknowns[0]
+    hessian = np.zeros((4, 4), np.result_type(bend, jacobian))
+    hessian[:3, :3] = jacobian.T @ bend @ jacobian
+    hessian[2, 2] -= along @ at.arm[0]
+    gradient = np.append(along @ jacobian, radius)
+    if unknowns[2] == unknowns[3]:  # the node turns with its body
+        gradient, hessian, unknowns = gradient[:3], hessian[:3, :3], unknowns[:3]
+        gradient[2] += radius
+    return SlipWay(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
+
+
+def friction_of(contact: ContactAt, z: Any) -> FrictionState:
+    """Return what friction does at a closed contact: as it was set, or as the state says."""
+    if contact.friction is not None:
+        return contact.friction
+    return FrictionState(float(np.rint(np.real(z[contact.flag]))), float(np.real(z[contact.anchor])))
+
+
 def compliance(mesh: Discretisation, contact: ContactAt) -> float:
     """Return by how much a contact yields to a unit force."""
     scales = mesh.scales
@@ -74,6 +121,8 @@ def is_closed(contact: ContactAt, z: Any, gap: Any) -> bool:
 def press(mesh: Discretisation, contact: ContactAt, z: Any) -> Contribution:
     """Return the term of a contact: that of its force where it is closed, else of the condition that it has none."""
     gap, force = measure(mesh, contact, z), z[contact.unknown]
+    if contact.rub >= 0:
+        return _press_and_rub(mesh, contact, z, gap)
     unknowns = np.append(gap.unknowns, contact.unknown)
     count = len(gap.unknowns)
     hessian = np.zeros((count + 1, count + 1), np.result_type(gap.hessian, z.dtype))
@@ -85,6 +134,42 @@ def press(mesh: Discretisation, contact: ContactAt, z: Any) -> Contribution:
     hessian[:count, -1] = hessian[-1, :count] = -gap.gradient
     hessian[-1, -1] = -soft
     gradient = np.append(-force * gap.gradient, -gap.value - soft * force)
+    return Contribution(0.5 * soft * force**2, unknowns, gradient, hessian)
+
+
+def _press_and_rub(mesh: Discretisation, contact: ContactAt, z: Any, gap: ContactGap) -> Contribution:
+    """Return the term of a contact with friction. It has no functional where it slips: its matrix is not symmetric.
+
+    Flag and anchor of a state keep the values that they have.
+    """
+    force, rub = z[contact.unknown], z[contact.rub]
+    state = friction_of(contact, z)
+    slip = slip_way(mesh, contact, z, state.anchor)
+    motions = np.union1d(gap.unknowns, slip.unknowns)
+    pressing, rubbing = np.searchsorted(motions, gap.unknowns), np.searchsorted(motions, slip.unknowns)
+    unknowns, count = np.append(motions, contact.own_unknowns), len(motions)
+    gradient = np.zeros(count + 4, z.dtype)
+    hessian = np.zeros((count + 4, count + 4), np.result_type(gap.hessian, slip.hessian, z.dtype))
+    hessian[[count + 2, count + 3], [count + 2, count + 3]] = -1.0
+    soft = compliance(mesh, contact)
+    if not is_closed(contact, z, gap.value):
+        gradient[count : count + 2] = -force, -rub
+        hessian[[count, count + 1], [count, count + 1]] = -1.0
+        return Contribution(0.0 * force, unknowns, gradient, hessian)
+    gradient[pressing] -= force * gap.gradient
+    gradient[rubbing] -= rub * slip.gradient
+    hessian[np.ix_(pressing, pressing)] -= force * gap.hessian
+    hessian[np.ix_(rubbing, rubbing)] -= rub * slip.hessian
+    hessian[pressing, count] = hessian[count, pressing] = -gap.gradient
+    hessian[rubbing, count + 1] = -slip.gradient
+    gradient[count], hessian[count, count] = -gap.value - soft * force, -soft
+    if state.sense == 0:
+        hessian[count + 1, rubbing], hessian[count + 1, count + 3] = -slip.gradient, 1.0
+        gradient[count + 1] = state.anchor - slip.value
+    else:
+        share = contact.item.friction * state.sense if abs(state.sense) == 1 else 0.0
+        gradient[count + 1] = -rub - share * force
+        hessian[count + 1, count + 1], hessian[count + 1, count] = -1.0, -share
     return Contribution(0.5 * soft * force**2, unknowns, gradient, hessian)
 
 

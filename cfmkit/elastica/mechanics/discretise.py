@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.element_cuts import (
     TAUT,
     MovingCuts,
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
-    from cfmkit.elastica.model.contact import Contact
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
 
@@ -90,20 +90,6 @@ class Attached(NamedTuple):
     item: Any
     places: tuple[int, ...]  # attachments
     grows: bool = False  # with the drive
-
-
-class ContactAt(NamedTuple):
-    """A contact, where it acts, and the unknown that is its force; of the side of a beam also its place."""
-
-    item: Contact
-    place: int  # attachment
-    unknown: int
-    number: int  # in `Network.contacts`
-    closed: bool | None = None  # None: as force and gap say
-    slide: int = -1  # unknown that is the parameter of the beam's shape at which it touches; -1: a node touches
-    element: int = -1  # that ends there
-    laid: int = 0  # -1 or 1: the element before or behind it lies on the obstacle
-    flag: int = -1  # unknown that says the same of a state
 
 
 class FlankPlace(NamedTuple):
@@ -267,6 +253,8 @@ class _ArrayBuilder:
             ContactAt(self.network.contacts[number], place, size + k, number)
             for k, (number, place) in enumerate(touching)
         )
+        behind = size + len(contacts) + 3 * len(flanks)
+        contacts, n_friction = _number_friction(contacts, behind)
         contacts += self._flank_contacts(flanks, elements, size + len(contacts))
         acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
         free, base, rate = self._constraints(size, elements, attachments, acting)
@@ -276,6 +264,7 @@ class _ArrayBuilder:
                 [contact.unknown for contact in contacts]
                 + [contact.slide for contact in sides]
                 + [contact.flag for contact in sides]
+                + list(range(behind, behind + n_friction))
             )
             size += len(more)
             free = np.append(free, more)
@@ -466,6 +455,18 @@ class _ArrayBuilder:
             unknown = self.bodies[node][local % FRAME_OF_DRIVE]
             held[unknown], rate[unknown], base[unknown] = True, sense, 0.0
         return np.flatnonzero(~held), base, rate
+
+
+def _number_friction(contacts: tuple[ContactAt, ...], first: int) -> tuple[tuple[ContactAt, ...], int]:
+    """Return contacts with the unknowns of their friction, numbered from `first` on, and how many these are."""
+    numbered, count = list[ContactAt](), 0
+    for contact in contacts:
+        if contact.item.friction:
+            own = first + count
+            contact = contact._replace(rub=own, flag=own + 1, anchor=own + 2)
+            count += 3
+        numbered.append(contact)
+    return tuple(numbered), count
 
 
 def _sides(contacts: tuple[ContactAt, ...]) -> list[tuple[str, int]]:

@@ -23,6 +23,7 @@ from cfmkit.numerics.dual_array import cos_sin, stack
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.terms import Contribution
 
@@ -182,8 +183,14 @@ def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     Without loads that follow: the negative pivots of L D L^T less one for every component of a section force. Those
     are maxima of the functional, or constraints with one negative and one positive pivot each; so are forces of
     contacts, those of open ones, too. Under loads that follow: the negative real eigenvalues of the motions' stiffness.
+    Where a contact slips the tangent is not symmetric: then 1 where the sign of its determinant says that it has
+    passed a limit point, else 0.
     """
     from scipy.linalg import lapack
+
+    if any(_slips(mesh, contact, tangent) for contact in mesh.contacts if contact.rub >= 0):
+        odd = int((mesh.free >= mesh.n_motions).sum()) % 2
+        return int(np.linalg.slogdet(tangent)[0] * (-1) ** odd < 0)
 
     if any(load.item.follows for load in mesh.loads):
         return int((motion_eigenvalues(mesh, tangent) < 0).sum())
@@ -192,6 +199,14 @@ def count_unstable(mesh: Discretisation, tangent: Any) -> int:
     single = pivots > 0
     negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
     return negative - int((mesh.free >= mesh.n_motions).sum())
+
+
+def _slips(mesh: Discretisation, contact: ContactAt, tangent: Any) -> bool:
+    """Return True if a tangent is that of a contact that slips: its tangential force follows the normal one."""
+    both = np.searchsorted(mesh.free, [contact.unknown, contact.rub])
+    if both[-1] >= len(mesh.free) or (mesh.free[both] != [contact.unknown, contact.rub]).any():
+        return False
+    return bool(tangent[both[1], both[0]] != 0)
 
 
 def motion_eigenvalues(mesh: Discretisation, tangent: Any) -> Any:

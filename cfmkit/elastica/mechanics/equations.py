@@ -300,6 +300,7 @@ def force_units(mesh: Discretisation) -> FloatArray:
     unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / length**2)[:, None]
     unit[[contact.unknown for contact in mesh.contacts]] = 1.0
+    unit[[contact.rub for contact in mesh.contacts if contact.rub >= 0]] = 1.0
     return np.asarray(unit[mesh.free])
 
 

@@ -12,6 +12,8 @@ from cfmkit.elastica.mechanics.element_tables import element_tables
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
+UNKNOWNS_OF_CONTACTS = ("unknown", "slide", "flag", "rub", "anchor")
+
 
 def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     """Return a network with the same elements and a higher degree of their rotations, and with its floors."""
@@ -29,9 +31,7 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     ahead = forces_end - _first_behind_forces(mesh)
     size = mesh.size + ahead
     contacts = tuple(
-        one._replace(unknown=one.unknown + ahead, slide=one.slide + ahead, flag=one.flag + ahead)
-        if one.slide >= 0
-        else one._replace(unknown=one.unknown + ahead)
+        one._replace(**{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(one, name)) >= 0})
         for one in mesh.contacts
     )
     moving = mesh.moving

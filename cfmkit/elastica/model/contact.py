@@ -1,7 +1,8 @@
 """One-sided contacts of nodes: stops that limit a motion, and rigid obstacles that the pad of a node may touch.
 
 A contact has a gap g >= 0 and presses with a force f >= 0, of which one is zero. A gap is positive on the free side.
-Assumes: no friction; an elastic contact yields by f / stiffness along the normal.
+An elastic contact yields by f / stiffness along the normal. Pads of nodes and stops of motions may have Coulomb
+friction: the tangential force is at most friction times f, and as large as that, against the motion, where it slips.
 """
 
 from __future__ import annotations
@@ -34,11 +35,27 @@ class Stop:
     direction: float | None  # [rad]; None: the rotation is limited
     sense: float = 1.0  # of a rotation: 1 counter-clockwise, -1 clockwise
     stiffness: float = math.inf  # [N/m or N m/rad]
+    friction: float = 0.0  # coefficient; of a motion only
 
     @property
     def turns(self) -> bool:
         """True if a rotation is limited: the force is a moment."""
         return self.direction is None
+
+
+class FrictionState(NamedTuple):
+    """What friction does at a contact: in which sense it slips, 0 where it sticks, 2 where there is none; and where."""
+
+    sense: float
+    anchor: float = 0.0  # place along the obstacle at which it sticks, in mean beam lengths
+
+
+class WayAlong(NamedTuple):
+    """How far places are along a line at one distance from an outline, with its derivatives by the place."""
+
+    value: Any  # (...) [m]
+    gradient: Any  # (..., 2)
+    hessian: Any  # (..., 2, 2) [1/m]
 
 
 class Distance(NamedTuple):
@@ -107,6 +124,61 @@ class ObstacleEdge(ShortRepr):
 
         rows: list[list[Any]] = [list(row) for row in zip(*(found for found, _ in candidates), strict=True)]
         return Distance(*map(choose, rows))
+
+    def way_along(self, places: Any, offset: float) -> WayAlong:
+        """Return how far places (..., 2) [m] are along the line at a distance from it: the obstacle to the right.
+
+        Of a closed one it is known but for whole rounds; see `round_length`.
+        """
+        places = np.asarray(places)
+        ways = list[WayAlong]()
+        begins = self._part_begins(offset)
+        found = [*self._from_segments(places), *self._from_arcs(places)]
+        near = np.array([np.where(inside, np.abs(np.real(gap.value)), np.inf) for gap, inside in found])
+        for start, along, begin in zip(self.start, self.along, begins, strict=False):
+            ways.append(WayAlong(begin + (places - start) @ along, along + 0.0 * places, np.zeros((*places.shape, 2))))
+        arcs = zip(self.centre, self.radius, self.first, self.sweep, self.bulge, strict=True)
+        for (centre, radius, first, sweep, bulge), begin in zip(arcs, begins[len(self.start) :], strict=True):
+            away = places - centre
+            reach = np.sqrt((away * away).sum(axis=-1))[..., None]
+            outwards = away / reach
+            across = np.stack([-outwards[..., 1], outwards[..., 0]], axis=-1)
+            angle = np.arctan2(np.real(away[..., 1]), np.real(away[..., 0]))
+            turned = (np.sign(sweep) * (angle - first) + BESIDE_END) % math.tau - BESIDE_END
+            size = -bulge * (radius + bulge * offset)
+            value = np.sign(sweep) * turned + 0j if np.iscomplexobj(places) else np.sign(sweep) * turned
+            if np.iscomplexobj(places):  # by a complex step
+                value = value + 1j * (np.real(across) * np.imag(places)).sum(axis=-1) / np.real(reach[..., 0])
+            both = outwards[..., :, None] * across[..., None, :]
+            bend = -size * (both + np.swapaxes(both, -1, -2)) / (reach * reach)[..., None]
+            ways.append(WayAlong(begin + size * value, size * across / reach, bend))
+        pick = near.argmin(axis=0)
+
+        def choose(values: list[Any]) -> Any:
+            stacked = np.array(values)
+            index = pick.reshape(1, *pick.shape, *(1,) * (stacked.ndim - 1 - pick.ndim))
+            return np.take_along_axis(stacked, index, axis=0)[0]
+
+        return WayAlong(*(choose([way[k] for way in ways]) for k in range(3)))
+
+    def round_length(self, offset: float) -> float:
+        """Return the length of the line at a distance from a closed outline [m]; infinite of an endless one."""
+        lengths = (self.radius + self.bulge * offset) * np.abs(self.sweep)
+        return float(self.length.sum() + lengths.sum()) if self.closed else math.inf
+
+    def _part_begins(self, offset: float) -> list[float]:
+        """Return how far along the line at a distance the segments begin, then the arcs [m]."""
+        ends = [tuple(at) for at in self.start + self.length[:, None] * self.along]
+        arc_at = self.centre + self.radius[:, None] * np.column_stack([np.cos(self.first), np.sin(self.first)])
+        begins, arc_begins, reached = [], [0.0] * len(self.radius), 0.0
+        for end, length in zip(ends, self.length.tolist(), strict=True):
+            begins.append(reached)
+            reached += length
+            for k, at in enumerate(arc_at):
+                if math.dist(at, end) <= BESIDE_END * (1.0 + length) * max(float(self.radius[k]), length):
+                    arc_begins[k] = reached
+                    reached += float((self.radius[k] + self.bulge[k] * offset) * abs(self.sweep[k]))
+        return [*begins, *arc_begins]
 
     def _from_segments(self, places: Any) -> list[tuple[Distance, Any]]:
         found, last = [], len(self.length) - 1
@@ -219,6 +291,7 @@ class NodeOnObstacle:
     outline: ObstacleEdge = field(compare=False)
     radius: float = 0.0  # of the pad [m]
     stiffness: float = math.inf  # [N/m]
+    friction: float = 0.0  # coefficient
 
     @property
     def turns(self) -> bool:
@@ -234,6 +307,7 @@ class BeamOnObstacle:
     beam: str
     outline: ObstacleEdge = field(compare=False)
     stiffness: float = field(default=math.inf, init=False)  # a bed of springs would be another model
+    friction: float = field(default=0.0, init=False)  # with rolling it would depend on the way
 
     @property
     def turns(self) -> bool:

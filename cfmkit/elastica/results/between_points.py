@@ -266,6 +266,9 @@ class BetweenPoints(ShortRepr):
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
         near = self._nearest(wanted, left)
         y = self._guesses(wanted, near)
+        # what friction does between two points is what it does at the later one: it changes at the earlier one, if any
+        later = left + (self._numbers[left + 1] > self._numbers[left])
+        y[:, self._friction_slots] = self.own_unknowns[later][:, self._friction_slots]
         loads = self._loads[near]
         known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
         y[known] = self.own_unknowns[near[known]]
@@ -286,6 +289,13 @@ class BetweenPoints(ShortRepr):
     def _spots(self, y: FloatArray, wanted: FloatArray, _near: FloatArray) -> tuple[SolvedStates, FloatArray]:
         """Return the equilibria at dimensionless places and their drives; `_near`: the drive at the nearest points."""
         return self._equations.solve_each(y, wanted), wanted
+
+    @cached_property
+    def _friction_slots(self) -> Any:
+        """Which free unknowns say what friction does."""
+        contacts = [contact for contact in self.path.mesh.contacts if contact.rub >= 0]
+        said = [unknown for contact in contacts for unknown in (contact.flag, contact.anchor)]
+        return np.flatnonzero(np.isin(self.path.mesh.free, said)) if said else np.empty(0, np.int64)
 
     @cached_property
     def _equations(self) -> NumpyEquations:

@@ -71,11 +71,12 @@ class Event:
 class ContactEvent:
     """The begin or end of a contact, or a contact that blocks the drive; unstable directions before and after."""
 
-    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes"]
+    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes", "slips", "sticks"]
     number: int  # of the contact in `Network.contacts`
     drive: float  # [m, rad or 1]
     before: int
     after: int
+    states: int = 1  # of friction that are possible behind it; the first was taken
 
 
 @dataclass(frozen=True)
@@ -191,6 +192,21 @@ class EquilibriumPath(ShortRepr):
         unit = mesh.scales.moment if self.network.contacts[number].turns else mesh.scales.force
         unknowns = [contact.unknown for contact in mesh.contacts if contact.number == number]
         return read_only(self.at.z[:, unknowns].sum(axis=1) * unit)
+
+    def contact_friction(self, number: int) -> tuple[FloatArray, Any]:
+        """Return the tangential force of the contact of a node, (n,) [N], and what it does: "stick", "slip" or "".
+
+        The force is on the node, positive along what it touches: the free side is to the left.
+        """
+        contact = next(one for one in self.mesh.contacts if one.number == number)
+        if contact.rub < 0:
+            return read_only(np.zeros(len(self))), read_only(np.full(len(self), ""), np.str_)
+        z = self.at.z
+        flags = np.rint(z[:, contact.flag])
+        said = np.where(
+            z[:, contact.unknown] > 0, np.where(flags == 0, "stick", np.where(np.abs(flags) == 1, "slip", "")), ""
+        )
+        return read_only(z[:, contact.rub] * self.mesh.scales.force), read_only(said, np.str_)
 
     def contact_places(self, number: int) -> FloatArray:
         """Return between which places the side of a beam touches at every point, (n, 2) [share of its length].

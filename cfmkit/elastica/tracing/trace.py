@@ -352,7 +352,7 @@ def trace_on(
     path = _path(network, drive, _states(start, meshes, points), points, told, status, message)
     if changes:
         touched = tuple(
-            ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after)
+            ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
             for found in changes.values()
             for one in found
         )

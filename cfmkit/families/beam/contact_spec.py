@@ -21,14 +21,16 @@ from cfmkit.elastica.model.contact import (
     polyline,
 )
 from cfmkit.specs.spec import Model, PositiveLength, Requirement
-from cfmkit.specs.units import Angle, Length, RotationalStiffness, Stiffness, format_short
+from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, format_short
 
 Point = tuple[Length, Length]
 FreeAngle = Annotated[Angle, Field(ge=0)]
 FreeWay = Annotated[Length, Field(ge=0)]
+FrictionCoefficient = Annotated[Ratio, Field(ge=0, lt=2)]
 Fault = tuple[tuple[str | int, ...], str]
 Mechanism = Any
 """The block `mechanism`, which imports this file."""
+FRICTION_COLUMNS = ("tangential", "state")
 OVERLAP = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
 HELD_SUPPORTS = ("clamped", "pinned")  # supports of nodes that are held in place
 LONGEST_POLYLINE = 200  # corners
@@ -54,7 +56,8 @@ class StopBase(Model):
         for sense, gap in zip((-1.0, 1.0), self.gaps, strict=True):
             if gap is not None:
                 along = direction if direction is None or sense > 0 else direction + math.pi
-                yield Stop(name, self.node, gap, along, sense, math.inf if stiffness is None else stiffness)
+                friction: float = getattr(self, "friction", 0.0)
+                yield Stop(name, self.node, gap, along, sense, math.inf if stiffness is None else stiffness, friction)
 
 
 class MotionStop(StopBase):
@@ -67,6 +70,7 @@ class MotionStop(StopBase):
         description="free way before any load: of a motion along the direction, or two: [against, along] it"
     )
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of the stop; default: it is rigid")
+    friction: FrictionCoefficient = Field(0.0, description="coefficient of Coulomb friction across the direction")
 
 
 class RotationStop(StopBase):
@@ -105,10 +109,13 @@ class ObstacleBase(Model):
     beams: tuple[str, ...] | None = Field(
         None,
         description="beams whose sides may touch it, anywhere along their lengths; default: all, none where nodes or "
-        "a stiffness are stated",
+        "a stiffness or friction are stated",
     )
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(
         None, description="of the obstacle at a pad; default: it is rigid"
+    )
+    friction: FrictionCoefficient = Field(
+        0.0, description="coefficient of Coulomb friction of pads; the curve has a way back then, as branch 'unload'"
     )
 
     @abstractmethod
@@ -217,16 +224,24 @@ def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()
         for node, radius in pads_of(mechanism, obstacle).items():
-            found.append(NodeOnObstacle(name, node, outline, radius, obstacle.stiffness or math.inf))
+            stiffness = obstacle.stiffness or math.inf
+            found.append(NodeOnObstacle(name, node, outline, radius, stiffness, obstacle.friction))
         found.extend(BeamOnObstacle(name, beam, outline) for beam in sides_of(mechanism, obstacle))
     return tuple(found)
+
+
+def rubs(mechanism: Mechanism) -> bool:
+    """Return True if a contact has friction: the way back is another one then."""
+    touched = (*mechanism.stops.values(), *mechanism.obstacles.values())
+    return any(getattr(item, "friction", 0.0) for item in touched)
 
 
 def sides_of(mechanism: Mechanism, obstacle: ObstacleBase) -> tuple[str, ...]:
     """Return the beams whose sides may touch an obstacle."""
     if obstacle.beams is not None:
         return obstacle.beams
-    return () if obstacle.nodes is not None or obstacle.stiffness is not None else tuple(mechanism.beams)
+    pads_only = obstacle.nodes is not None or obstacle.stiffness is not None or obstacle.friction
+    return () if pads_only else tuple(mechanism.beams)
 
 
 def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]:
@@ -234,7 +249,7 @@ def pads_of(mechanism: Mechanism, obstacle: ObstacleBase) -> Mapping[str, float]
 
     Where the sides of beams may touch it, so may their ends, but for those that are held in place.
     """
-    if obstacle.nodes is None and obstacle.beams is None and obstacle.stiffness is not None:
+    if obstacle.nodes is None and obstacle.beams is None and (obstacle.stiffness is not None or obstacle.friction):
         return free_ends(mechanism)
     pads = dict(obstacle.nodes) if obstacle.nodes is not None else free_ends(mechanism)
     for name in sides_of(mechanism, obstacle):
@@ -270,6 +285,11 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
     for name, obstacle in mechanism.obstacles.items():
         place = ("obstacles", name, obstacle.kind)
         yield from _side_faults(mechanism, obstacle, place)
+        if obstacle.friction and obstacle.beams:
+            yield (
+                (*place, "friction"),
+                "friction along a beam's flank is not modelled: state 'nodes', or leave out 'friction'",
+            )
         pads = pads_of(mechanism, obstacle)
         if not pads and not sides_of(mechanism, obstacle):
             yield (*place, "nodes"), "no beam ends freely: state the nodes that may touch it, such as {tip: 2 mm}"
@@ -290,6 +310,13 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
     if not (mechanism.stops or mechanism.obstacles):
         return
     yield from _column_faults(mechanism)
+    smooth = [name for name, obstacle in mechanism.obstacles.items() if sides_of(mechanism, obstacle)]
+    if smooth and rubs(mechanism):
+        yield (
+            ("obstacles", smooth[0]),
+            "flanks of beams beside contacts with friction are not modelled: state the 'nodes' that may touch it, "
+            "or leave out 'friction'",
+        )
     for name in mechanism.obstacles:
         if name in mechanism.stops:
             yield ("obstacles", name), "a stop has the same name: rename one of them"
@@ -324,10 +351,16 @@ def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str 
 
 def _column_faults(mechanism: Mechanism) -> Iterator[Fault]:
     seen = {f"{name}_force" for name in mechanism.beams}
-    for place, column in column_names(mechanism):
-        if column in seen:
-            yield place, f"its column {column!r} has the name of another one: rename it"
-        seen.add(column)
+    for place, force in column_names(mechanism):
+        for column in (force, *(friction_columns(force) if rubs(mechanism) else ())):
+            if column in seen:
+                yield place, f"its column {column!r} has the name of another one: rename it"
+            seen.add(column)
+
+
+def friction_columns(column: str) -> tuple[str, ...]:
+    """Return the columns of friction of a contact by the column of its force."""
+    return tuple(f"{column.removesuffix('force')}{what}" for what in FRICTION_COLUMNS)
 
 
 def column_names(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:

@@ -16,7 +16,7 @@ from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.errors import InputError
-from cfmkit.families.beam.contact_spec import OVERLAP, column_names, pads_of, sides_of
+from cfmkit.families.beam.contact_spec import OVERLAP, column_names, friction_columns, pads_of, sides_of
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
@@ -27,7 +27,7 @@ from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
@@ -123,6 +123,8 @@ def _column_names(solution: Solution) -> list[str]:
         names.append(column)
         if isinstance(contacts[numbers[0]], BeamOnObstacle):
             names += [f"{column.removesuffix('force')}{end}" for end in ("from", "to")]
+        if any(contacts[number].friction for number in numbers):
+            names += friction_columns(column)
     return names
 
 
@@ -133,6 +135,14 @@ def _columns(solution: Solution) -> dict[str, Column]:
     for column, numbers in zip(names, groups(path.network.contacts).values(), strict=True):
         contact = path.network.contacts[numbers[0]]
         columns[column] = Column(signed_force(path, numbers)[keep], "torque" if contact.turns else "force")
+        if any(path.network.contacts[number].friction for number in numbers):
+            tangential, state = friction_columns(column)
+            rubbing = [path.contact_friction(number) for number in numbers]
+            signs = [getattr(path.network.contacts[number], "sense", 1.0) for number in numbers]
+            total = np.sum([sign * force for sign, (force, _) in zip(signs, rubbing, strict=True)], axis=0)
+            columns[tangential] = Column(total[keep], "force")
+            said = [np.asarray(states)[keep] for _, states in rubbing]
+            columns[state] = Column(np.array(["".join(each) for each in zip(*said, strict=True)], np.str_), "text")
         if isinstance(contact, BeamOnObstacle):
             places = path.contact_places(numbers[0])[keep]
             for end, values in zip(("from", "to"), places.T, strict=True):
@@ -224,6 +234,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 
 # -- findings ----------------------------------------------------------------------------------------------------------
 FINDINGS = OF_STOPS | {
+    "friction_not_unique": "friction leaves several states at a change of contact: the first of them was taken",
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
     "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
@@ -235,19 +246,41 @@ def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterat
     path = solution.path
     if not path.network.contacts or not len(solution.keep):
         return
-    sentences = [_sentence(solution, event, say(event.drive)) for event in path.contact_events]
     resting = [describe(one) for number, one in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0]
     before = [f"closed before the drive moves: {', '.join(resting)}"] if resting else []
+    yield from change_sentences(solution, say, before)
+    yield from _gap_sentences(solution)
+    yield from _side_sentences(solution, say)
+
+
+def change_sentences(
+    solution: Solution, say: Callable[[float], str], before: Sequence[str] = ()
+) -> Iterator[tuple[str, str]]:
+    """Yield the same on what changes along a curve, behind sentences on what was before it."""
+    path = solution.path
+    sentences = [_sentence(solution, event, say(event.drive)) for event in path.contact_events]
     told = [*before, *(text for text in sentences if text)]
     if told:
         more = f"; and {len(told) - MOST_NAMED} more changes" if len(told) > MOST_NAMED else ""
         yield "contact_begins", "; ".join(told[:MOST_NAMED]) + more
     for event in path.contact_events:
+        if event.states > 1:
+            who = describe(path.network.contacts[event.number])
+            yield (
+                "friction_not_unique",
+                f"where {who} changes at {say(event.drive)}, friction leaves {event.states} states that can go on: "
+                f"{_state_taken(path, event)}",
+            )
         if event.kind == "blocks":
             who = describe(path.network.contacts[event.number])
             yield "blocked", f"the drive is blocked by {who} at {say(event.drive)}"
-    yield from _gap_sentences(solution)
-    yield from _side_sentences(solution, say)
+
+
+def _state_taken(path: Path, event: ContactEvent) -> str:
+    """Return which of several states of friction the curve goes on with: that of the next point."""
+    at = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
+    state = str(path.contact_friction(event.number)[1][min(at + 1, len(path) - 1)])
+    return {"stick": "it sticks here", "slip": "it slides here"}.get(state, "it leaves here")
 
 
 def describe(contact: Contact) -> str:
@@ -267,8 +300,13 @@ def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
             "moves": f"the contact on {contact.name!r} moves between an end and the side of {what!r} at {place}",
             "spreads": f"contact spreads at {place}: {what!r} lies along {contact.name!r} from there on",
             "closes": f"{what!r} no longer lies along {contact.name!r} at {place}",
+            "slips": f"{what!r} slides on {contact.name!r} from {place} on",
+            "sticks": f"{what!r} sticks to {contact.name!r} from {place} on",
         }
         return sentences[event.kind]
+    if event.kind in ("slips", "sticks"):
+        does = "slides on" if event.kind == "slips" else "sticks to"
+        return f"{contact.node!r} {does} stop {contact.name!r} from {place} on"
     if event.kind == "ends":
         return f"stop {contact.name!r} is left at {place}"
     last = float(path.contact_force(event.number)[solution.keep[-1]])

@@ -12,7 +12,7 @@ import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
 from cfmkit.families.beam.contacts import FINDINGS as ON_CONTACTS
-from cfmkit.families.beam.contacts import contact_sentences
+from cfmkit.families.beam.contacts import change_sentences, contact_sentences
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
@@ -457,5 +457,8 @@ def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
 def findings_of(solution: Solution) -> Iterator[Finding]:
     """Yield everything that is wrong with a solved mechanism, or that the user must know about it."""
     yield from findings_of_one(rules_of(solution), finding, solution)
-    for name, message in contact_sentences(solution, partial(drive_text, solution.assembly)):
+    say = partial(drive_text, solution.assembly)
+    for name, message in contact_sentences(solution, say):
         yield finding(name, message)
+    for name, message in change_sentences(solution.back, say) if solution.back is not None else ():
+        yield finding(name, f"on the way back: {message}")

@@ -24,6 +24,7 @@ from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
+from cfmkit.families.beam.contact_spec import rubs
 from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_sides_in_obstacles
 from cfmkit.families.beam.curve_along_its_motion import travel_of
 from cfmkit.families.beam.findings import findings_of
@@ -34,6 +35,7 @@ from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, 
 from cfmkit.families.beam.scalar_results import QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
+from cfmkit.families.beam.there_and_back import both_ways, join_ways, part_ways
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
 from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.one_blas_thread import one_blas_thread
@@ -87,7 +89,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
-        closed=solution.everywhere,
+        closed=solution.everywhere if solution.back is None else both_ways(solution),
         winding=solution.winding,
         ends=_ends(solution),
         effort_error=solution.effort_error,
@@ -108,9 +110,14 @@ def solve(spec: BeamSpec) -> Solution:
     _refuse_tight_coils(assembly)
     _refuse_torn_beams(assembly)
     refuse_sides_in_obstacles(assembly)
-    path = trace(assembly.network, assembly.drive(), assembly.control())
-    keep, ends = _keep_points(assembly, path)
-    return Solution(assembly, path, keep, ends)
+    if not rubs(spec.mechanism):
+        path = trace(assembly.network, assembly.drive(), assembly.control())
+        return Solution(assembly, path, *_keep_points(assembly, path))
+    drive = assembly.drive()
+    there_and_back = replace(drive, points=np.concatenate([drive.points, drive.points[-2::-1]]))
+    load, unload = part_ways(trace(assembly.network, there_and_back, assembly.control()), len(drive.points))
+    back = None if unload is None else Solution(assembly, unload, *_keep_points(assembly, unload))
+    return Solution(assembly, load, *_keep_points(assembly, load), back)
 
 
 def _refuse_tight_coils(assembly: Assembly) -> None:
@@ -190,7 +197,14 @@ def _ending(solution: Solution) -> tuple[Status, str]:
 
 
 def _curve(solution: Solution) -> Curve:
-    """Return the curve with stresses and the forces of each beam."""
+    """Return the curve with stresses and the forces of each beam; with friction also of the way back."""
+    columns = _columns(solution)
+    if solution.back is None:
+        return _curve_of(solution, columns, solution.stable)
+    return join_ways(*(_curve_of(way, _columns(way), way.stable) for way in (solution, solution.back)))
+
+
+def _columns(solution: Solution) -> LazyColumns:
     path, outputs = solution.path, solution.spec.analysis.outputs
     columns = {
         "max_stress": lambda: Column(solution.stress, "stress"),
@@ -210,7 +224,7 @@ def _curve(solution: Solution) -> Curve:
         columns["load_factor"] = lambda: Column(path.drive[solution.keep], "factor")
     if solution.spec.analysis.modes and solution.assembly.masses() is not None:
         columns |= _frequencies(solution)
-    return _curve_of(solution, columns, solution.stable)
+    return columns
 
 
 def _curve_of(solution: Solution, columns: LazyColumns, stable: Any) -> Curve:

@@ -49,6 +49,7 @@ class Solution(ShortRepr):
     # (n,) which points of the path make the curve: those requested, or all where the path is followed through folds
     keep: Any
     ends: Any = ()  # (m,) points of the path at which windows end between two points of the curve
+    back: Solution | None = None  # the way back from the end, which friction makes another one
 
     @property
     def spec(self) -> BeamSpec:
