@@ -241,11 +241,13 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
     ------
     cfmkit.errors.InputError
         If a variable changes the make-up of the network, moves a corner of a beam and a step of its thickness past
-        each other, or moves one side of a step only; and where sides of beams may touch an obstacle. Outputs raise it
-        where the tangent is singular at a point.
+        each other, or moves one side of a step only; where sides of beams may touch an obstacle, or contacts have
+        friction. Outputs raise it where the tangent is singular at a point.
     """
     if any(isinstance(contact, BeamOnObstacle) for contact in path.network.contacts):
         raise InputError("derivatives by design variables are not known where sides of beams touch obstacles")
+    if any(contact.friction for contact in path.network.contacts):
+        raise InputError("derivatives by design variables are not known where contacts have friction")
     x = np.asarray(variables, dtype=float)
     pairs = []
     for k in range(len(x)):

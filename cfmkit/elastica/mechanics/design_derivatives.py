@@ -26,8 +26,8 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.designs import design_of
-from cfmkit.elastica.mechanics.discretise import ContactAt
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses

@@ -24,10 +24,10 @@ SAME_PLACE = 1e-9  # share of the range within which an event is at a point
 
 def part_ways(path: Path, count: int) -> tuple[Path, Path | None]:
     """Return the parts of a path up to the last of `count` requested values, and behind it; None if it ends before."""
-    turn = np.flatnonzero(path.requested == count - 1)
-    if not len(turn) or turn[0] == len(path) - 1:
+    turns = np.flatnonzero(path.requested == count - 1)
+    if not len(turns) or turns[0] == len(path) - 1:
         return path, None
-    turn, last = int(turn[0]), len(path)
+    turn, last = int(turns[0]), len(path)
     places = list(_points_of_events(path))
     events = path.contact_events
     load, unload = path.take(np.arange(turn + 1)), path.take(np.arange(turn, last))
@@ -76,8 +76,8 @@ def both_ways(solution: Solution) -> BothWays | None:
     there, back = solution.everywhere, solution.back.everywhere if solution.back is not None else None
     if there is None or back is None:
         return None
-    ends = [(float(way.own_points[0]), float(way.own_points[-1])) for way in (there, back)]
-    return BothWays({"load": there, "unload": back}) if np.allclose(*ends, rtol=0, atol=1e-12) else None
+    first, second = (np.array([way.own_points[0], way.own_points[-1]]) for way in (there, back))
+    return BothWays({"load": there, "unload": back}) if np.allclose(first, second, rtol=0, atol=1e-12) else None
 
 
 @dataclass(frozen=True, eq=False)

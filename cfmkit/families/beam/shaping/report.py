@@ -115,7 +115,7 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
         yield f"{task.contact!r} is not touched all over the window"
     elif band is None:
         yield f"the analysis ends before the window does: {result.message}"
-    elif task.objective == "range" and band is not None and band > task.half_band:
+    elif task.objective == "range" and band > task.half_band:
         yield f"over the requested window the force is within ± {percent(band)} only"
     allowed = task.allowable_stress
     if allowed is not None and stress is not None and stress > allowed:

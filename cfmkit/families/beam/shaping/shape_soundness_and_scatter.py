@@ -125,7 +125,8 @@ def scatter_within_tolerances(variables: Variables, found: Found, spread: Networ
 
 def _force_at_requested(task: Task, path: Path) -> FloatArray:
     """Return the force that is to be constant at the requested points of a path."""
-    return task.force(path)[path.at_requested]
+    force: FloatArray = task.force(path)[path.at_requested]
+    return force
 
 
 def crossing(task: Task, path: Path, pose: int) -> bool:

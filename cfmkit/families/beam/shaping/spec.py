@@ -159,6 +159,9 @@ def _contact_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tu
         yield ("contact",), f"there is no stop or obstacle {wanted.contact!r}; there are: {listed}"
     if isinstance(mechanism.stops.get(wanted.contact or ""), RotationStop):
         yield ("contact",), f"the stop {wanted.contact!r} limits a rotation: its force is a moment"
+    for name, contact in (*mechanism.stops.items(), *mechanism.obstacles.items()):
+        if getattr(contact, "friction", 0.0):
+            yield (), f"shapes are searched without friction: leave out 'friction' of {name!r}"
     for name, obstacle in mechanism.obstacles.items():
         if sides_of(mechanism, obstacle):
             yield (), f"shapes are searched with pads on obstacles only: state 'nodes' alone of 'obstacles.{name}'"
