@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
+from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, list_phrases
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
 from cfmkit.specs.leaves import stated_leaves
 from cfmkit.specs.own_metrics import name_of
+from cfmkit.specs.sensitivity_methods import MethodWord, describe_methods, describe_samples
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
     DIMENSIONS,
@@ -92,6 +94,11 @@ class Analysis(Model):
 
 SweepValue = str | int | float | bool
 
+if TYPE_CHECKING:
+    Combine = str
+else:
+    Combine = Literal["grid", "zip", *SAMPLE_KINDS]
+
 
 class SolidAnalysis(Model):
     """Solution of the part as a planar solid."""
@@ -115,22 +122,20 @@ class Sweep(Model):
     vary: dict[str, str | tuple[SweepValue, ...]] = Field(
         description="dotted path: 'start:stop:n' with units, e.g. '8 mm:16 mm:5', or a list of values", min_length=1
     )
-    combine: Literal["grid", "zip", "lhs", "sobol"] = Field(
+    combine: Combine = Field(
         "grid",
-        description=(
-            "all combinations, values in step, a Latin hypercube or a Sobol sequence; "
-            "ranges of the last two are 'start:stop'"
-        ),
+        description=f"all combinations, values in step, {list_phrases()}; ranges of what is drawn are 'start:stop'",
     )
-    samples: int | None = Field(None, ge=1, description="points of a Latin hypercube or a Sobol sequence")
+    samples: int | None = Field(None, ge=1, description=f"points of {list_phrases()}")
     design: bool = Field(False, description="redesign the mechanism at each point")
     metrics: tuple[str, ...] = Field((), description="columns of results.csv; default: all metrics and values")
     curves: bool = Field(False, description="keep the curve of every point in curves.csv")
 
     @model_validator(mode="after")
     def _samples_where_drawn(self) -> Self:
-        if (self.combine in ("lhs", "sobol")) != (self.samples is not None):
-            raise ValueError("'samples' and 'combine: lhs' or 'sobol' belong together: give both or neither")
+        if (self.combine in SAMPLE_KINDS) != (self.samples is not None):
+            kinds = "' or '".join(SAMPLE_KINDS)
+            raise ValueError(f"'samples' and 'combine: {kinds}' belong together: give both or neither")
         return self
 
 
@@ -172,18 +177,12 @@ class Sensitivity(Model):
     removed_keys: ClassVar[dict[str, str]] = {
         "on_failure": "samples without a result are counted and reported; indices that need them are not stated"
     }
-    method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] = Field(
-        "oat",
-        description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances, or the "
-        "tolerances that keep `min_yield`",
-    )
+    method: MethodWord = Field("oat", description=describe_methods())
     parameters: dict[str, tuple[MetricValue, MetricValue] | Tolerance] = Field(
         min_length=1, description="dotted path: a range [199 mm, 201 mm] or a tolerance {normal: 0.1 mm}"
     )
     correlated: tuple[Correlated, ...] = Field((), description="parameters that deviate together; for tolerances")
-    samples: int | None = Field(
-        None, ge=2, description="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts"
-    )
+    samples: int | None = Field(None, ge=2, description=describe_samples())
     seed: int | None = Field(None, ge=0, description="seed of all random numbers; `--seed` takes precedence")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
