@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from cfmkit.api import AnySpec, Metric
     from cfmkit.specs.sensitivity_methods import MethodWord
-    from cfmkit.specs.spec import Combine, Spec
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.study_spec import Combine
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.serial_and_cluster_executors import Executor
 

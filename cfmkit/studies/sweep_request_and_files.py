@@ -20,7 +20,8 @@ from cfmkit.studies.varied_axes import WantedVariation, axes, collect_variations
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.specs.spec import Combine, Spec
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.study_spec import Combine
     from cfmkit.store.safe_disk_changes import Data
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan

@@ -180,7 +180,7 @@ def test_signatures_name_every_argument(name):
 
 
 def test_signatures_have_the_keys_of_the_blocks_that_they_stand_for():
-    from cfmkit.specs.spec import Sensitivity, Sweep
+    from cfmkit.specs.study_spec import Sensitivity, Sweep
     from cfmkit.studies.suggest.spec import SuggestBlock
 
     for function, block, others in (

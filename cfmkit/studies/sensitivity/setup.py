@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.metrics import Outcome
     from cfmkit.results import Quantity, Result
-    from cfmkit.specs.spec import Requirement, Sensitivity, Spec
+    from cfmkit.specs.spec import Requirement, Spec
+    from cfmkit.specs.study_spec import Sensitivity
     from cfmkit.specs.units import Ends
     from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.point_evaluation import Metric
