@@ -15,6 +15,8 @@ import spare_family
 import cfmkit
 from cfmkit import families
 
+pytestmark = pytest.mark.lists
+
 CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"
 VARY = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
 
