@@ -1,6 +1,6 @@
 """Methods of a sensitivity study by name: what a specification and the command line need to know of them.
 
-What a method does is `METHOD` in the module named here: `cfmkit.studies.sensitivity.method`.
+What a method does is `METHOD` in the module of its name, which studies look up.
 """
 
 from __future__ import annotations
@@ -17,11 +17,6 @@ class MethodName:
     phrase: str  # what it is, in a few words
     samples: str  # what `sensitivity.samples` is the number of; empty: it chooses its own steps
     default_samples: int
-
-    @property
-    def home(self) -> str:
-        """Module that has the method."""
-        return f"cfmkit.studies.sensitivity.{self.name}"
 
 
 METHOD_NAMES: dict[str, MethodName] = {

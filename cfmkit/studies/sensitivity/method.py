@@ -30,6 +30,6 @@ class Method:
 
 
 def method_named(name: str) -> Method:
-    """Return the method of one of the names in `METHOD_NAMES`."""
-    method: Method = import_module(METHOD_NAMES[name].home).METHOD
+    """Return the method of one of the names in `METHOD_NAMES`: that of the module beside this one with that name."""
+    method: Method = import_module(f".{METHOD_NAMES[name].name}", __package__).METHOD
     return method
