@@ -114,8 +114,10 @@ def test_a_template_lists_the_words_of_a_choice(name):
     text = template(name)
     assert "{words of" not in text
     if name == "vcfm":
-        assert "structure: v-beam             # v-beam, cosine, hybrid\n" in text
-        assert "structure: diamond            # diamond, folded, straight, u-shape\n" in text
+        from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
+
+        assert f"structure: v-beam             # {', '.join(LEAF_KINDS)}\n" in text
+        assert f"structure: diamond            # {', '.join(SPRING_KINDS)}\n" in text
 
 
 @pytest.mark.lists

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 
@@ -12,15 +12,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.studies.sensitivity.evaluation import Evaluator
-    from cfmkit.studies.sensitivity.result_types import Findings
-    from cfmkit.studies.sensitivity.setup import Setup
 
 
 @dataclass(frozen=True)
 class Method:
     """Record of a method."""
 
-    run: Callable[[Setup, Evaluator], Findings]
+    run: Callable[[Any, Evaluator], Any]  # from the `Setup`, which has this record, to `Findings`
     count_points: Callable[[int, int, int], int]  # of samples, parameters and groups of them; none is drawn again
     indices: tuple[str, ...]  # on the page; the first that a parameter has says in which order
     # end of a file name -> function of `cfmkit.plots.sensitivity` that draws one metric

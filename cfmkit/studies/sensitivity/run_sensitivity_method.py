@@ -26,6 +26,7 @@ def carry_out(setup: Setup, compute: Callable[[Work], Records]) -> Findings:
     """
     evaluator = Evaluator(setup.study, setup.parameters, compute, by_role=setup.record.by_role)
     try:
-        return setup.record.run(setup, evaluator)
+        found: Findings = setup.record.run(setup, evaluator)
     except Interrupted:
         return Findings(setup, evaluator, interrupted=True)
+    return found
