@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import BAD, Document, GridColumn, Note, PageTable, ValueRow, Written, name_in_words
 from cfmkit.documents.run_document import value_and_bounds, warning_of
 from cfmkit.metrics.metric_definitions import words
+from cfmkit.studies.sensitivity.monte_carlo_yield import VARIANCE_DROP, YIELD_GAIN
 from cfmkit.studies.sensitivity.output import by_interval, exit_code, message, warnings, yield_ok
 from cfmkit.studies.sensitivity.result_types import IN_UNITS
 
@@ -17,17 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.share import Share
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
-INDICES = {
-    "oat": ("swing", "normalised_slope"),
-    "local": ("normalised_slope", "gradient"),
-    "morris": ("mu_star", "sigma"),
-    "sobol": ("total_order", "first_order"),
-    "tolerance": ("yield_gain_when_halved", "variance_drop_when_halved"),
-    "inverse": ("tolerance_alone", "tolerance_together", "tolerance_allocated"),
-}
-"""Indices on the page; the first says in which order."""
-
-PERCENT = INDICES["tolerance"]
+PERCENT = (YIELD_GAIN, VARIANCE_DROP)
+"""Indices that are shown in percent."""
 
 NO_INFLUENCE = 1e-12
 """An index below this is the rounding of a difference of numbers near 1 (2e-16 each), not an influence."""
@@ -103,7 +96,7 @@ def share_of(one: Share) -> str:
 def _rankings(found: Findings) -> Iterator[PageTable]:
     shares = {metric.label for metric in found.setup.study.metrics if metric.dimension == "ratio"}
     for metric, each in _by_metric(found).items():
-        indices = [name for name in INDICES[found.setup.method] if any(name in lines for lines in each.values())]
+        indices = [name for name in found.setup.record.indices if any(name in lines for lines in each.values())]
         ranked = enumerate(indices)
         heads = (
             GridColumn(_in_words(metric)),
@@ -131,13 +124,13 @@ def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
     tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
     for one in found.lines:
         tree[one.metric][one.parameter][one.index] = one
-    return {metric: dict(sorted(each.items(), key=_rank)) for metric, each in tree.items()}
+    rank = partial(_rank, found.setup.record.indices)
+    return {metric: dict(sorted(each.items(), key=rank)) for metric, each in tree.items()}
 
 
-def _rank(item: tuple[str, dict[str, IndexLine]]) -> float:
+def _rank(indices: tuple[str, ...], item: tuple[str, dict[str, IndexLine]]) -> float:
     """Return how far up a parameter stands: largest first, those without a value before all."""
-    names = [names[0] for names in INDICES.values()] + ["variance_drop_when_halved"]
-    line = next((item[1][name] for name in names if name in item[1]), None)
+    line = next((item[1][name] for name in indices if name in item[1]), None)
     return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
 
 

@@ -7,9 +7,9 @@ over a curve, `requirements` compares with bounds, `metrics_json` writes border 
 
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
 from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window, restrict, traces
+from cfmkit.metrics.definition import Definition
 from cfmkit.metrics.metric_definitions import (
     TABLE,
-    Definition,
     definition_of,
     definitions,
     known_metrics,

@@ -1,4 +1,4 @@
-"""The table of constant-force metrics: each by name, with dimension, definition, source and function.
+"""The table of constant-force metrics by their names; definitions stand beside the functions.
 
 A metric of a force curve is called ``force_mean``; of a torque curve, where it
 is a torque over an angle, ``torque_mean``. Names without ``force_`` are the same
@@ -17,224 +17,22 @@ Sources
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.metrics import ranges, window_metrics
-from cfmkit.metrics.spread import STATIC_BALANCE
+from cfmkit.metrics.definition import Definition
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Kind
 
 
-Worst = Literal["largest", "smallest", "farthest-from-target"]
-Scope = Literal["branch", "cycle", "loop", "value"]
-
-_PLACEHOLDERS: Mapping[Kind, Mapping[str, str]] = {
-    "force": {"effort": "force", "motion": "length", "work": "energy"},
-    "torque": {"effort": "torque", "motion": "angle", "work": "energy"},
-}
-_WORDS = {"force": "displacement", "torque": "angle"}
-
-
-@dataclass(frozen=True)
-class Definition:
-    """Definition of a metric."""
-
-    name: str  # as requirements and tables call it
-    dimension: str  # a name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve
-    definition: str  # one sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words
-    # takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`; None: the family computes it and
-    # puts it into `Result.values`
-    function: Callable[..., float] | None = None
-    worst: Worst = "largest"  # which branch counts where none is named; without a target the farthest is the smallest
-    # what it belongs to: one branch; all branches together, or one of them alone; the closed loop only; or no curve at
-    # all
-    scope: Scope = "branch"
-    windowed: bool = True  # whether it looks only inside the window
-    argument: str = ""  # what stands in its brackets in place of a branch: a dimension, or nothing
-    of_material: bool = False  # whether it is there only where the material says something about use
-    of_curve: bool = False  # whether it is there only where a target curve is
-    of_parts: bool = False  # whether it is there only where the model knows the efforts of single springs and members
-
-    @property
-    def per_branch(self) -> bool:
-        """Whether ``name[branch]`` means something."""
-        return self.scope in ("branch", "cycle") and not self.argument
-
-    def of(self, kind: Kind) -> Definition:
-        """Return the definition in the words and units of one kind of curve."""
-        text = self.definition.replace("{effort}", kind).replace("{motion}", _WORDS[kind])
-        return replace(self, dimension=_PLACEHOLDERS[kind].get(self.dimension, self.dimension), definition=text)
-
-
-_TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
-_DING = "[Ding 2022, sec. 6.2]"
-_LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
-
-_IN_WINDOW = (
-    Definition(
-        "force_mean",
-        "effort",
-        f"mean {{effort}} over the points in the window, its ends included {_TABLE_3}",
-        window_metrics.mean,
-        "farthest-from-target",
-    ),
-    Definition(
-        "force_sd",
-        "effort",
-        f"standard deviation (n - 1) of the {{effort}} over the points in the window {_TABLE_3}",
-        window_metrics.standard_deviation,
-    ),
-    Definition("force_max", "effort", f"largest {{effort}} in the window {_TABLE_3}", window_metrics.largest),
-    Definition(
-        "force_min", "effort", f"smallest {{effort}} in the window {_TABLE_3}", window_metrics.smallest, "smallest"
-    ),
-    Definition(
-        "force_ripple",
-        "ratio",
-        f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING}",
-        window_metrics.ripple,
-    ),
-    Definition(
-        "half_band",
-        "ratio",
-        "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
-        window_metrics.half_band,
-    ),
-    Definition(
-        "deviation_from_mean",
-        "ratio",
-        f"largest |F - mean|/mean of the {{effort}} in the window {_DING}",
-        window_metrics.deviation_from_mean,
-    ),
-    Definition(
-        "deviation_from_target",
-        "ratio",
-        "largest |F - target|/target of the {effort} in the window",
-        window_metrics.deviation_from_target,
-    ),
-    Definition(
-        "rms_to_target",
-        "effort",
-        "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
-        "the start of the window excluded [Bilancia 2019, eq. 8]",
-        window_metrics.rms_to_target,
-    ),
-    Definition(
-        "deviation_from_curve",
-        "ratio",
-        "largest |F - F*| of the {effort} over the largest |F*| in the window, F* the curve of `design.target` or "
-        "`analysis.target`",
-        window_metrics.deviation_from_curve,
-        of_curve=True,
-    ),
-    Definition(
-        "rms_to_curve",
-        "effort",
-        "sqrt(mean((F - F*)^2)) of the {effort} at 100 places uniform in the {motion}, the start of the window "
-        "excluded, F* the curve of `design.target` or `analysis.target`",
-        window_metrics.rms_to_curve,
-        of_curve=True,
-    ),
-    Definition(
-        STATIC_BALANCE,
-        "ratio",
-        "largest |F| of the {effort} in the window over the largest {effort} of one spring or member there, which is "
-        "the derivative of its energy by the {motion}; 0 is a perfect balancer",
-        window_metrics.static_balance,
-        of_parts=True,
-    ),
-)
-
-_RANGES = (
-    Definition("range_95", "motion", f"d - c: {_LAN}", ranges.range_95, "smallest", windowed=False),
-    Definition(
-        "range_95_fraction", "ratio", f"(d - c)/d: {_LAN}", ranges.range_95_fraction, "smallest", windowed=False
-    ),
-    *(
-        Definition(
-            name,
-            "motion",
-            f"widest interval around the reference pose (default: the centre of the window; for the springs of a "
-            f"slider-crank the stretched position, or half the travel of a force) in which the {{effort}} "
-            f"is within {percent} % of that at the pose [Li, Hao 2019, eq. 32]",
-            function,
-            "smallest",
-            windowed=False,
-        )
-        for name, percent, function in (
-            ("band_range_05pct", "0.5", ranges.band_range_05pct),
-            ("band_range_1pct", "1", ranges.band_range_1pct),
-            ("band_range_5pct", "5", ranges.band_range_5pct),
-        )
-    ),
-    *(
-        Definition(
-            name,
-            "motion",
-            f"{what} of the longest part of the travel on which every branch stays within the {{effort}} band (around "
-            "the target, else around the mean in the window), the allowable stress and its valid range",
-            function,
-            "smallest",
-            "cycle",
-            windowed=False,
-        )
-        for name, what, function in (
-            ("usable_stroke", "length", ranges.usable_stroke),
-            ("usable_start", "start", ranges.usable_start),
-            ("usable_end", "end", ranges.usable_end),
-        )
-    ),
-)
-
-_LOADS = (
-    Definition(
-        "hysteresis_area",
-        "work",
-        "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
-        "[Sanchez-Salinas 2022, sec. 3]",
-        window_metrics.hysteresis_area,
-        scope="loop",
-    ),
-    Definition("stress_max", "stress", "largest stress in the window, of all load cases", window_metrics.stress_max),
-    Definition(
-        "safety_factor",
-        "factor",
-        "allowable stress over the largest stress in the window, of all load cases; 1 or more is within the limit",
-        window_metrics.safety_factor,
-        "smallest",
-    ),
-)
-
-_LONG_TERM = (
-    Definition(
-        "fatigue_life",
-        "count",
-        "cycles to failure between the least and the largest stress in the window, of all load cases, by the "
-        "material's `fatigue` with Goodman's line",
-        window_metrics.fatigue_life,
-        "smallest",
-        of_material=True,
-    ),
-    Definition(
-        "force_after",
-        "effort",
-        "mean {effort} in the window after a hold of the time in brackets, as in `force_after[1000 h]`: it follows "
-        "the material's `relaxation`",
-        window_metrics.effort_after,
-        "smallest",
-        argument="time",
-        of_material=True,
-    ),
-)
-
-TABLE = (*_IN_WINDOW, *_RANGES, *_LOADS, *_LONG_TERM)
+TABLE = (*window_metrics.IN_WINDOW, *ranges.TRAVELS, *window_metrics.LOADS, *window_metrics.LONG_TERM)
 """Every metric of the contract, in the order in which they are shown."""
 
 

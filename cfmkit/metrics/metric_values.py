@@ -18,7 +18,6 @@ from cfmkit.metrics.branch_views import MeasuringFrame, span_text
 from cfmkit.metrics.branches_cut_to_window import Undefined, Window, covers, traces
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
 from cfmkit.metrics.metric_definitions import (
-    Definition,
     definitions,
     metrics_by_name,
     split_name,
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
+    from cfmkit.metrics.definition import Definition
     from cfmkit.results import Result
     from cfmkit.specs.units import Ends
 

@@ -7,7 +7,7 @@ which an extreme may stand, the same ends that are solved for. Curves may have d
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,8 +17,9 @@ from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
 from cfmkit.metrics.continuous_means_and_extremes import FEW, extremes, mean_of_rows
+from cfmkit.metrics.metric_definitions import definitions
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches
-from cfmkit.metrics.spread import STATIC_BALANCE, ManyWindows, metric_of, metrics_of, static_balance
+from cfmkit.metrics.spread import ManyWindows, static_balance
 from cfmkit.metrics.window_metrics import NO_STRESS
 
 if TYPE_CHECKING:
@@ -179,6 +180,10 @@ class RowsInWindow:
     def is_known(self) -> NDArray[np.bool_]:
         """Which curves reach both ends and have an effort at every point between."""
         return self.covered & np.isfinite(self.many.mean)
+
+    def where_known(self, values: FloatArray) -> FloatArray:
+        """Return values of curves; NaN for those that are not known all over the window."""
+        return np.where(self.is_known, values, np.nan)
 
     @cached_property
     def _cut(self) -> Ends:
@@ -356,13 +361,11 @@ CYCLE: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] = {
 }
 """Metrics of all branches together."""
 
-WINDOWED: Mapping[str, Callable[[RowsInWindow], FloatArray]] = {
-    STATIC_BALANCE: RowsInWindow.static_balance,
-    "rms_to_target": RowsInWindow.rms_to_target,
-    "stress_max": RowsInWindow.stress_max,
-    "safety_factor": RowsInWindow.safety_factor,
-}
-"""Metrics of one branch whose window must be covered, beside those of `spread`."""
+
+@lru_cache(maxsize=4)
+def _functions(kind: Kind) -> Mapping[str, Callable[[RowsInWindow], FloatArray] | None]:
+    """Return the functions of metrics of one branch of many curves, by name."""
+    return {item.name: item.of_rows for item in definitions(kind)}
 
 
 def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mapping[str, FloatArray] | None:
@@ -388,11 +391,7 @@ def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mappi
             return {"": _loop_area(branches)}
         if name in RANGES:
             return {branch: one.range_of(name) for branch, one in branches.items()}
-        if name in WINDOWED:
-            return {branch: np.where(one.is_known, WINDOWED[name](one), np.nan) for branch, one in branches.items()}
-        if name in metrics_of(kind):
-            return {
-                branch: np.where(one.covered, metric_of(name, one.many, one.curves.target), np.nan)
-                for branch, one in branches.items()
-            }
+        function = _functions(kind).get(name)
+        if function is not None:
+            return {branch: np.where(one.covered, function(one), np.nan) for branch, one in branches.items()}
     return None

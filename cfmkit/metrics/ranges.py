@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branches_cut_to_window import Undefined
+from cfmkit.metrics.definition import Definition
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -99,3 +100,46 @@ def _usable(cycle: Cycle) -> Interval:
     if cycle.usable is None:
         raise Undefined("no part of the travel is usable")
     return cycle.usable
+
+
+_LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
+
+TRAVELS = (
+    Definition("range_95", "motion", f"d - c: {_LAN}", range_95, worst="smallest", windowed=False),
+    Definition("range_95_fraction", "ratio", f"(d - c)/d: {_LAN}", range_95_fraction, worst="smallest", windowed=False),
+    *(
+        Definition(
+            name,
+            "motion",
+            f"widest interval around the reference pose (default: the centre of the window; for the springs of a "
+            f"slider-crank the stretched position, or half the travel of a force) in which the {{effort}} "
+            f"is within {percent} % of that at the pose [Li, Hao 2019, eq. 32]",
+            function,
+            worst="smallest",
+            windowed=False,
+        )
+        for name, percent, function in (
+            ("band_range_05pct", "0.5", band_range_05pct),
+            ("band_range_1pct", "1", band_range_1pct),
+            ("band_range_5pct", "5", band_range_5pct),
+        )
+    ),
+    *(
+        Definition(
+            name,
+            "motion",
+            f"{what} of the longest part of the travel on which every branch stays within the {{effort}} band (around "
+            "the target, else around the mean in the window), the allowable stress and its valid range",
+            function,
+            worst="smallest",
+            scope="cycle",
+            windowed=False,
+        )
+        for name, what, function in (
+            ("usable_stroke", "length", usable_stroke),
+            ("usable_start", "start", usable_start),
+            ("usable_end", "end", usable_end),
+        )
+    ),
+)
+"""Metrics that are lengths of travel, in the order in which they are shown."""

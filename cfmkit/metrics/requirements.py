@@ -12,7 +12,6 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.metric_definitions import (
-    Definition,
     branch_fault,
     known_metrics,
     split_name,
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.metrics.branches_cut_to_window import Window
+    from cfmkit.metrics.definition import Definition
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Spec
 

@@ -183,34 +183,4 @@ class ManyWindows:
         return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.effort[:, 1:] + self.effort[:, :-1])))
 
 
-OF_EFFORT: dict[str, Callable[[ManyWindows], FloatArray]] = {
-    "mean": lambda many: many.mean,
-    "sd": lambda many: many.deviation,
-    "max": lambda many: many.extremes[0],
-    "min": lambda many: many.extremes[1],
-    "ripple": lambda many: ripple(many.spread),
-}
-"""Metrics whose names begin with ``force_`` or ``torque_``."""
-
-OF_EITHER: dict[str, Callable[[ManyWindows], FloatArray]] = {
-    "half_band": lambda many: half_band(many.spread),
-    "deviation_from_mean": lambda many: deviation_from_mean(many.spread),
-}
-"""Metrics that are called the same for forces and torques."""
-
-TO_TARGET = "deviation_from_target"
-
 STATIC_BALANCE = "static_balance"
-
-
-def metrics_of(kind: str) -> frozenset[str]:
-    """Return the names of the metrics of a `ManyWindows` whose effort is a ``force`` or a ``torque``."""
-    return frozenset((*(f"{kind}_{name}" for name in OF_EFFORT), *OF_EITHER, TO_TARGET))
-
-
-def metric_of(name: str, many: ManyWindows, target: FloatArray | float | None) -> FloatArray:
-    """Return one of `metrics_of` of each curve, (d,); NaN where it is undefined."""
-    if name == TO_TARGET:
-        wanted = np.broadcast_to(np.nan if target is None else target, len(many.mean))
-        return np.asarray(deviation_from_target(many.spread, wanted))
-    return OF_EITHER[name](many) if name in OF_EITHER else OF_EFFORT[name.partition("_")[2]](many)

@@ -1,5 +1,7 @@
 """Metrics of what lies inside the window: statistics, deviations, hysteresis, stress, cycles to failure.
 
+Each has its function and, in the tables at the end, its definition.
+
 A branch whose mean is negative is judged in its own direction (the opposite sign
 convention gives the same ripple). Each function takes a `Branch` (or the
 `Cycle`) and returns SI, or raises `Undefined` with the reason.
@@ -16,6 +18,7 @@ import numpy as np
 from cfmkit.metrics import ranges_many, spread, winding_branches
 from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.metrics.definition import Definition
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 from cfmkit.results import LargestStress, OwnStress
 
@@ -232,3 +235,152 @@ def effort_after(branch: Branch, time: float) -> float:
     if known is None or known.relaxation is None:
         raise Undefined("the material has no relaxation data: add 'relaxation' to it")
     return float(branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time))
+
+
+_TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
+_DING = "[Ding 2022, sec. 6.2]"
+
+IN_WINDOW = (
+    Definition(
+        "force_mean",
+        "effort",
+        f"mean {{effort}} over the points in the window, its ends included {_TABLE_3}",
+        mean,
+        lambda rows: rows.many.mean,
+        worst="farthest-from-target",
+    ),
+    Definition(
+        "force_sd",
+        "effort",
+        f"standard deviation (n - 1) of the {{effort}} over the points in the window {_TABLE_3}",
+        standard_deviation,
+        lambda rows: rows.many.deviation,
+    ),
+    Definition(
+        "force_max",
+        "effort",
+        f"largest {{effort}} in the window {_TABLE_3}",
+        largest,
+        lambda rows: rows.many.extremes[0],
+    ),
+    Definition(
+        "force_min",
+        "effort",
+        f"smallest {{effort}} in the window {_TABLE_3}",
+        smallest,
+        lambda rows: rows.many.extremes[1],
+        worst="smallest",
+    ),
+    Definition(
+        "force_ripple",
+        "ratio",
+        f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING}",
+        ripple,
+        lambda rows: spread.ripple(rows.many.spread),
+    ),
+    Definition(
+        "half_band",
+        "ratio",
+        "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
+        half_band,
+        lambda rows: spread.half_band(rows.many.spread),
+    ),
+    Definition(
+        "deviation_from_mean",
+        "ratio",
+        f"largest |F - mean|/mean of the {{effort}} in the window {_DING}",
+        deviation_from_mean,
+        lambda rows: spread.deviation_from_mean(rows.many.spread),
+    ),
+    Definition(
+        "deviation_from_target",
+        "ratio",
+        "largest |F - target|/target of the {effort} in the window",
+        deviation_from_target,
+        lambda rows: spread.deviation_from_target(rows.many.spread, rows.curves.target),
+    ),
+    Definition(
+        "rms_to_target",
+        "effort",
+        "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
+        "the start of the window excluded [Bilancia 2019, eq. 8]",
+        rms_to_target,
+        lambda rows: rows.where_known(rows.rms_to_target()),
+    ),
+    Definition(
+        "deviation_from_curve",
+        "ratio",
+        "largest |F - F*| of the {effort} over the largest |F*| in the window, F* the curve of `design.target` or "
+        "`analysis.target`",
+        deviation_from_curve,
+        of_curve=True,
+    ),
+    Definition(
+        "rms_to_curve",
+        "effort",
+        "sqrt(mean((F - F*)^2)) of the {effort} at 100 places uniform in the {motion}, the start of the window "
+        "excluded, F* the curve of `design.target` or `analysis.target`",
+        rms_to_curve,
+        of_curve=True,
+    ),
+    Definition(
+        spread.STATIC_BALANCE,
+        "ratio",
+        "largest |F| of the {effort} in the window over the largest {effort} of one spring or member there, which is "
+        "the derivative of its energy by the {motion}; 0 is a perfect balancer",
+        static_balance,
+        lambda rows: rows.where_known(rows.static_balance()),
+        of_parts=True,
+    ),
+)
+"""Metrics of the effort in the window, in the order in which they are shown."""
+
+LOADS = (
+    Definition(
+        "hysteresis_area",
+        "work",
+        "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
+        "[Sanchez-Salinas 2022, sec. 3]",
+        hysteresis_area,
+        scope="loop",
+    ),
+    Definition(
+        "stress_max",
+        "stress",
+        "largest stress in the window, of all load cases",
+        stress_max,
+        lambda rows: rows.where_known(rows.stress_max()),
+    ),
+    Definition(
+        "safety_factor",
+        "factor",
+        "allowable stress over the largest stress in the window, of all load cases; 1 or more is within the limit",
+        safety_factor,
+        lambda rows: rows.where_known(rows.safety_factor()),
+        worst="smallest",
+    ),
+)
+"""Metrics of loss and stress."""
+
+LONG_TERM = (
+    Definition(
+        "fatigue_life",
+        "count",
+        "cycles to failure between the least and the largest stress in the window, of all load cases, by the "
+        "material's `fatigue` with Goodman's line",
+        fatigue_life,
+        worst="smallest",
+        of_material=True,
+    ),
+    Definition(
+        "force_after",
+        "effort",
+        "mean {effort} in the window after a hold of the time in brackets, as in `force_after[1000 h]`: it follows "
+        "the material's `relaxation`",
+        effort_after,
+        worst="smallest",
+        argument="time",
+        of_material=True,
+    ),
+)
+"""Metrics of fatigue and relaxation, of materials that say something about them."""

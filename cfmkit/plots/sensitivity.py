@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import textwrap
 from dataclasses import dataclass
+from functools import partial
 from itertools import takewhile
 from typing import TYPE_CHECKING
 
@@ -183,8 +184,8 @@ def figures(found: Findings) -> dict[str, Callable[[], Figure]]:
         pictures["yield_gain"] = lambda: draw_gains(found)
     for number, metric in enumerate(found.setup.study.metrics):
         stem = re.sub("[^a-z0-9]+", "_", metric.label.lower()).strip("_")
-        for name, draw in _OF_METHOD[found.setup.method].items():
-            pictures[f"{stem}{name}"] = lambda number=number, draw=draw: draw(found, number)  # type: ignore[misc]
+        for name, function in found.setup.record.pictures.items():
+            pictures[f"{stem}{name}"] = partial(globals()[function], found, number)
     return pictures
 
 
@@ -402,13 +403,3 @@ def draw_convergence(found: Findings, number: int) -> Figure:
 
 def _numbers(line: IndexLine) -> list[float]:
     return [np.nan if number is None else float(number) for number in (line.samples, line.value, line.low, line.high)]
-
-
-_OF_METHOD: dict[str, dict[str, Callable[[Findings, int], Figure]]] = {
-    "oat": {"": draw_oat},
-    "local": {"": draw_bars},
-    "morris": {"": draw_morris},
-    "sobol": {"": draw_bars, "_convergence": draw_convergence},
-    "tolerance": {"": draw_histogram},
-    "inverse": {"": draw_histogram},
-}

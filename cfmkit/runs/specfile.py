@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, SpecError, UsageError, reason_of, visible
+from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -203,7 +204,7 @@ def _sweep_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
         return
     from cfmkit.studies.varied_axes import collect_variations, faults
 
-    drawn, joint = spec.sweep.combine in ("lhs", "sobol"), spec.sweep.combine == "zip"
+    drawn, joint = spec.sweep.combine in SAMPLE_KINDS, spec.sweep.combine == "zip"
     for request, message in faults(spec, collect_variations(spec.sweep.vary), drawn, joint):
         yield document.problem(("sweep", "vary", request.path), message)
 

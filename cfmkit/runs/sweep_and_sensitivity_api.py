@@ -21,10 +21,11 @@ from cfmkit.tables import read_csv
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from typing import Literal
 
     from cfmkit.api import AnySpec, Metric
+    from cfmkit.specs.sensitivity_methods import MethodWord
     from cfmkit.specs.spec import Spec
+    from cfmkit.specs.study_spec import Combine
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.serial_and_cluster_executors import Executor
 
@@ -34,7 +35,7 @@ def sweep(
     jobs: int = 1,
     *,
     vary: Mapping[str, Any] | None = None,
-    combine: Literal["grid", "zip", "lhs", "sobol"] | None = None,
+    combine: Combine | None = None,
     samples: int | None = None,
     metrics: Iterable[Metric] | None = None,
     design: bool | None = None,
@@ -52,10 +53,11 @@ def sweep(
     vary : mapping, optional
         Path -> ``"start:stop:n"``, a list of texts with units, or a NumPy array in SI units. This and the next ones
         replace the specification's block `sweep`; without any of them the block counts.
-    combine : {"grid", "zip", "lhs", "sobol"}, optional
-        All combinations, values in step, a Latin hypercube, or a Sobol sequence.
+    combine : str, optional
+        All combinations (``"grid"``), values in step (``"zip"``), or points that are drawn: one of the words of
+        `cfmkit.numerics.unit_cube_samples.SAMPLE_KINDS`, as ``"lhs"`` or ``"sobol"``.
     samples : int, optional
-        Points of the last two.
+        Points that are drawn.
     metrics : iterable of str or callable, optional
         Columns: names, or functions of a `Result` (see `metric`). Default: all.
     design : bool, optional
@@ -106,7 +108,7 @@ def sensitivity(
     spec: AnySpec,
     jobs: int = 1,
     *,
-    method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] | None = None,
+    method: MethodWord | None = None,
     parameters: Mapping[str, Any] | None = None,
     correlated: Sequence[Mapping[str, Any]] | None = None,
     samples: int | None = None,
@@ -124,9 +126,9 @@ def sensitivity(
         What is varied.
     jobs : int
         Processes.
-    method : {"oat", "local", "morris", "sobol", "tolerance", "inverse"}, optional
-        One at a time, gradients, Morris screening, Sobol indices, random parts within tolerances, or the tolerances
-        that keep a yield. This and the next ones replace the values of the specification's block `sensitivity`.
+    method : str, optional
+        One of the words of `cfmkit.specs.sensitivity_methods.METHOD_NAMES`, as ``"sobol"`` or ``"tolerance"``. This
+        and the next ones replace the values of the specification's block `sensitivity`.
     parameters : mapping, optional
         Path -> a range ``["199 mm", "201 mm"]`` or a tolerance ``{"normal": "0.1 mm"}``.
     correlated : sequence of mapping, optional

@@ -16,6 +16,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model, field_vali
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
 from cfmkit.specs.leaves import stated_leaves
 from cfmkit.specs.own_metrics import name_of
+from cfmkit.specs.study_spec import Correlated, Sensitivity, Sweep, Tolerance
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
     DIMENSIONS,
@@ -90,9 +91,6 @@ class Analysis(Model):
         return self
 
 
-SweepValue = str | int | float | bool
-
-
 class SolidAnalysis(Model):
     """Solution of the part as a planar solid."""
 
@@ -107,91 +105,6 @@ class SolidAnalysis(Model):
         description="error of the force, in parts of the largest, to which the mesh is refined; a warning says if it "
         "cannot be reached",
     )
-
-
-class Sweep(Model):
-    """Block `sweep`: the durable form of ``--vary``."""
-
-    vary: dict[str, str | tuple[SweepValue, ...]] = Field(
-        description="dotted path: 'start:stop:n' with units, e.g. '8 mm:16 mm:5', or a list of values", min_length=1
-    )
-    combine: Literal["grid", "zip", "lhs", "sobol"] = Field(
-        "grid",
-        description=(
-            "all combinations, values in step, a Latin hypercube or a Sobol sequence; "
-            "ranges of the last two are 'start:stop'"
-        ),
-    )
-    samples: int | None = Field(None, ge=1, description="points of a Latin hypercube or a Sobol sequence")
-    design: bool = Field(False, description="redesign the mechanism at each point")
-    metrics: tuple[str, ...] = Field((), description="columns of results.csv; default: all metrics and values")
-    curves: bool = Field(False, description="keep the curve of every point in curves.csv")
-
-    @model_validator(mode="after")
-    def _samples_where_drawn(self) -> Self:
-        if (self.combine in ("lhs", "sobol")) != (self.samples is not None):
-            raise ValueError("'samples' and 'combine: lhs' or 'sobol' belong together: give both or neither")
-        return self
-
-
-class Tolerance(Model):
-    """Deviation of a value from its nominal one; a percentage is of the nominal value."""
-
-    normal: MetricValue | None = Field(None, description="standard deviation, e.g. '0.1 mm' or '2 %'")
-    uniform: MetricValue | None = Field(
-        None, description="half width of a range in which all values are equally likely"
-    )
-    truncate: MetricValue | None = Field(None, description="parts that deviate by more are rejected before assembly")
-
-    @model_validator(mode="after")
-    def _one_distribution(self) -> Self:
-        if (self.normal is None) == (self.uniform is None):
-            raise ValueError("give either 'normal' (a standard deviation) or 'uniform' (a half width)")
-        if self.truncate is not None and self.normal is None:
-            raise ValueError("'truncate' cuts the tails of 'normal'; a 'uniform' tolerance has none")
-        return self
-
-
-class Correlated(Model):
-    """Parameters that deviate together, such as all springs of one batch."""
-
-    parameters: tuple[str, ...] = Field(
-        min_length=1, description="paths as under 'parameters'; `.*` stands for every item of a list"
-    )
-    correlation: Ratio = Field(
-        1.0,
-        ge=-1,
-        le=1,
-        description="correlation coefficient between any two of the parameters; 1: all deviate by the same share",
-    )
-
-
-class Sensitivity(Model):
-    """Block `sensitivity`."""
-
-    removed_keys: ClassVar[dict[str, str]] = {
-        "on_failure": "samples without a result are counted and reported; indices that need them are not stated"
-    }
-    method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] = Field(
-        "oat",
-        description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances, or the "
-        "tolerances that keep `min_yield`",
-    )
-    parameters: dict[str, tuple[MetricValue, MetricValue] | Tolerance] = Field(
-        min_length=1, description="dotted path: a range [199 mm, 201 mm] or a tolerance {normal: 0.1 mm}"
-    )
-    correlated: tuple[Correlated, ...] = Field((), description="parameters that deviate together; for tolerances")
-    samples: int | None = Field(
-        None, ge=2, description="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts"
-    )
-    seed: int | None = Field(None, ge=0, description="seed of all random numbers; `--seed` takes precedence")
-    metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
-    min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
-    costs: dict[str, Annotated[float, Field(gt=0)]] = Field(
-        {},
-        description="inverse: a tolerance costs this number over its width, in any unit: {path: 2.0}; default: 1 each",
-    )
-    design: bool = Field(False, description="redesign the mechanism at each point")
 
 
 class DesignKeys(Model):
@@ -470,7 +383,6 @@ def frozen(value: Any) -> Any:
 
 __all__ = [
     "Analysis",
-    "Correlated",
     "DesignBlock",
     "DesignKeys",
     "Displacement",
@@ -480,11 +392,8 @@ __all__ = [
     "PositiveForce",
     "PositiveLength",
     "Requirement",
-    "Sensitivity",
     "SolidAnalysis",
     "Spec",
-    "Sweep",
-    "Tolerance",
     "frozen",
     "readable_requirement",
     "refuse",

@@ -354,7 +354,15 @@ def fillet_of(part: CutPart | None, thinnest: float) -> float:
 
 
 class RoundedCorners:
-    """Inside corners of the part of a mechanism that has `part` and `thinnest`."""
+    """Part of a mechanism that has `part` and `thinnest`: how it is cut, stated or not, and its inside corners."""
+
+    default_part: ClassVar[type[CutPart]] = PaddedPart
+    """Cut where `part` states none."""
+
+    @property
+    def cut_part(self: Any) -> Any:
+        """How it is cut."""
+        return self.part or self.default_part()
 
     @property
     def fillet(self: Any) -> float:

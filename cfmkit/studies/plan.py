@@ -7,14 +7,14 @@ axes holds two thousand values. Only what is drawn at random is kept as drawn.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cfmkit.errors import UsageError
+from cfmkit.numerics.unit_cube_samples import sample_unit_cube
 from cfmkit.specs.units import Place, format_quantity, from_border, place_of, to_border
 from cfmkit.specs.units.decimal_scaling_and_grids import even_grid, shift_decimal
 from cfmkit.studies.varied_axes import is_place
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.varied_axes import Axis
 
-Combine = Literal["grid", "zip", "lhs", "sobol"]
 Levels = tuple[Any, ...] | NDArray[Any]
 
 MOST_POINTS = 1_000_000
@@ -150,9 +149,9 @@ def zip_axes(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
 
 @dataclass(frozen=True)
 class Draw:
-    """Draw of points: a Latin hypercube or a scrambled Sobol sequence, of how many points, from which seed."""
+    """Draw of points: of which of `SAMPLE_KINDS`, of how many points, from which seed."""
 
-    method: Literal["lhs", "sobol"]
+    method: str
     count: int
     seed: int = 0
 
@@ -168,14 +167,7 @@ def sample_axes(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Pl
         If there are more points than allowed.
     """
     refuse_too_many(draw.count, most)
-    from scipy.stats import qmc
-
-    kind = qmc.LatinHypercube if draw.method == "lhs" else qmc.Sobol
-    engine: Any = kind(len(axes), seed=np.random.default_rng(draw.seed))
-    with warnings.catch_warnings():
-        # A Sobol sequence that is not a power of two long is less balanced, not wrong.
-        warnings.simplefilter("ignore", UserWarning)
-        unit = engine.random(draw.count)
+    unit = sample_unit_cube(draw.method, len(axes), draw.count, draw.seed)
     return Plan(tuple(_drawn_variable(item, unit[:, k]) for k, item in enumerate(axes)), draw.count, joint=True)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family
@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.specs.spec import Spec
+    from cfmkit.specs.study_spec import Combine
     from cfmkit.store.safe_disk_changes import Data
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.plan import Combine, Plan
+    from cfmkit.studies.plan import Plan
 
 MOST_CURVES = 100
 """Curves in one picture; of studies with more points only the metrics are drawn."""
@@ -38,7 +39,7 @@ class SweepRequest:
     # what varies; none: as in the specification. What is given replaces all of that
     vary: tuple[WantedVariation, ...] = ()
     combine: Combine | None = None  # how values are combined
-    samples: int | None = None  # points of a Latin hypercube or a Sobol sequence
+    samples: int | None = None  # points that are drawn
     # design, curves: whether to design anew at each point, and to keep every curve
     design: bool | None = None
     curves: bool | None = None
@@ -101,7 +102,7 @@ def _plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...])
     return sample_axes(axes(spec, asked, drawn=True), _draw(combine, samples, request.seed), request.most)
 
 
-def _draw(combine: Literal["lhs", "sobol"], samples: int | None, seed: int) -> Draw:
+def _draw(combine: str, samples: int | None, seed: int) -> Draw:
     if samples is None or samples < 1:
         raise UsageError(f"how many points are to be drawn? Write --sample {combine}:256")
     return Draw(combine, samples, seed)

@@ -16,6 +16,8 @@ from cfmkit.families import family
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.lists
+
 LAYERS = (
     ("cli", "__main__"),
     ("api", "runs"),

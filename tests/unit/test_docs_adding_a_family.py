@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.lists
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "adding_a_family.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(?:py|toml|xml)\n(?:#|<!--) (\S+)(?: -->)?\n(.*?)^```", PAGE, re.M | re.S)

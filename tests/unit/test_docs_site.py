@@ -15,6 +15,8 @@ from cfmkit.errors import UsageError
 from cfmkit.runs.examples import example
 from cfmkit.specs.keys_and_schema import keys
 
+pytestmark = pytest.mark.lists
+
 DOCS = Path(__file__).parents[2] / "docs"
 
 

@@ -19,6 +19,8 @@ import cfmkit
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+pytestmark = pytest.mark.lists
+
 ROOT = Path(__file__).parents[2]
 
 

@@ -14,6 +14,8 @@ from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
 from cfmkit.runs.editor_schema import LINE, metric_names, schema
 
+pytestmark = pytest.mark.lists
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = [one for one in cfmkit.examples() if "/" not in one.name]
 

@@ -15,6 +15,8 @@ from cfmkit import families
 from cfmkit.families import entry_point_plugins
 from cfmkit.families.base import INTERFACE
 
+pytestmark = pytest.mark.lists
+
 GROUP = "cfmkit.families"
 OLD = "\n".join(["cfmkit: 1", "family: {}", "mechanism: {{stiffness: 2 N/mm}}", ""])
 

@@ -11,6 +11,8 @@ from cfmkit.cli import guide, show_topics
 from cfmkit.cli.show_by_meaning import explain_by_meaning
 from cfmkit.cli.verbs import names as verbs
 
+pytestmark = pytest.mark.lists
+
 REFERENCE = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(encoding="utf-8")
 
 

@@ -12,6 +12,8 @@ from cfmkit.cli.commands import names, parse, program
 from cfmkit.cli.main import EPILOG, TEXT, _accept_global_options, main
 from cfmkit.cli.show_topics import READ_FIRST, explain
 
+pytestmark = pytest.mark.lists
+
 EXAMPLES = {
     name: module.EXAMPLE
     for name in names()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.lists
+
 ROOT = Path(__file__).parents[2]
 HOUSE = runpy.run_path(str(ROOT / "tools" / "house.py"))
 

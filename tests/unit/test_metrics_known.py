@@ -9,7 +9,7 @@ import cfmkit
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import check, definitions, known_metrics, metrics_by_name, other_name, values_of_family
-from cfmkit.metrics.metric_definitions import Definition
+from cfmkit.metrics.definition import Definition
 from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
 from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity

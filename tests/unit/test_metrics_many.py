@@ -1,5 +1,7 @@
 """Range metrics of many curves at once are those of each curve."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from cfmkit.metrics import MeasuringFrame, Window
 from cfmkit.metrics.metric_definitions import TABLE
 from cfmkit.metrics.metric_values import survey
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
-from cfmkit.metrics.spread import ManyWindows, Spread, metric_of, metrics_of
+from cfmkit.metrics.spread import ManyWindows, Spread
 
 DEFINED = {item.name: item for item in TABLE}
 COUNT, POINTS = 300, 41
@@ -68,8 +70,17 @@ def test_the_usable_interval_of_many_loops_is_that_of_each(seed, until):
     assert 20 < np.isfinite(start).sum() < COUNT
 
 
+OF_EFFORTS = ("force_mean", "force_sd", "force_max", "force_min", "force_ripple", "half_band", "deviation_from_mean")
+
+
+def metric_of(name, many, target):
+    """Return a metric of many curves by its definition."""
+    (function,) = (one.of_rows for one in TABLE if one.name == name)
+    return function(SimpleNamespace(many=many, curves=SimpleNamespace(target=np.full(len(many.effort), target))))
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("name", sorted(metrics_of("force")))
+@pytest.mark.parametrize("name", [*OF_EFFORTS, "deviation_from_target"])
 def test_a_metric_of_many_windows_is_that_of_each_whichever_way_the_force_acts(name, sign):
     motion, effort = curves(4)
     effort = sign * effort
@@ -83,9 +94,9 @@ def test_a_metric_of_many_windows_is_that_of_each_whichever_way_the_force_acts(n
 def test_a_spread_is_judged_in_the_direction_of_its_mean_and_without_a_target_nothing_deviates_from_it():
     assert Spread.of(-0.5, 2.0, -3.0)[:4] == (0.5, 3.0, -2.0, -1.0)
     rows = ManyWindows(np.arange(2.0), np.array([[-1.0, -3.0], [1.0, -3.0]]), lambda _, e: (e.max(1), e.min(1)))
-    assert metric_of("force_ripple", rows, None) == pytest.approx([2 / 3, 4 / 3])
-    assert metric_of("force_max", rows, None).tolist() == [-1.0, 1.0]
-    assert np.isnan(metric_of("deviation_from_target", rows, None)).all()
+    assert metric_of("force_ripple", rows, np.nan) == pytest.approx([2 / 3, 4 / 3])
+    assert metric_of("force_max", rows, np.nan).tolist() == [-1.0, 1.0]
+    assert np.isnan(metric_of("deviation_from_target", rows, np.nan)).all()
 
 
 def test_the_first_95_percent_alone_are_those_that_are_solved_for_beside_the_bands():

@@ -15,6 +15,8 @@ import spare_family
 import cfmkit
 from cfmkit import families
 
+pytestmark = pytest.mark.lists
+
 CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"
 VARY = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
 
@@ -180,7 +182,7 @@ def test_signatures_name_every_argument(name):
 
 
 def test_signatures_have_the_keys_of_the_blocks_that_they_stand_for():
-    from cfmkit.specs.spec import Sensitivity, Sweep
+    from cfmkit.specs.study_spec import Sensitivity, Sweep
     from cfmkit.studies.suggest.spec import SuggestBlock
 
     for function, block, others in (

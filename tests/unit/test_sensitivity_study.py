@@ -17,12 +17,13 @@ from cfmkit.families import family
 from cfmkit.plots.sensitivity import figures, short
 from cfmkit.plots.style import MM, png
 from cfmkit.results import Status
+from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 from cfmkit.studies.engine import MISSING, run
 from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
-from cfmkit.studies.sensitivity.run_sensitivity_method import METHODS, carry_out
-from cfmkit.studies.sensitivity.setup import points_of, prepare
+from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
+from cfmkit.studies.sensitivity.setup import prepare
 from cfmkit.studies.summary import Summary
 
 CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
@@ -44,13 +45,13 @@ def study(method="sobol", **more):
 BROKEN = {"mechanism.rolling_friction": ("-0.001", "0.004"), "mechanism.roller_radius": {"uniform": "0.05 mm"}}
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHOD_NAMES)
 def test_a_method_evaluates_as_many_points_as_it_says(method):
     found = study(method)
     setup = found.setup
     assert len(setup.parameters) == 3
     groups = len(setup.together)
-    assert found.evaluator.count == points_of(method, setup.samples, 3, groups) > 0
+    assert found.evaluator.count == setup.record.count_points(setup.samples, 3, groups) > 0
     assert exit_code(found) in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED)
     assert found.unstated == 0
     with pytest.raises(UsageError, match="--max-points"):
@@ -58,7 +59,7 @@ def test_a_method_evaluates_as_many_points_as_it_says(method):
     prepare(spec(method), most=found.evaluator.count)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHOD_NAMES)
 @pytest.mark.parametrize("parameters", [PARAMETERS, BROKEN], ids=["complete", "with failures"])
 def test_pictures_are_drawn_whatever_failed_and_their_bytes_repeat(method, parameters):
     found = study(method, parameters=parameters)
@@ -70,7 +71,7 @@ def test_pictures_are_drawn_whatever_failed_and_their_bytes_repeat(method, param
         assert len(picture) > 5000
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHOD_NAMES)
 def test_labels_of_axes_stay_clear_of_the_edges_of_the_picture(method):
     for name, draw in figures(study(method)).items():
         figure = draw()
@@ -173,7 +174,7 @@ def test_a_family_that_knows_its_gradient_is_asked_for_it(monkeypatch):
         return {"theoretical_force": dict.fromkeys(paths, 3.0)}
 
     known = dataclasses.replace(record, gradient=gradient)
-    monkeypatch.setattr("cfmkit.studies.sensitivity.run_sensitivity_method.family", lambda name: known)
+    monkeypatch.setattr("cfmkit.studies.sensitivity.local.family", lambda name: known)
     found = study("local", metrics=("theoretical_force",))
     assert asked == [found.setup.paths]
     assert found.evaluator.count == 0
@@ -196,7 +197,7 @@ def test_an_interrupted_study_states_nothing_but_keeps_its_rows():
     assert exit_code(found) is ExitCode.INTERRUPTED
     written = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in outputs(found)}
     assert "indices.csv" not in written
-    assert done[0] < points_of("sobol", 32, 3, 2)
+    assert done[0] < found.setup.record.count_points(32, 3, 2)
     assert len(written["results.csv"].splitlines()) == 1 + done[0]
     assert message(found).endswith("run the same command again to continue")
     assert message(dataclasses.replace(found, fresh=True)).endswith(

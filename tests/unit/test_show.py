@@ -5,10 +5,13 @@ import re
 from functools import cache
 from pathlib import Path
 
+import pytest
 from sources import calls_of
 
 from cfmkit.cli import show_topics
 from cfmkit.experiment.value_definitions import define_recorded_values
+
+pytestmark = pytest.mark.lists
 
 ROOT = Path(__file__).parents[2]
 

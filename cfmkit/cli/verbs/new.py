@@ -13,7 +13,10 @@ from cfmkit.documents.document import GOOD, Document, Paragraph, Verbatim, next_
 from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from cfmkit.cli.output import Terminal
+    from cfmkit.specs.keys_and_schema import Key
 
 PLACE = 50
 EXAMPLE = "cfmkit new cam -o mine.yaml"
@@ -69,7 +72,8 @@ def run(options: NewOptions, terminal: Terminal) -> Document:
 def template(name: str) -> str:
     """Return the commented spec of a family; it comes with the package that has the family.
 
-    ``{words of PATH}`` in it stands for the words that a key allows.
+    ``{words of PATH}`` in it stands for the words that a key allows. Keys of its blocks that it leaves out are added as
+    comments, each with what it means.
 
     Raises
     ------
@@ -83,7 +87,32 @@ def template(name: str) -> str:
     record = family(name)
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
-    kinds = {key.path: key.kind for key in keys(record.spec_type)}
-    return re.sub(
+    known = keys(record.spec_type)
+    kinds = {key.path: key.kind for key in known}
+    text = re.sub(
         r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), read_packaged(record.template)
     )
+    return complete_template(text, known)
+
+
+def complete_template(text: str, known: Iterable[Key]) -> str:
+    """Return a template in which every optional key of a block stands, those that it left out as comments at its end.
+
+    Parameters
+    ----------
+    text : str
+        The template.
+    known : iterable of Key
+        Of the specification.
+    """
+    for key in known:
+        block, _, name = key.path.partition(".")
+        is_missing = block.isidentifier() and name.isidentifier() and f"{name}:" not in text
+        if not is_missing or key.required or (start := re.search(rf"(?m)^{block}:.*\n", text)) is None:
+            continue
+        after = re.compile(r"(?m)^(?! )").search(text, start.end())  # the first line that is not indented
+        end = len(text) if after is None else after.start()
+        meaning = key.description.partition(";")[0]
+        added = f"  # {name}: {key.default or key.example or f'<{key.kind}>'}    # {meaning}\n"
+        text = f"{text[:end]}{added}{text[end:]}"
+    return text

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.specs.sensitivity_methods import MethodWord, describe_methods, describe_samples
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -31,12 +32,11 @@ class SensitivityOptions(Studying):
     report: WithReport = False
     table: Tables = "csv"
     method: Annotated[
-        Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] | None,
+        MethodWord | None,
         option(
             "--method",
             metavar="NAME",
-            text="oat (one at a time), local (gradients), morris (screening), sobol (indices), tolerance (Monte Carlo: "
-            "the yield) or inverse (the tolerances that a yield needs); default: the spec's, else oat.",
+            text=f"{describe_methods()}; default: the spec's, else oat.",
         ),
     ] = None
     samples: Annotated[
@@ -45,7 +45,7 @@ class SensitivityOptions(Studying):
             "--samples",
             metavar="N",
             low=2,
-            text="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance, inverse: parts.",
+            text=f"{describe_samples()}.",
         ),
     ] = None
     seed: Annotated[

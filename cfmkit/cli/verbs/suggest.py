@@ -49,13 +49,9 @@ def _key(name: str, metavar: str, text: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SuggestOptions(Common):
-    """Arguments and options."""
+class RequestOptions(Common):
+    """Options that are keys of a request."""
 
-    request: Annotated[
-        str | None,
-        argument("FILE", "YAML file with a block 'suggest'; - reads standard input."),
-    ] = None
     force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
     travel: Annotated[str | None, _key("travel", "LENGTH", "Travel over which the force is to be constant.")] = None
@@ -94,6 +90,16 @@ class SuggestOptions(Common):
         list[str] | None,
         _key("prefer", "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable."),
     ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuggestOptions(RequestOptions):
+    """Arguments and options."""
+
+    request: Annotated[
+        str | None,
+        argument("FILE", "YAML file with a block 'suggest'; - reads standard input."),
+    ] = None
     time_budget: Annotated[
         str, option("--time-budget", metavar="TIME", shown=True, text="Time for the whole command: 60s, 10min.")
     ] = BUDGET
@@ -107,10 +113,7 @@ class SuggestOptions(Common):
     no_lock: NoLock = False
 
 
-KEYS = (
-    "force", "torque", "travel", "angle", "ripple", "envelope", "material", "process", "adjustable", "hysteresis",
-    "springs", "safety", "cycles", "made_well", "prefer",
-)  # fmt: skip
+KEYS = tuple(one.name for one in fields(RequestOptions) if one not in fields(Common))
 """Options that are keys of a request."""
 
 LISTS = ("material", "adjustable", "prefer")

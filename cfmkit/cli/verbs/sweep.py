@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
+from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, list_phrases
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,8 +48,8 @@ class SweepOptions(Studying):
         str | None,
         option(
             "--sample",
-            metavar="lhs:N|sobol:N",
-            text="Draw N points from ranges start:stop: a Latin hypercube or a Sobol sequence.",
+            metavar="|".join(f"{kind}:N" for kind in SAMPLE_KINDS),
+            text=f"Draw N points from ranges start:stop: {list_phrases()}.",
         ),
     ] = None
     design: Annotated[bool, flag("--design", text="Redesign the mechanism at each point.")] = False
@@ -133,7 +134,7 @@ def request(options: SweepOptions) -> SweepRequest:
     method, samples = _sample(options.sample) if options.sample else ("zip" if options.zip else None, None)
     return SweepRequest(
         vary=tuple(parse_variation(option) for option in options.vary or ()),
-        combine=method,  # type: ignore[arg-type]
+        combine=method,
         samples=samples,
         design=options.design or None,
         curves=options.curves or None,
@@ -146,8 +147,9 @@ def request(options: SweepOptions) -> SweepRequest:
 
 def _sample(text: str) -> tuple[str, int]:
     method, _, count = text.partition(":")
-    if method not in ("lhs", "sobol") or not (count.isascii() and count.isdigit()) or not 0 < len(count) < 19:
-        raise UsageError(f"--sample {text!r}: write lhs:N or sobol:N, e.g. sobol:256")
+    if method not in SAMPLE_KINDS or not (count.isascii() and count.isdigit()) or not 0 < len(count) < 19:
+        kinds = " or ".join(f"{kind}:N" for kind in SAMPLE_KINDS)
+        raise UsageError(f"--sample {text!r}: write {kinds}, e.g. sobol:256")
     if int(count) < 1:
         raise UsageError("--sample: there must be at least one point")
     return method, int(count)

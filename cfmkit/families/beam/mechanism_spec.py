@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -27,7 +27,7 @@ from cfmkit.families.beam.network_elements_spec import (
 )
 from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.specs.units import format_short
-from cfmkit.stock.material_and_part_spec import RoundedCorners, SafetyFactor
+from cfmkit.stock.material_and_part_spec import CutPart, RoundedCorners, SafetyFactor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -201,6 +201,8 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 class Mechanism(RoundedCorners, Model):
     """A planar network of slender beams, its loads and its drive."""
+
+    default_part: ClassVar[type[CutPart]] = PartSpec
 
     material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
     safety_factor: SafetyFactor = 1.0

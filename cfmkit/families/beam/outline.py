@@ -11,7 +11,6 @@ from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Re
 from cfmkit.export.drawn_as_specified import SpecifiedPiece, check_outline
 from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.drawn_pieces import STANDS, both_halves, drawn_parts
-from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes
 from cfmkit.families.beam.part import FINE, SHARE, drawn_fillet, drawn_frame, fine_tolerance, held_places, strips_of
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points
@@ -50,7 +49,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     solid = drawn_parts(assembly, beams, SHARE * tolerance)
     frame = drawn_frame(assembly, beams, tolerance)
     lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
-    part, fillet = spec.mechanism.part or PartSpec(), drawn_fillet(spec)
+    part, fillet = spec.mechanism.cut_part, drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
     contours = merge_pieces(pieces, fine / FINE, fillet, solid.holes)
     thinnest, holes = fine / FINE, [area for hole in solid.holes for area in hole.covered(fine / FINE)]

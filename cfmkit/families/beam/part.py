@@ -30,7 +30,6 @@ from cfmkit.families.beam.drawn_pieces import (
     pads_behind,
     section_at_bend,
 )
-from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import (
     assemble,
     is_on_axis,
@@ -178,7 +177,7 @@ def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
 def drawn_frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
     """Return the same for a mechanism that is built."""
 
-    part = assembly.spec.mechanism.part or PartSpec()
+    part = assembly.spec.mechanism.cut_part
     if part.frame is None or part.frame.ground is None:
         return ()
     nodes, moving = assembly.network.nodes, moving_nodes(assembly)

@@ -32,6 +32,8 @@ class VcfmPart(CutPart):
 class CutLeaves(RoundedCorners):
     """Part of a mechanism of `bistable` leaves and, unless it is bought, a `positive` spring."""
 
+    default_part = VcfmPart
+
     @property
     def thinnest(self: Any) -> float:
         """Smallest thickness of all leaves that are cut [m]."""

@@ -16,12 +16,10 @@ from cfmkit.export.fillets import round_inside_corners, sharp_notes
 from cfmkit.export.posed_part import rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
-from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law
 from cfmkit.families.vcfm.part import leaves_contours, sizes_of_frame, specified_pieces, spring_contours
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes
 from cfmkit.specs.units import format_short
-from cfmkit.stock.material_and_part_spec import CutPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -51,7 +49,7 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     rounded = [round_inside_corners(contour, fillet) for contour in (*leaves, *spring)]
     cut = [contour for contour, _ in rounded]
     sections = check_outline(cut, tuple(specified_pieces(spec, top)), thinnest, fillet)
-    part = spec.mechanism.part or CutPart()
+    part = spec.mechanism.cut_part
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
     return Drawing(
         "vcfm",
@@ -114,7 +112,7 @@ def _dimensions(spec: VcfmSpec, sizes: FrameSizes) -> Iterator[DrawnDimension]:
     yield DrawnDimension("across clamps", (-half - reach, -rise), (half + reach, -rise), "x")
     if sizes.stopped:
         yield DrawnDimension("stop", (sizes.out, sizes.wall_top), (sizes.out, sizes.under), "y")
-    given = (spec.mechanism.part or VcfmPart()).frame
+    given = spec.mechanism.cut_part.frame
     if sizes.floor is not None and given is not None and given.seat is not None:
         face = max(y for _, y in sizes.ledge)
         yield DrawnDimension("seat of the spring", (0.0, face), (0.0, -spec.mechanism.frame.clearance), "y")

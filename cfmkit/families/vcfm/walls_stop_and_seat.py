@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import GeometryError
 from cfmkit.export.posed_part import PosedBody, rectangle
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.cut_and_frame_spec import StandingFrame, VcfmPart
+from cfmkit.families.vcfm.cut_and_frame_spec import StandingFrame
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None
         If the spring does not fit between the walls, or the shuttle comes to the seat.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    given = (spec.mechanism.part or VcfmPart()).frame or StandingFrame()
+    given = spec.mechanism.cut_part.frame or StandingFrame()
     levels, strip = -(-about.half_beams // 2), strip_of(about, spec.mechanism.material)
     wall, rise = 0.5 * frame.shuttle_width + float(strip.reach), float(strip.rise)
     thick, block = given.wall or frame.block, frame.block
@@ -152,7 +152,7 @@ def _floor(
 
 def frame_notes(spec: VcfmSpec, sizes: FrameSizes) -> Iterator[str]:
     """Yield what stop and seat are for."""
-    given = (spec.mechanism.part or VcfmPart()).frame
+    given = spec.mechanism.cut_part.frame
     if given is not None and given.stop is not None:
         yield f"the bar across the shuttle lands on the walls after {mm(given.stop)}"
     if given is not None and given.seat is not None:

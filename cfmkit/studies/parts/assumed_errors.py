@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
 from cfmkit.families.base import function_named
-from cfmkit.specs.spec import Tolerance
+from cfmkit.specs.study_spec import Tolerance
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES, SPRING_RATE, usual
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import SpecError
-from cfmkit.specs.spec import DesignKeys, Sensitivity
+from cfmkit.specs.spec import DesignKeys
+from cfmkit.specs.study_spec import Sensitivity
 from cfmkit.studies.parts.assumed_errors import assume_errors, process_of_part, tolerances
 from cfmkit.studies.parts.distributions import draw, values_at
 from cfmkit.studies.parts.uncertain_values import correlations, groups, parameters_of

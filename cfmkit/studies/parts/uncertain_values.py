@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import Problem, QuantityError, SpecError
-from cfmkit.specs.spec import Tolerance
+from cfmkit.specs.study_spec import Tolerance
 from cfmkit.specs.units import meant_as_percent, read_number, read_quantity
 from cfmkit.studies.parts.distributions import Incompatible, ParameterSpread, correlation_matrix
 from cfmkit.studies.plan import Plan, Variable
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.specs.spec import Sensitivity, Spec
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.study_spec import Sensitivity
 
 Place = tuple[str | int, ...]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
+
+
+RESAMPLES = 200
+"""Bootstrap samples behind an interval."""
+
+CONSTANT = 1e-12
+"""An output that varies less than so much of its size does not vary: it has no variance to share out."""
 
 
 @dataclass(frozen=True)
@@ -37,3 +44,13 @@ def analyze_complete(
 ) -> Analysis:
     """Return the indices of one output; not stated where one of its samples failed, whose output is NaN."""
     return unstated_indices(names, count) if np.isnan(outputs).any() else analyze(outputs)
+
+
+def problem(count: int) -> dict[str, Any]:
+    """Return a unit cube as SALib wants it described."""
+    return {"num_vars": count, "names": [str(k) for k in range(count)], "bounds": [[0.0, 1.0]] * count}
+
+
+def varies_not(outputs: FloatArray) -> bool:
+    """Return whether all outputs are the same, but for rounding."""
+    return bool(np.ptp(outputs) <= CONSTANT * np.abs(outputs).max())

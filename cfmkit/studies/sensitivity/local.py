@@ -18,8 +18,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families import family
+from cfmkit.specs.units import border_unit, to_border
+from cfmkit.studies.sensitivity.method import Method
+from cfmkit.studies.sensitivity.oat import SLOPE
+from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
+from cfmkit.studies.sensitivity.result_types import to_stated_value as reported
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from cfmkit.arrays import FloatArray
+    from cfmkit.studies.parts.uncertain_values import Parameter
+    from cfmkit.studies.point_evaluation import Metric
+    from cfmkit.studies.sensitivity.evaluation import Evaluator
+    from cfmkit.studies.sensitivity.setup import Setup
 
 LEVELS = 7
 """How often a step is halved, and one."""
@@ -103,3 +116,62 @@ def _extrapolate(differences: FloatArray, noise: FloatArray, factor: float) -> S
 def normalise(derivative: float, nominal: float, at_nominal: float) -> float:
     """Return the relative change of the output for a relative change of the parameter; NaN about zero."""
     return derivative * nominal / at_nominal if nominal and at_nominal else float("nan")
+
+
+def run(setup: Setup, evaluator: Evaluator) -> Findings:
+    """Return the gradients: those that the family knows, else by differences."""
+    half = (setup.ends[:, 1] - setup.ends[:, 0]) / 2.0
+    points = sample(setup.values, half)
+    count = len(half)
+    exact = _exact(setup)
+    width = len(setup.study.metrics) + len(setup.study.spec.part_requirements)
+    outputs = np.full((count, 2, LEVELS, width), np.nan)
+    if not _all_known(setup, exact):
+        sides = [side for side in ("up", "down") for _ in range(LEVELS)]
+        roles = [[f"{path} {side}" for side in sides] for path in setup.paths]
+        outputs = evaluator.outputs(points.reshape(count, -1, count), roles).reshape(outputs.shape)
+    found: list[IndexLine] = []
+    for m, metric in enumerate(setup.study.metrics):
+        nominal = float(setup.nominal.values[m])
+        for k, one in enumerate(setup.parameters):
+            known = exact.get(metric.name, {}).get(one.path) if metric.over is None else None
+            if known is not None:
+                derivative = Slope(known, 0.0)
+            else:
+                derivative = slope(outputs[k, 0, :, m], outputs[k, 1, :, m], nominal, float(half[k]))
+            found += _gradient_lines(metric, one, derivative, nominal)
+    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+
+
+def _exact(setup: Setup) -> Mapping[str, Mapping[str, float]]:
+    """Return the derivatives that the family knows in closed form: metric -> path -> SI value."""
+    gradient = family(setup.study.spec.family).gradient
+    if gradient is None or setup.study.design:
+        return {}
+    found: Mapping[str, Mapping[str, float]] = gradient(setup.study.spec, setup.paths)
+    return found
+
+
+def _all_known(setup: Setup, exact: Mapping[str, Mapping[str, float]]) -> bool:
+    wanted = ((one, path) for one in setup.study.metrics for path in setup.paths)
+    return all(one.over is None and path in exact.get(one.name, {}) for one, path in wanted)
+
+
+def _gradient_lines(metric: Metric, one: Parameter, slope: Slope, at_nominal: float) -> Iterator[IndexLine]:
+    above, below = border_unit(metric.dimension), border_unit(one.dimension)
+    scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
+    unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
+    value, low, high = (reported(end * scale, "ratio") for end in _neighbours(slope.value, slope.error))
+    yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, LEVELS)
+    relative = normalise(1.0, one.spread.nominal, at_nominal)
+    value, low, high = (
+        reported(end, "ratio") for end in _neighbours(slope.value * relative, slope.error * abs(relative))
+    )
+    yield IndexLine(metric.label, one.path, SLOPE, value, low, high, "1", LEVELS)
+
+
+def _neighbours(value: float, reach: float) -> tuple[float, float, float]:
+    return value, value - reach, value + reach
+
+
+METHOD = Method(run, lambda _, parameters, __: 2 * LEVELS * parameters, (SLOPE, "gradient"), {"": "draw_bars"})

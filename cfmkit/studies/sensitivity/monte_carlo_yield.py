@@ -15,8 +15,7 @@ import numpy as np
 
 from cfmkit.studies.parts.distributions import values_at
 from cfmkit.studies.parts.share import LEVEL, paired_difference
-from cfmkit.studies.sensitivity.indices import Analysis, Index
-from cfmkit.studies.sensitivity.sobol import RESAMPLES, varies_not
+from cfmkit.studies.sensitivity.indices import RESAMPLES, Analysis, Index, varies_not
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

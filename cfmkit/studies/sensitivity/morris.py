@@ -16,11 +16,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.indices import Analysis, Index
-from cfmkit.studies.sensitivity.sobol import RESAMPLES, problem
+from cfmkit.studies.parts.distributions import values_across
+from cfmkit.studies.sensitivity.indices import RESAMPLES, Analysis, Index, analyze_complete, problem
+from cfmkit.studies.sensitivity.method import Method
+from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.studies.sensitivity.evaluation import Evaluator
+    from cfmkit.studies.sensitivity.setup import Setup
 
 MU_STAR, MU, SIGMA = "mu_star", "mu", "sigma"
 NAMES = (MU_STAR, MU, SIGMA)
@@ -80,3 +84,26 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
         Index(MU, mean, gap, gap),
         Index(SIGMA, scatter, gap, gap),
     )
+
+
+def run(setup: Setup, evaluator: Evaluator) -> Findings:
+    """Return size, mean and scatter of the effects."""
+    count, seed = len(setup.parameters), setup.seed
+    spreads = [one.spread for one in setup.parameters]
+
+    unit = sample(0, setup.samples, count, seed)
+    points = values_across(spreads, unit.reshape(-1, count)).reshape(unit.shape)
+    roles = [f"step {k}" for k in range(count + 1)]
+    outputs = evaluator.outputs(points, roles)
+    low, high = setup.ends.T
+    grid = np.rint((points - low) / (high - low) * (LEVELS - 1)) / (LEVELS - 1)
+    found: list[IndexLine] = []
+    for m, metric in enumerate(setup.study.metrics):
+        analysis = analyze_complete(outputs[..., m], lambda one: analyze(grid, one, seed), NAMES, count)
+        found += lines_of(metric, setup.paths, analysis, len(grid))
+    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+
+
+METHOD = Method(
+    run, lambda samples, parameters, _: samples * (parameters + 1), ("mu_star", "sigma"), {"": "draw_morris"}
+)

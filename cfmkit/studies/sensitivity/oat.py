@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.studies.sensitivity.indices import Analysis, Index
+from cfmkit.studies.sensitivity.method import Method
+from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.studies.sensitivity.evaluation import Evaluator
+    from cfmkit.studies.sensitivity.setup import Setup
 
 LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"
 
@@ -68,3 +72,18 @@ def _slope(nominal: FloatArray, ends: FloatArray, change: FloatArray, at_nominal
         slope = change / (ends[:, 1] - ends[:, 0]) * nominal / at_nominal
     slope[~np.isfinite(slope) | (nominal == 0.0)] = np.nan
     return np.asarray(slope)
+
+
+def run(setup: Setup, evaluator: Evaluator) -> Findings:
+    """Return what each parameter does through its range."""
+    points = sample(setup.values, setup.ends, setup.samples)
+    outputs = evaluator.outputs(points, [[path] * setup.samples for path in setup.paths])
+    found: list[IndexLine] = []
+    for m, metric in enumerate(setup.study.metrics):
+        nominal = float(setup.nominal.values[m])
+        analysis = analyze(setup.values, setup.ends, outputs[..., m], nominal)
+        found += lines_of(metric, setup.paths, analysis, setup.samples)
+    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+
+
+METHOD = Method(run, lambda samples, parameters, _: samples * parameters, (SWING, SLOPE), {"": "draw_oat"})

@@ -9,7 +9,7 @@ from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.metrics import metrics_json
 from cfmkit.results import Finding, Quantity, Status
-from cfmkit.studies.sensitivity.setup import MADE
+from cfmkit.studies.sensitivity.method import method_named
 from cfmkit.studies.tables import results_table
 from cfmkit.studies.varied_axes import write_value
 from cfmkit.tables import Table, TableColumn, csv_chunks, to_csv
@@ -90,7 +90,7 @@ def yield_ok(found: Findings) -> bool:
     They miss it where so many parts rule it out.
     """
     wanted = found.setup.block.min_yield
-    if wanted is None or found.setup.method not in MADE:
+    if wanted is None or not method_named(found.setup.method).draws_parts:
         return True
     share = found.all_met
     return share is not None and (
@@ -219,5 +219,5 @@ def _parameter(one: Parameter) -> dict[str, Any]:
 
 
 def _correlated_pairs(setup: Setup) -> list[dict[str, Any]]:
-    pairs = setup.parts.correlated if setup.method in MADE else ()
+    pairs = setup.parts.correlated if setup.record.draws_parts else ()
     return [{"parameters": [setup.paths[k] for k in members], "correlation": value} for members, value in pairs]

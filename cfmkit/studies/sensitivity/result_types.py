@@ -8,7 +8,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from cfmkit.specs.units import border_unit, to_border
-from cfmkit.studies.sensitivity.sobol import varies_not
+from cfmkit.studies.sensitivity.indices import varies_not
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

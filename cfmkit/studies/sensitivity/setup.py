@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from cfmkit.families import family
 from cfmkit.metrics import check, values_of_family
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
+from cfmkit.specs.sensitivity_methods import METHOD_NAMES
 from cfmkit.specs.units import TravelShare, border_unit, format_short, to_border
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.design_with_margins_and_verification import run_design
@@ -20,6 +21,7 @@ from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.uncertain_values import together
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.sensitivity.method import method_named
 from cfmkit.studies.variable_paths import length_to_vary
 
 if TYPE_CHECKING:
@@ -29,17 +31,12 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.metrics import Outcome
     from cfmkit.results import Quantity, Result
-    from cfmkit.specs.spec import Requirement, Sensitivity, Spec
+    from cfmkit.specs.spec import Requirement, Spec
+    from cfmkit.specs.study_spec import Sensitivity
     from cfmkit.specs.units import Ends
     from cfmkit.studies.parts.uncertain_values import Parameter
     from cfmkit.studies.point_evaluation import Metric
-
-Method = Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"]
-SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000, "inverse": 200}
-"""How many samples a method takes by default; `local` chooses its own steps."""
-
-MADE = ("tolerance", "inverse")
-"""Methods whose samples are made parts."""
+    from cfmkit.studies.sensitivity.method import Method
 
 NOTHING = (
     "nothing to vary: add a block 'sensitivity: {parameters: {...}}' to the spec, "
@@ -68,9 +65,14 @@ class Setup:
     warnings: tuple[Finding, ...] = ()  # what the user must know
 
     @property
-    def method(self) -> Method:
-        """Method by which the indices or tolerances are computed."""
+    def method(self) -> str:
+        """Name of the method by which the indices or tolerances are computed."""
         return self.block.method
+
+    @property
+    def record(self) -> Method:
+        """That method."""
+        return method_named(self.block.method)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -133,34 +135,19 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     if block is None:
         raise UsageError(NOTHING.replace("{path}", length_to_vary(spec)[0]))
     chosen = seed if seed is not None else block.seed or 0
-    samples = block.samples or SAMPLES[block.method]
+    samples = block.samples or METHOD_NAMES[block.method].default_samples
     parts = Parts.of_block(spec, block, samples, chosen)
     parameters, paths = parts.parameters, parts.paths
     _suits(spec, block, parameters)
     groups = together(block, paths)
-    refuse_too_many(points_of(block.method, samples, len(paths), len(groups)), most)
-    made = block.method in ("tolerance", "inverse")
-    study = Study(spec, paths, (), block.design, seed=chosen, deliver=run_design, made=made)
+    method = method_named(block.method)
+    refuse_too_many(method.count_points(samples, len(paths), len(groups)), most)
+    study = Study(spec, paths, (), block.design, seed=chosen, deliver=run_design, made=method.draws_parts)
     result = _solve_nominal(study)
     study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
     study, nominal, unvalued = _with_nominal(study, result)
     warnings = (*unvalued, *_cautions(spec, block, parameters, samples))
     return Setup(block, parts, study, nominal, groups, warnings)
-
-
-def points_of(method: Method, samples: int, parameters: int, groups: int) -> int:
-    """Return how many points a method evaluates, if none has to be drawn again."""
-    from cfmkit.studies.sensitivity.local import LEVELS
-
-    counts = {
-        "oat": samples * parameters,
-        "local": 2 * LEVELS * parameters,
-        "morris": samples * (parameters + 1),
-        "sobol": samples * (parameters + 2),
-        "tolerance": samples * (groups + 1),
-        "inverse": samples,
-    }
-    return counts[method]
 
 
 def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
@@ -174,7 +161,7 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
         missing = f"no such parameter; there are {known}"
         raise SpecError([Problem("", 0, 0, f"sensitivity.costs.{path}", missing) for path in unknown])
     outside = [one for one in parameters if not one.spread.low <= one.spread.nominal <= one.spread.high]
-    if block.method in MADE and outside:
+    if method_named(block.method).draws_parts and outside:
         reported = "the nominal value is outside the range; tolerances are tightened towards it"
         raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", reported) for one in outside])
 
@@ -248,12 +235,12 @@ def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]
 
 
 def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:
-    if block.correlated and block.method not in MADE:
+    if block.correlated and not method_named(block.method).draws_parts:
         reported = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
         yield Finding("correlation_not_used", reported)
     if block.method == "sobol" and samples & (samples - 1):
         yield Finding("unbalanced", f"{samples} is not a power of two: Sobol sequences are balanced at 64, 128, 256")
-    if block.method in MADE and not spec.part_requirements:
+    if method_named(block.method).draws_parts and not spec.part_requirements:
         yield Finding("no_requirements", "without requirements there is no yield, only distributions")
     yield from _followers(spec, parameters)
 

@@ -15,26 +15,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.indices import Analysis, Index, unstated_indices
+from cfmkit.studies.parts.distributions import values_at
+from cfmkit.studies.sensitivity.indices import (
+    RESAMPLES,
+    Analysis,
+    Index,
+    analyze_complete,
+    problem,
+    unstated_indices,
+    varies_not,
+)
+from cfmkit.studies.sensitivity.method import Method
+from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.studies.sensitivity.evaluation import Evaluator
+    from cfmkit.studies.sensitivity.setup import Setup
 
 FIRST, TOTAL = "first_order", "total_order"
 NAMES = (FIRST, TOTAL)
-RESAMPLES = 200
-"""Bootstrap samples behind an interval."""
-
-CONSTANT = 1e-12
-"""An output that varies less than so much of its size does not vary: it has no variance to share out."""
-
 FEWEST = 16
 """Convergence is shown from so many blocks on."""
-
-
-def problem(count: int) -> dict[str, Any]:
-    """Return a unit cube as SALib wants it described."""
-    return {"num_vars": count, "names": [str(k) for k in range(count)], "bounds": [[0.0, 1.0]] * count}
 
 
 def sample(start: int, count: int, parameters: int, seed: int) -> FloatArray:
@@ -84,11 +86,6 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
     return tuple(_index(name, found[key], found[f"{key}_conf"]) for name, key in zip(NAMES, ("S1", "ST"), strict=True))
 
 
-def varies_not(outputs: FloatArray) -> bool:
-    """Return whether all outputs are the same, but for rounding."""
-    return bool(np.ptp(outputs) <= CONSTANT * np.abs(outputs).max())
-
-
 def _index(name: str, value: Any, reach: Any) -> Index:
     values, reaches = np.asarray(value, dtype=np.float64), np.asarray(reach, dtype=np.float64)
     return Index(name, values, values - reaches, values + reaches)
@@ -111,3 +108,32 @@ def stages(count: int) -> list[int]:
 def convergence(outputs: FloatArray, seed: int) -> list[tuple[int, Analysis]]:
     """Return the indices from the first 16, ..., n/4, n/2, n blocks."""
     return [(size, analyze(outputs[:size], seed)) for size in stages(len(outputs))]
+
+
+def run(setup: Setup, evaluator: Evaluator) -> Findings:
+    """Return the indices, and how they converge."""
+    count, seed = len(setup.parameters), setup.seed
+    spreads = [one.spread for one in setup.parameters]
+
+    unit = sample(0, setup.samples, count, seed)
+    points = values_at(spreads, unit.reshape(-1, count)).reshape(unit.shape)
+    roles = ["A", *(f"A with {path} of B" for path in setup.paths), "B"]
+    outputs = evaluator.outputs(points, roles)
+    found: list[IndexLine] = []
+    on_the_way: list[IndexLine] = []
+    for m, metric in enumerate(setup.study.metrics):
+        for size in stages(len(outputs)):
+            known = outputs[:size, ..., m]
+            analysis = analyze_complete(known, lambda one: analyze(one, seed), NAMES, count)
+            lines = list(lines_of(metric, setup.paths, analysis, size))
+            on_the_way += lines
+        found += lines
+    return Findings(setup, evaluator, tuple(found), tuple(on_the_way), points=points, outputs=outputs)
+
+
+METHOD = Method(
+    run,
+    lambda samples, parameters, _: samples * (parameters + 2),
+    ("total_order", "first_order"),
+    {"": "draw_bars", "_convergence": "draw_convergence"},
+)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
@@ -170,30 +171,25 @@ class SuggestBlock(Model):
     def request(self) -> Request:
         """Return the same as families know it."""
         value: Any = self.force if self.force is not None else self.torque
-        thinnest = PROCESSES[self.process].least_feature if self.process else None
         usual = USUAL[self.process] if self.process else ()
         materials = self._materials or tuple(MaterialSpec(name=name) for name in usual)
         blocks = tuple(self._lasting(one) for one in materials)
         low, high = self.ends
-        return Request(
-            kind="force" if self.force is not None else "torque",
-            target=_middle(low, high) if isinstance(value, tuple) else value,
-            low=low,
-            high=high,
-            banded=isinstance(value, tuple),
-            travel=float(self.travel if self.travel is not None else self.angle or 0.0),
-            ripple=self.ripple,
-            envelope=self.envelope,
-            materials=blocks,
-            adjustable=self.adjustable,
-            hysteresis=self.hysteresis,
-            cycles=self.cycles,
-            springs=self.springs,
-            safety=self.safety,
-            good_parts=self.made_well,
-            process=self.process,
-            **({} if thinnest is None else {"thinnest": thinnest}),
-        )
+        derived: dict[str, Any] = {
+            "kind": "force" if self.force is not None else "torque",
+            "target": _middle(low, high) if isinstance(value, tuple) else value,
+            "low": low,
+            "high": high,
+            "banded": isinstance(value, tuple),
+            "travel": float(self.travel if self.travel is not None else self.angle or 0.0),
+            "materials": blocks,
+            "good_parts": self.made_well,
+        }
+        if self.process:
+            derived["thinnest"] = PROCESSES[self.process].least_feature
+        # every other key goes on under its own name
+        own = {field.name for field in fields(Request)} & type(self).model_fields.keys() - derived.keys()
+        return Request(**{name: getattr(self, name) for name in own}, **derived)
 
 
 def _middle(low: float, high: float) -> float:

@@ -240,7 +240,7 @@ def multibody_history(
         spin=np.array([right.spin, left.spin]),
         brace=np.abs([right.roller_pin, left.roller_pin]),
         pin=np.abs([right.slider_pin, left.slider_pin]),
-        elongation=np.abs(center[0] + center[1].conj()) - machine.rest_length - machine.tension_stretch,
+        elongation=machine.springs.elongation(np.abs(center[0] + center[1].conj())),
         center=center,
         on_corner=np.zeros(len(found.times), dtype=bool),
     )
@@ -322,7 +322,7 @@ def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]
 def _slack(name: str, margin: FloatArray, machine: Machine) -> float:
     if name == "lift_off":
         return ROUNDING * float(np.nanmax(np.abs(margin), initial=0.0))
-    return 1e-12 * max(machine.rest_length, 1.0)
+    return 1e-12 * max(machine.springs.rest_length, 1.0)
 
 
 def _describe_ending(name: str, known: Mapping[str, FloatArray], machine: Machine, when: str) -> Finding:
@@ -339,7 +339,8 @@ def _describe_ending(name: str, known: Mapping[str, FloatArray], machine: Machin
         "spring_slack": lambda: finding(
             "spring_slack",
             f"the springs go slack {when}: they become up to {mm(-worst)} shorter than their rest length and hold the "
-            f"rollers no longer; use shorter springs ('mechanism.rest_half_width', here {mm(machine.rest_length / 2)})",
+            "rollers no longer; use shorter springs ('mechanism.rest_half_width', here "
+            f"{mm(machine.springs.rest_length / 2)})",
         ),
     }
     return reported[name]()

@@ -108,10 +108,16 @@ class MotionResponse:
         return guide
 
     @cached_property
+    def axis_distance(self) -> FloatArray:
+        """Distance of the axes of the rollers, (n,) [m]."""
+        distance: FloatArray = np.abs(self.at.center[0] + self.at.center[1].conj())
+        return distance
+
+    @cached_property
     def elongation(self) -> FloatArray:
         """Elongation of the springs, (n,) [m]."""
-        distance: FloatArray = np.abs(self.at.center[0] + self.at.center[1].conj())
-        return distance - self.machine.rest_length - self.machine.tension_stretch
+        elongation: FloatArray = self.machine.springs.elongation(self.axis_distance)
+        return elongation
 
     @cached_property
     def mass(self) -> FloatArray:
@@ -129,8 +135,7 @@ class MotionResponse:
         center = self.at.center.imag
         lifted = parts.roller_mass * center + parts.brace_mass * (center + position) / 2.0
         height = machine.slider_mass * position + lifted.sum(axis=0)
-        stretch = np.maximum(self.elongation + self.machine.tension_stretch, 0.0)
-        potential = machine.gravity * height + machine.stiffness * stretch**2 / 2.0
+        potential = machine.gravity * height + machine.springs.energy(self.axis_distance)
         if machine.sideways:
             outward = (parts.roller_mass + 0.5 * parts.brace_mass) * self.at.center.real
             potential = potential - machine.sideways * (outward[0] - outward[1])
@@ -218,7 +223,7 @@ def _springs(machine: Machine, center: ComplexArray) -> ComplexArray:
     """Return the force of the springs on both rollers (2, n) [N]; springs do not push."""
     gap = center[0] + center[1].conj()
     distance = np.abs(gap)
-    pull = machine.stiffness * np.maximum(distance - machine.rest_length, 0.0) / distance * gap
+    pull = machine.springs.pull(distance) / distance * gap
     # The left roller sees the opposite force in a mirror.
     return np.array([-pull, -pull.conj()])
 

@@ -264,7 +264,7 @@ class NineCoordinates:
         )
         gap = right - left
         distance = np.abs(gap)
-        pull = machine.stiffness * np.maximum(distance - machine.rest_length, 0.0) * gap / distance
+        pull = machine.springs.pull(distance) * gap / distance
         for chain, posture, side, arm in zip(self.chains, postures, self.sides, (right, -left), strict=True):
             parts, brace = side.parts, chain.columns.start
             first = parts.brace_length * (0.5 * parts.brace_mass + parts.roller_mass)
@@ -378,7 +378,7 @@ def reactions(model: NineCoordinates, found: Trajectory) -> tuple[Reactions, Rea
     machine, x = model.machine, found.coordinates
     right, left = (chain.length * np.exp(1j * x[:, chain.columns.start]) for chain in model.chains)
     distance = np.abs(right - left)
-    pull = machine.stiffness * np.maximum(distance - machine.rest_length, 0.0) * (right - left) / distance
+    pull = machine.springs.pull(distance) * (right - left) / distance
     first, second = (_side(model, found, index, spring) for index, spring in enumerate((-pull, -pull.conj())))
     return first, second
 

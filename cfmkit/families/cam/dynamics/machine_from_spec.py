@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, NoRise, Side, SideParts, pieces_of
 from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
@@ -61,9 +62,7 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
             lift,
         ),
         slider_mass=masses.slider if masses else 0.0,
-        stiffness=mechanism.springs.total,
-        rest_length=2.0 * mechanism.springs_rest,
-        tension_stretch=mechanism.springs.tension_stretch,
+        springs=AxisSprings.of(mechanism),
         gravity=GRAVITY * along if spec.gravity else 0.0,
         friction=mechanism.rolling_friction if stated_motion(spec).closed else 0.0,
         sideways=GRAVITY * right_share if spec.gravity and stated_motion(spec).closed else 0.0,

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.dynamics.axis_springs import AxisSprings
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track
 
@@ -58,15 +59,10 @@ class Machine:
     right: Side
     left: Side
     slider_mass: float  # [kg]
-    # stiffness, rest_length: of all springs together, between the axes of the rollers [N/m, m]; at that distance they
-    # would pull no more
-    stiffness: float
-    rest_length: float
+    springs: AxisSprings  # between the axes of the rollers
     gravity: float  # acceleration against the slider's travel up; 0 switches weight off [m/s^2]
     friction: float = 0.0  # rolling resistance over roller radius
     sideways: float = 0.0  # acceleration across the slider's travel, to the right, with which weight acts [m/s^2]
-    # how much farther apart than `rest_length` the axes are when springs with initial tension begin to open [m]
-    tension_stretch: float = 0.0
 
     @cached_property
     def constants(self) -> Constants:

@@ -15,7 +15,6 @@ from cfmkit.export.posed_part import PosedBody, swept
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
 from cfmkit.families.slider_crank.printed.part import STRAIGHT, Leg, bodies, choose_points
 from cfmkit.specs.units import format_short
-from cfmkit.stock.material_and_part_spec import PaddedPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.stock.material_and_part_spec import PaddedPart
 
 
 SWEPT = 25
@@ -44,7 +44,7 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     """
     from cfmkit.export.union import SAGITTA, OutlinePiece, merge_pieces
 
-    part, fillet = spec.mechanism.part or PaddedPart(), spec.mechanism.fillet
+    part, fillet = spec.mechanism.cut_part, spec.mechanism.fillet
     outline, path = leg.contours
     rounded, sharp = round_inside_corners(outline, fillet)
     sections = check_outline((rounded,), tuple(leg.specified_pieces()), leg.thinnest, fillet)

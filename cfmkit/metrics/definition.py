@@ -1,0 +1,56 @@
+"""Definition of a metric: its name, unit, meaning, and the functions that compute it of one curve and of many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+
+
+Worst = Literal["largest", "smallest", "farthest-from-target"]
+Scope = Literal["branch", "cycle", "loop", "value"]
+
+_PLACEHOLDERS: Mapping[Kind, Mapping[str, str]] = {
+    "force": {"effort": "force", "motion": "length", "work": "energy"},
+    "torque": {"effort": "torque", "motion": "angle", "work": "energy"},
+}
+_WORDS = {"force": "displacement", "torque": "angle"}
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Definition of a metric."""
+
+    name: str  # as requirements and tables call it
+    dimension: str  # a name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve
+    definition: str  # one sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words
+    # takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`; None: the family computes it and
+    # puts it into `Result.values`
+    function: Callable[..., float] | None = None
+    # takes a `RowsInWindow`, returns the same of many curves, (d,), NaN where there is none; None: studies analyse each
+    # curve alone
+    of_rows: Callable[[Any], FloatArray] | None = None
+    worst: Worst = "largest"  # which branch counts where none is named; without a target the farthest is the smallest
+    # what it belongs to: one branch; all branches together, or one of them alone; the closed loop only; or no curve at
+    # all
+    scope: Scope = "branch"
+    windowed: bool = True  # whether it looks only inside the window
+    argument: str = ""  # what stands in its brackets in place of a branch: a dimension, or nothing
+    of_material: bool = False  # whether it is there only where the material says something about use
+    of_curve: bool = False  # whether it is there only where a target curve is
+    of_parts: bool = False  # whether it is there only where the model knows the efforts of single springs and members
+
+    @property
+    def per_branch(self) -> bool:
+        """Whether ``name[branch]`` means something."""
+        return self.scope in ("branch", "cycle") and not self.argument
+
+    def of(self, kind: Kind) -> Definition:
+        """Return the definition in the words and units of one kind of curve."""
+        text = self.definition.replace("{effort}", kind).replace("{motion}", _WORDS[kind])
+        return replace(self, dimension=_PLACEHOLDERS[kind].get(self.dimension, self.dimension), definition=text)
