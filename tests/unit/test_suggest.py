@@ -556,7 +556,7 @@ def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
     keys = {"force": "1.8 N", "travel": "12.8 mm", "envelope": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
     offer = function_named(family("slider-crank").propose)(read_request(None, keys).request(), Run())
     kinds = [one.variant.partition(",")[0] for one in offer.candidates]
-    assert {"strip", "flexures", "tapered strip"} <= set(kinds)
+    assert {"strip", "springs at pins", "tapered strip"} <= set(kinds)
     assert "tapered strip" not in kinds[: -kinds.count("tapered strip")]
 
 
@@ -665,8 +665,8 @@ def test_springs_for_a_force_are_the_flattest_of_those_that_fit():
     )
     with pytest.raises(SolutionError, match="no spring of steel wire fits at the crank pin"):
         add_custom_springs(family("slider-crank").design(free, Run()).spec, asked)
-    best = make_proposal(ProposalJob("slider-crank", offered[0], asked, 0))
-    assert best.good, best.missed or best.message
+    made = (make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in offered[:4])
+    best = next(one for one in made if one.good)  # the first ones need more room for guide and ground
     assert best.numbers["depth"] <= asked.depth
 
 

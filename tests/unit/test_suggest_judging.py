@@ -15,6 +15,7 @@ from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.families import family, stiffening_of_wide_beams
 from cfmkit.families.base import function_named
+from cfmkit.families.hardware import PartStrength
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
@@ -346,11 +347,12 @@ def test_links_bear_what_the_formulas_of_a_bar_with_holes_say():
 
 def test_links_are_as_narrow_as_their_loads_allow():
     acting = loads(axial=-12.0, moment=0.05, pin=12.0, rate=0.05)
-    link = links_that_bear(acting, 2e-3, 2e9, 40e6, 0.4e-3, 3e-3)
+    strength = PartStrength("x", 2e9, 40e6, 235e6, assumed=False)
+    link = links_that_bear(acting, 2e-3, strength, 0.4e-3, 3e-3)
     assert link.safety(acting, 40e6) >= 1.0
     assert 0.0099 < link.turn_share(acting) <= 0.01
-    assert links_that_bear(acting, 0.2e-3, 2e9, 40e6, 0.4e-3, 3e-3) is None
-    assert links_that_bear(acting, 2e-3, 2e9, 40e6, 0.4e-3, 0.5e-3) is None
+    assert links_that_bear(acting, 0.2e-3, strength, 0.4e-3, 3e-3) is None
+    assert links_that_bear(acting, 2e-3, strength, 0.4e-3, 0.5e-3) is None
 
 
 LINKAGE = {

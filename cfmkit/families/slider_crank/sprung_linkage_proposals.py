@@ -8,13 +8,14 @@ springs within the envelope.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm, percent
+from cfmkit.families.hardware import PartStrength
 from cfmkit.families.slider_crank.flattest_springs_that_fit import STILL, SprungMotion, flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
@@ -283,7 +284,9 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
         return None
     loads = _loads(spec)
     widest = min((_hole_of_coil(spec, name, loads_of) for name, loads_of in _turns_of(spec).items()), default=np.inf)
-    link = links_that_bear(loads, sheet, material.modulus, request.strength_used * allowable, request.thinnest, widest)
+    own = PartStrength.from_material(material, spec.mechanism.safety_factor)
+    strength = replace(own, allowable=min(request.strength_used * allowable, own.allowable))
+    link = links_that_bear(loads, sheet, strength, request.thinnest, widest)
     if link is None:
         return None
     changes: dict[str, Any] = {

@@ -58,7 +58,7 @@ def with_shares(found: Findings, met: NDArray[np.bool_], failed: NDArray[np.bool
 
 
 def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
-    """Return findings with the share of good parts, and what it gains from tighter tolerances."""
+    """Return findings with the yield, and what it gains from tighter tolerances."""
     setup, outputs = found.setup, found.outputs
     if outputs is None:
         return found

@@ -37,6 +37,7 @@ from cfmkit.stock.stock_series import ALL_SERIES
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.hardware import PartStrength
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
@@ -160,9 +161,6 @@ PIN_DIAMETERS = tuple(
 )
 """Pins of links [m]: the diameters of ISO 2338 from 1 mm on."""
 
-PIN_STRENGTH = 235e6
-"""Yield strength of pins [Pa]: plain carbon steel, EN 10025-2 S235; hardened ones bear more."""
-
 LARGEST_TURN_SHARE = 0.01
 """Turn of a link over that of its spring up to which links count as rigid."""
 
@@ -174,7 +172,7 @@ SPARE = 1.001
 
 
 def links_that_bear(
-    loads: LinkLoads, sheet: float, modulus: float, allowable: float, least: float, widest_pin: float
+    loads: LinkLoads, sheet: float, strength: PartStrength, least: float, widest_pin: float
 ) -> LinkBar | None:
     """Return the narrowest links of a sheet that bear their loads and stay straight; None if there are none.
 
@@ -183,21 +181,25 @@ def links_that_bear(
     loads : LinkLoads
     sheet : float
         Thickness [m].
-    modulus, allowable : float
-        Of the material [Pa].
+    strength : PartStrength
+        Of the material, and of its pins.
     least : float
         Thinnest wall that the process makes [m].
     widest_pin : float
         Largest diameter of a pin: torsion springs go around it [m].
     """
-    pin = next((d for d in PIN_DIAMETERS if _pin_bears(d, loads, sheet, allowable)), None)
+    pin = next((d for d in PIN_DIAMETERS if _pin_bears(d, loads, sheet, strength)), None)
     if pin is None or pin > widest_pin:
         return None
     low, high = pin + 2.0 * max(least, 0.25 * pin), WIDEST_SHARE * min(loads.lengths)
 
+    modulus = strength.modulus
+
     def bears(width: float) -> bool:
         link = LinkBar(width, sheet, pin, modulus)
-        return bool(link.safety(loads, allowable) >= SPARE and SPARE * link.turn_share(loads) <= LARGEST_TURN_SHARE)
+        return bool(
+            link.safety(loads, strength.allowable) >= SPARE and SPARE * link.turn_share(loads) <= LARGEST_TURN_SHARE
+        )
 
     if low > high or not bears(high):
         return None
@@ -215,8 +217,8 @@ def least_sheet(loads: LinkLoads, modulus: float, allowable: float) -> float:
     return float(max(widest.turn_share(loads) / LARGEST_TURN_SHARE, widest.stress(loads) / allowable))
 
 
-def _pin_bears(diameter: float, loads: LinkLoads, sheet: float, allowable: float) -> bool:
+def _pin_bears(diameter: float, loads: LinkLoads, sheet: float, strength: PartStrength) -> bool:
     """Return True if a pin bears its load: in its hole, and bent between two links, whose middles are a sheet apart."""
     pressure = bearing_pressure(loads.pin_max, diameter, sheet)
     bent = pin_bending(loads.pin_max, sheet, diameter)
-    return bool(SPARE * pressure <= allowable and SPARE * bent <= PIN_STRENGTH)
+    return bool(SPARE * pressure <= strength.allowable and SPARE * bent <= strength.pins)
