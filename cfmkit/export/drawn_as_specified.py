@@ -124,11 +124,20 @@ def _check_area(measured: float, least: float, largest: float) -> None:
 def _areas(
     pieces: Sequence[FloatArray], holes: Sequence[FloatArray], fillet: float, grid: float
 ) -> tuple[float, float]:
-    """Return the area of the union of polygons less holes [m2]: without fillets, and with all that they may fill."""
-    from shapely import Polygon, union_all
+    """Return the area of the union of polygons less holes [m2]: without fillets, and with all that they may fill.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the union does not exist in numbers of double precision.
+    """
+    from shapely import GEOSException, Polygon, union_all
 
     # without a grid the union of strips that only just overlap may lose one of them
     shapes = ([Polygon(area).buffer(0.0) for area in areas] for areas in (pieces, holes))
-    whole, cut = (union_all(own, grid_size=grid) for own in shapes)
+    try:
+        whole, cut = (union_all(own, grid_size=grid) for own in shapes)
+    except GEOSException:
+        raise GeometryError("the outline has pieces that are too thin to be joined: make its beams thicker") from None
     filled = whole.buffer(fillet, quad_segs=32).buffer(-fillet, quad_segs=32) if fillet > 0 else whole
     return float(whole.difference(cut).area), float(filled.difference(cut).area)

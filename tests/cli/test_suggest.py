@@ -96,7 +96,7 @@ def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
     document = document_of(data | {"families": [], "warnings": []}, ExitCode.OK, written)
     notes = [note.text for note in document.notes if note.word == "note"]
     assert len(notes) == 1
-    assert "the time ran out: of 1-cam-2-springs only design.yaml was written" in notes[0]
+    assert "no time was left for the curve and figures of 1-cam-2-springs" in notes[0]
 
 
 def test_a_request_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):

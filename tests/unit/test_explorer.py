@@ -84,9 +84,9 @@ def test_what_is_saved_can_be_analysed_and_replaces_nothing(explorer):
     assert explorer.save("mine.yaml", ["mechanism.springs.stiffness=0.8 N/mm"]) == {"saved": "mine.yaml"}
     saved = cfmkit.load(explorer.folder / "mine.yaml")
     assert saved.mechanism.springs.stiffness == pytest.approx(800.0)
-    with pytest.raises(OutputError, match="in the way"):
+    with pytest.raises(OutputError, match=r"the file exists|in the way"):
         explorer.save("mine.yaml", ())
-    with pytest.raises(OutputError, match="in the way"):
+    with pytest.raises(OutputError, match=r"the file exists|in the way"):
         explorer.save("cam.yaml", ())
 
 

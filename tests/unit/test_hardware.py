@@ -147,6 +147,6 @@ def test_a_design_without_stated_friction_says_what_pins_and_guide_take():
 
     plain = cfmkit.analyze(cfmkit.load("configs/slider_crank_bilancia2019.yaml"))
     note = friction_note(plain, Run())
-    assert ": 0.15 assumed in pins (" in note
+    assert "with 0.15 in pins (" in note
     rubbing = cfmkit.load("configs/slider_crank_friction.yaml")
     assert friction_note(cfmkit.analyze(rubbing), Run()) == ""

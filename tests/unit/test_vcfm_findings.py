@@ -522,7 +522,8 @@ def test_every_finding_is_explained_and_no_other_can_be_made():
     bought = {"spring_overstretched", "spring_slack", "no_spring_fits"}  # test_vcfm_bought_springs.py
     bought |= {"spring_buckles"}  # test_spring_wire_and_buckling.py
     curves = {"target_curve"}  # test_target_curve.py
-    assert tested | designs | solids | wide | bought | curves == set(FINDINGS)
+    stops = {"contact_begins", "blocked"}  # test_end_stops.py
+    assert tested | designs | solids | wide | bought | curves | stops == set(FINDINGS)
     with pytest.raises(KeyError):
         finding("bad_luck", "")
 

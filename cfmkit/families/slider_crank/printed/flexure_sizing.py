@@ -182,6 +182,9 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
             f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {found.over:.4g} times the stress allowed"
         )
         return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
+    if (thinnest := min(one.thickness for one in found.flexures)) < 1.0 / PER_METRE:
+        text = f"the stress allows flexures of {mm(thinnest)} at most: less travel, or a stronger material"
+        return no_design(finding("target_unreachable", text))
     over = (
         "of flexures sized by the closed forms over that of the springs, on average",
         "of flexures sized by the closed forms over that of pure bending",
@@ -287,11 +290,15 @@ def correct_flexures(
     return Sized(parts, *factors, by_stress)
 
 
+PER_METRE = 1e8
+"""Thicknesses are whole parts of it, rounded down: the stress is that of the written one."""
+
+
 def _write_flexures(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
     blocks = [
         FlexureSpec(
             length=round(one.length, 9),
-            thickness=float(np.floor(one.thickness * 1e8) / 1e8),
+            thickness=float(np.floor(one.thickness * PER_METRE) / PER_METRE),
             width=round(one.width, 8),
             before=one.before,
         )

@@ -22,6 +22,7 @@ import numpy as np
 
 from cfmkit.arrays import LazySequence, distinct
 from cfmkit.curves import Column, Curve
+from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import ScalarQuantity, SolvedRows, drop_numbers, findings_of_one, valid, values_of_one
@@ -62,11 +63,11 @@ ROWS_TOGETHER = 96
 """Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
 COLUMNS = dict(QUANTITIES) | {
-    name: ScalarQuantity[Solution](*about, lambda _solution: np.nan, applies=lambda _solution: False)
-    for name, about in OF_PARTS.items()
+    name.partition("[")[0]: ScalarQuantity[Solution](*about, lambda _solution: np.nan, applies=lambda _solution: False)
+    for name, about in (OF_PARTS | OF_STOPS).items()
     if name not in QUANTITIES
 }
-"""What studies may ask of rows: of values that only printed parts have their cells are empty."""
+"""What studies may ask of rows: of values that only printed parts and stops have their cells are empty."""
 
 
 def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
