@@ -88,6 +88,14 @@ class ScalarQuantity(Generic[S]):
         return self.dimension, self.definition
 
 
+def without_values(definitions: Mapping[str, tuple[str, str]]) -> dict[str, ScalarQuantity[Any]]:
+    """Return what rows say of results that they never have: studies may ask for them, and their cells are empty."""
+    return {
+        name.partition("[")[0]: ScalarQuantity(*about, lambda _solution: np.nan, applies=lambda _solution: False)
+        for name, about in definitions.items()
+    }
+
+
 def values_of_one(table: Mapping[str, ScalarQuantity[S]], solution: S) -> LazyMapping[Quantity]:
     """Return the scalar results of a solution of one mechanism by name, each computed when it is read."""
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from beam_support import CONFIGS
+from given_points import GivenPoints
 
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.results import Status
+from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.variants_in_rows import are_solved_together
 
 GAP = 4e-3
 RATE = 5e4
@@ -150,3 +154,13 @@ def test_requirements_on_stress_count_with_the_stop_reached():
     at_gap = float(free.closed.stress("load", np.array([GAP]))[0])
     assert result.values["travel_stress_max"].value < free.values["travel_stress_max"].value
     assert result.curve.extra["max_stress"].values[-1] == pytest.approx(at_gap, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["vcfm_ding2022", "vcfm_pla"])
+def test_a_sweep_of_every_column_without_stops_is_solved_in_rows(name):
+    """Metrics of contacts, which a mechanism without stops never has, had made every point a run of its own."""
+    spec = cfmkit.load(CONFIGS / f"{name}.yaml").replace({"requirements": ()})
+    path = "mechanism.bistable.thickness"
+    plan = GivenPoints({path: float(spec.at(path)) * np.array([0.99, 1.0, 1.01])})
+    every = metrics_of(spec, (), cfmkit.analyze(spec).curves[0])
+    assert are_solved_together(Study(spec, plan.paths, tuple(every)), plan)

@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, L
 from cfmkit.families.vcfm.findings import RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stack_laws
-from cfmkit.families.vcfm.quantities import QUANTITIES
+from cfmkit.families.vcfm.quantities import COLUMNS, QUANTITIES
 from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
@@ -153,7 +153,7 @@ def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for start in range(0, len(members), size):
             chosen = members[start : start + size]
             solution = _solve_kind([specs[index] for index in chosen])
-            yield np.array(chosen), SolvedRows(solution, QUANTITIES, RULES, _is_complete(solution))
+            yield np.array(chosen), SolvedRows(solution, COLUMNS, RULES, _is_complete(solution))
 
 
 def _is_complete(solution: Solution) -> NDArray[np.bool_]:

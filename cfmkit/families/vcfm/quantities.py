@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
-from cfmkit.families.rows import ScalarQuantity
+from cfmkit.families.rows import ScalarQuantity, without_values
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
@@ -268,6 +268,9 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{name: _of_wire(name) for name in WIRE_DEFINITIONS},
 }
 """Every scalar result of the family, in the order in which they are shown."""
+
+COLUMNS = without_values(OF_STOPS) | dict(QUANTITIES)
+"""What studies may ask of rows; a mechanism with stops is solved by itself."""
 
 DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()} | OF_STOPS
 """Name -> dimension and definition."""

@@ -25,7 +25,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import ScalarQuantity, SolvedRows, drop_numbers, findings_of_one, valid, values_of_one
+from cfmkit.families.rows import SolvedRows, drop_numbers, findings_of_one, valid, values_of_one, without_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
@@ -62,11 +62,7 @@ RATES = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
 ROWS_TOGETHER = 96
 """Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
-COLUMNS = dict(QUANTITIES) | {
-    name.partition("[")[0]: ScalarQuantity[Solution](*about, lambda _solution: np.nan, applies=lambda _solution: False)
-    for name, about in (OF_PARTS | OF_STOPS).items()
-    if name not in QUANTITIES
-}
+COLUMNS = without_values(OF_PARTS | OF_STOPS) | dict(QUANTITIES)
 """What studies may ask of rows: of values that only printed parts and stops have their cells are empty."""
 
 
