@@ -185,13 +185,9 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     if (thinnest := min(one.thickness for one in found.flexures)) < 1.0 / PER_METRE:
         text = f"the stress allows flexures of {mm(thinnest)} at most: less travel, or a stronger material"
         return no_design(finding("target_unreachable", text))
-    over = (
-        "of flexures sized by the closed forms over that of the springs, on average",
-        "of flexures sized by the closed forms over that of pure bending",
-    )
     factors: dict[str, tuple[float | None, str, str]] = {
-        "closed_form_force": (found.force_factor, "factor", f"force {over[0]}"),
-        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {over[1]}"),
+        "closed_form_force": (found.force_factor, "factor", f"force {FACTORS[0]}"),
+        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {FACTORS[1]}"),
     }
     return Design(
         _write_flexures(spec, found.flexures, stroke),
@@ -289,6 +285,12 @@ def correct_flexures(
         )
     return Sized(parts, *factors, by_stress)
 
+
+FACTORS = (
+    "of flexures sized by the closed forms over that of the springs, on average",
+    "of flexures sized by the closed forms over that of pure bending",
+)
+"""What is said of the factors of force and stress."""
 
 PER_METRE = 1e8
 """Thicknesses are whole parts of it, rounded down: the stress is that of the written one."""
