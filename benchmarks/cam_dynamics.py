@@ -163,9 +163,9 @@ def main():
     parts = build(cfmkit.load(CONFIG))
     machine, motion = parts.machine, parts.motion
     times = motion.times(POINTS)
-    direct, exact = best(lambda: respond(machine, motion.at(times)), 3000, 4)  # short runs dodge other processes
+    direct, exact = best(lambda: respond(machine, motion.evaluate(times)), 3000, 4)  # short runs dodge other processes
     sides = build(cfmkit.load(CONFIG).replace({"mechanism.errors.slider_deviation": "2 deg"})).machine
-    turned, _ = best(lambda: respond(sides, motion.at(times)), 3000, 4)
+    turned, _ = best(lambda: respond(sides, motion.evaluate(times)), 3000, 4)
     largest = np.abs(exact.force).max()
     print(f"{'way':34s} {'steps':>6s} {'error':>9s} {'time':>12s} {'ratio':>8s}")
     print(f"{'direct':34s} {'-':>6s} {'-':>9s} {direct * 1e3:9.3f} ms {1:8.0f}")
@@ -180,7 +180,7 @@ def main():
     if find_spec("exudyn"):
         for steps in (200, 2000, 20000):
             when, force, seconds = Exudyn().run(steps)
-            expected = respond(machine, motion.at(np.minimum(when, motion.time))).force
+            expected = respond(machine, motion.evaluate(np.minimum(when, motion.time))).force
             error = np.abs(force - expected).max() / largest
             line("exudyn, index 2, Newmark", steps, error, seconds, direct)
     else:

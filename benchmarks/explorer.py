@@ -41,7 +41,7 @@ def main() -> None:
     """Print a row a family."""
     print(f"{'config':<22} {'answer':>9} {'analysis':>9} {'ratio':>6} {'wanted':>8}")
     for name, change in SLIDERS.items():
-        explorer = Explorer.of(str(CONFIGS / f"{name}.yaml"))
+        explorer = Explorer.from_file(str(CONFIGS / f"{name}.yaml"))
         answers, analyses = [], []
         for number in range(10, 10 + ROUNDS):
             changes = [change.format(number)]

@@ -51,7 +51,7 @@ def by_ccx(data: bytes) -> tuple[float, float]:
 
 def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
     """Return the same of every part of a specification, in the order of its decks."""
-    return [reaction(one, one.part.meshed().refined()[0]) for one in family(spec.family).driven_parts(spec)]
+    return [reaction(one, one.part.create_mesh().refine()[0]) for one in family(spec.family).driven_parts(spec)]
 
 
 LAYERS, GRADED = 3, 1.5
@@ -63,7 +63,7 @@ of the travel, `slider_crank_tapered` came to another form."""
 
 def extruded(one: DrivenPart) -> bytes:
     """Return a deck of the part in three dimensions, one half of its width, moved as in the plane."""
-    meshed = one.part.meshed()
+    meshed = one.part.create_mesh()
     grid, widths = meshed.problem.elements.mesh, meshed.problem.elements.width
     if np.ptp(widths) > 0:
         raise ValueError("several widths")
@@ -109,7 +109,7 @@ def in_three_dimensions(names: list[str]) -> None:
     for name, changes in ({one: SPECS.get(one, []) for one in names} or SPECS).items():
         spec = cfmkit.load(name, ["analysis.fidelity=solid", *changes])
         for one in family(spec.family).driven_parts(spec):
-            own = reaction(one, one.part.meshed())
+            own = reaction(one, one.part.create_mesh())
             try:
                 other, took = by_ccx(extruded(one))
             except (ValueError, subprocess.CalledProcessError) as error:
@@ -122,9 +122,9 @@ def in_three_dimensions(names: list[str]) -> None:
 
 def reaction(one: DrivenPart, meshed: Meshed) -> float:
     """Return the largest reaction of a part at the end of its travel by cfmkit [N]."""
-    solved = meshed.followed(np.linspace(0.0, one.stops[-1], len(one.stops)).tolist())
+    solved = meshed.follow_stops(np.linspace(0.0, one.stops[-1], len(one.stops)).tolist())
     supports, pose = solved.problem.supports, solved.course.poses[-1]
-    forces = solved.problem.elements.forces(solved.moved(pose))
+    forces = solved.problem.elements.forces(solved.evaluate_displacements(pose))
     return float(np.hypot(*supports.reactions(pose.unknowns, pose.travel, forces)[:, :2].T).max())
 
 

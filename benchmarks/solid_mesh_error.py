@@ -192,14 +192,14 @@ def reference(part: Part, stops: tuple[float, ...]) -> MeshSolution:
     """Return a few poses on a mesh that is much finer than that of an analysis."""
     chosen = np.unique(np.linspace(0, len(stops) - 1, N_POSES).round().astype(int))
     travels = [stops[k] for k in chosen]
-    meshed = part.meshed(part.thinnest / FINE_ACROSS, FINE_ACROSS)
-    found = meshed.followed(travels)
-    found = meshed.at(*(pose for pose in found.course.poses if pose.travel in travels))
+    meshed = part.create_mesh(part.thinnest / FINE_ACROSS, FINE_ACROSS)
+    found = meshed.follow_stops(travels)
+    found = meshed.collect_poses(*(pose for pose in found.course.poses if pose.travel in travels))
     for split in (*N_CORNER_SPLITS * [True], False):
-        finer, refinement = meshed.refined(meshed.singular if split else None)
+        finer, refinement = meshed.refine(meshed.singular if split else None)
         guide = PoseGuide(found, finer, (refinement,))
         poses = [finer.problem.solve(guide(travel), travel) for travel in guide.poses]
-        meshed, found = finer, finer.at(*(pose for pose in poses if pose is not None and pose.unstable == 0))
+        meshed, found = finer, finer.collect_poses(*(pose for pose in poses if pose is not None and pose.unstable == 0))
     return found
 
 
@@ -219,7 +219,7 @@ class Row:
 def compare(name: str, part: DrivenPart, known: dict[str, list[float]]) -> Row:
     """Return the errors of an analysis against a reference."""
     start = time.process_time()
-    solved = part.solved()
+    solved = part.solve()
     seconds = time.process_time() - start
     course, (peaks, _) = solved.solution.course, solved.solution.peaks
     travel, effort, stress = (np.array(known[key]) for key in ("travel", "effort", "stress"))

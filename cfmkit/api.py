@@ -163,7 +163,7 @@ def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
     from cfmkit.runs.notebook_result import AnalysisView
 
     spec = spec_of(spec)
-    return AnalysisView.of(windows_judged(family(spec.family).analyze(spec, run or Run())))
+    return AnalysisView.from_result(windows_judged(family(spec.family).analyze(spec, run or Run())))
 
 
 def design(spec: AnySpec, run: Run | None = None) -> Design:

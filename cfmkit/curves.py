@@ -99,24 +99,24 @@ class Curve(ShortRepr):
     @property
     def displacement(self) -> FloatArray:
         """Displacement of a force curve [m]."""
-        return self._as("force", self.motion, "displacement")
+        return self._require_kind("force", self.motion, "displacement")
 
     @property
     def force(self) -> FloatArray:
         """Force of a force curve [N]."""
-        return self._as("force", self.effort, "force")
+        return self._require_kind("force", self.effort, "force")
 
     @property
     def angle(self) -> FloatArray:
         """Angle of a torque curve [rad]."""
-        return self._as("torque", self.motion, "angle")
+        return self._require_kind("torque", self.motion, "angle")
 
     @property
     def torque(self) -> FloatArray:
         """Torque of a torque curve [N m]."""
-        return self._as("torque", self.effort, "torque")
+        return self._require_kind("torque", self.effort, "torque")
 
-    def _as(self, kind: Kind, values: FloatArray, name: str) -> FloatArray:
+    def _require_kind(self, kind: Kind, values: FloatArray, name: str) -> FloatArray:
         if self.kind != kind:
             raise AttributeError(f"this is a {self.kind} curve: it has no {name}")
         return values
@@ -158,6 +158,6 @@ class Curve(ShortRepr):
             self.motion[keep], self.effort[keep], self.branch[keep], self.stable[keep], extra, self.kind, self.label
         )
 
-    def on(self, branch: str) -> Curve:
+    def select_branch(self, branch: str) -> Curve:
         """Return the points of one branch, in path order."""
         return self.take(self.branch == branch)

@@ -33,7 +33,7 @@ class Slow(Exception):
 def observe(path: Any) -> dict[str, Any]:
     """Return what is compared of a path."""
     at = pick(path)
-    names = [name for name in path.network.nodes if not path.network.moved(name)] if len(at) else []
+    names = [name for name in path.network.nodes if not path.network.is_moved_by_link(name)] if len(at) else []
     return {
         "status": path.status.name,
         "points": len(path.at_requested),

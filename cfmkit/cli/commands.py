@@ -44,7 +44,7 @@ class Verbs(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, in the order of the help."""
-        return sorted(names(), key=lambda name: _module(name).PLACE)
+        return sorted(names(), key=lambda name: _module(name).HELP_POSITION)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return one verb as a command, None if there is no such verb."""
@@ -101,7 +101,7 @@ def _unwrap_paragraphs(text: str) -> str:
 
 def _example(module: ModuleType) -> str | None:
     """Return what a verb's help ends with: a command that can be tried."""
-    command = getattr(module, "EXAMPLE", None)
+    command = getattr(module, "HELP_EXAMPLE", None)
     return None if command is None else f"Example: {command}"
 
 

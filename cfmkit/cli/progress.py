@@ -59,7 +59,7 @@ class StudyProgress:
         """Take how many points there are; a study that draws points again adds them to those that are done."""
         self._all = self._done + points
 
-    def done(self, points: int, failed: int, reused: bool) -> None:
+    def add_finished(self, points: int, failed: int, reused: bool) -> None:
         """Take that more points are finished."""
         self._done += points
         self._failed += failed

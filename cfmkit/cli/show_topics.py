@@ -331,7 +331,9 @@ def _values() -> Records:
 
     every = families.records()
     known = [(record.name, record.values) for record in every]
-    known += [(record.name, import_module(record.attribution).DEFINITIONS) for record in every if record.attribution]
+    known += [
+        (record.name, import_module(record.attribution).DEVIATION_DEFINITIONS) for record in every if record.attribution
+    ]
     known.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
     return _gather_records(
         (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})

@@ -84,13 +84,13 @@ class DesignProgram(ABC):
     elastic: tuple[str, ...] = ()  # limits that give way, by the last variable
 
     @abstractmethod
-    def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
+    def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return objective and rows at z, with derivatives or without; None if the model has no answer."""
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return the objective and the constraints (m,) at z (n,); None if the model has no answer."""
         elastic = self.elastic
-        seen = self.seen(z[:-1] if elastic else z, False)
+        seen = self.evaluate(z[:-1] if elastic else z, False)
         if seen is None:
             return None
         rows = [one.values + z[-1] if one.name in elastic else one.values for one in seen.rows]
@@ -99,7 +99,7 @@ class DesignProgram(ABC):
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives (n,) and (m, n) of objective and constraints at z."""
         elastic = self.elastic
-        seen = self.seen(z[:-1] if elastic else z, True)
+        seen = self.evaluate(z[:-1] if elastic else z, True)
         if seen is None:
             return None
         objective = np.zeros(len(z))

@@ -301,7 +301,7 @@ class _Parts:
         found = [self.seen(x, error) for error in self.errors]
         return None if any(one is None for one in found) else np.array([self.seen.rows(one) for one in found])  # type: ignore[arg-type]
 
-    def sloped(self, x: FloatArray) -> FloatArray | None:
+    def differentiate_rows(self, x: FloatArray) -> FloatArray | None:
         """Return the derivatives of those rows by the values, (k, m, n)."""
         out = []
         for error in self.errors:
@@ -342,7 +342,7 @@ def optimise_on_samples(
     for _ in range(most):
         if trust < LEAST_TRUST or problem.late():
             break
-        slopes = parts.sloped(x) if slopes is None else slopes
+        slopes = parts.differentiate_rows(x) if slopes is None else slopes
         move = (
             None
             if slopes is None

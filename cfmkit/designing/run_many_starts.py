@@ -55,7 +55,7 @@ class Clock:
     deadline: float | None = None
 
     @classmethod
-    def of(cls, *budgets: float | None) -> Clock:
+    def from_budgets(cls, *budgets: float | None) -> Clock:
         """Return the clock on which the shortest of some budgets [s] begins now."""
         given = [budget for budget in budgets if budget is not None]
         return cls(time() + min(given) if given else None)
@@ -64,7 +64,7 @@ class Clock:
         """Return whether the time is up."""
         return self.deadline is not None and time() > self.deadline
 
-    def left(self) -> float | None:
+    def get_time_left(self) -> float | None:
         """Return the time that is left [s], at least 0; None: all the time."""
         return None if self.deadline is None else max(self.deadline - time(), 0.0)
 

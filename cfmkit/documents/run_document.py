@@ -383,7 +383,7 @@ def _remark(report: Report, name: str) -> str:
 def _rule(report: Report) -> str:
     """Return by which rule a stress is allowed, where the mechanism says how much of its strength may be used."""
     try:
-        return f" (yield strength / {report.result.spec.at('mechanism.safety_factor'):.4g})"
+        return f" (yield strength / {report.result.spec.get_value('mechanism.safety_factor'):.4g})"
     except KeyError:
         return ""
 

@@ -99,7 +99,7 @@ class Report:
         missed = [ExitCode.REQUIREMENT_MISSED] if self.missed else []
         return worst([self.status.exit_code, *missed])
 
-    def beside(self, metrics: Mapping[str, Quantity], supplement: Supplement) -> Report:
+    def extend(self, metrics: Mapping[str, Quantity], supplement: Supplement) -> Report:
         """Return the report with more to say."""
         both = self.supplement.plus(supplement)
         return replace(self, metrics={**self.metrics, **metrics}, supplement=both)

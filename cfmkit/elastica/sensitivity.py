@@ -83,7 +83,7 @@ class Gradient:
             for k in range(self.designs.count)
         )
 
-    def of(self, output: Output) -> FloatArray:
+    def differentiate(self, output: Output) -> FloatArray:
         """Return the derivatives (..., k) of an output (...) of a model and its equilibria, analytic in both."""
         pairs = zip(self.designs.networks, self.stepped, strict=True)
         return read_only(np.stack([np.imag(output(net, at)) / COMPLEX_STEP for (net, _), at in pairs], axis=-1))
@@ -111,12 +111,12 @@ class Gradient:
     @property
     def motion(self) -> Mapping[str, FloatArray]:
         """Node -> (p, 3, k) derivatives of `EquilibriumPath.motion`, of linked nodes too."""
-        return _Lookup(self, lambda node: self.of(lambda _, at: node_motion(at, node)))
+        return _Lookup(self, lambda node: self.differentiate(lambda _, at: node_motion(at, node)))
 
     @property
     def reaction(self) -> Mapping[str, FloatArray]:
         """Node -> (p, 3, k) derivatives of `EquilibriumPath.reaction`."""
-        return _Lookup(self, lambda node: self.of(lambda _, at: node_reaction(at, node, _residual(at))))
+        return _Lookup(self, lambda node: self.differentiate(lambda _, at: node_reaction(at, node, _residual(at))))
 
     def contact_force(self, number: int) -> FloatArray:
         """Return the derivatives of `EquilibriumPath.contact_force`, (p, k)."""
@@ -133,13 +133,13 @@ class Gradient:
             found = beam_states.states_of_elements(net, at, [element], np.array([float(end)]))
             return np.stack([found.h[:, 0], found.v[:, 0], found.moment[:, 0]], axis=-1)
 
-        return self.of(output)
+        return self.differentiate(output)
 
     @cached_property
     def energy(self) -> FloatArray:
         """Derivatives of `EquilibriumPath.energy`, (p, k)."""
         moment = self.path.mesh.scales.moment
-        return self.of(lambda _, at: strain_energy(at) * moment)
+        return self.differentiate(lambda _, at: strain_energy(at) * moment)
 
     def shape(self, beam: str) -> FloatArray:
         """Return the derivatives of `EquilibriumPath.shape`, (p, n, 2, k): of material points of the beam."""
@@ -199,7 +199,7 @@ class Gradient:
         """
         known = self.path.stress_extremes(beam, axial)
         element, fraction = known.element[self.points], known.fraction[self.points]
-        return self.of(lambda net, at: stress_extremes.stress_at(net, at, beam, element, fraction, axial))
+        return self.differentiate(lambda net, at: stress_extremes.stress_at(net, at, beam, element, fraction, axial))
 
 
 class _Lookup(Mapping[str, Any]):

@@ -142,7 +142,7 @@ def frequencies(
     unit = np.sqrt(fine.scales.force / fine.scales.length) / (2 * np.pi)
     for k, point in enumerate(chosen.tolist()):
         z = embed(path.mesh, fine, path.at.z[point])
-        matrices = system.at(z, float(path.at.drive[point]))
+        matrices = system.assemble_matrices(z, float(path.at.drive[point]))
         row = system.row_of(z, *hold) if hold is not None and by_load else None
         (squares, *still), (others, *loose) = (
             _squares(*_choose_unknowns(fine, matrices, is_held, row), count) for is_held in (True, False)
@@ -210,12 +210,12 @@ class _VibratingNetwork:
         inner = fine.size + np.arange(elements * own).reshape(elements, 2, 2, self.order)
         self.positions, self.varying = inner[:, 0], inner[:, 1]  # (e, axis, order) unknowns: bubbles; forces
 
-    def at(self, z: FloatArray, drive: float) -> _Matrices:
+    def assemble_matrices(self, z: FloatArray, drive: float) -> _Matrices:
         """Return the matrices about a pose."""
         stiffness = np.zeros((self.size, self.size))
         stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
         self._vary(stiffness, z, drive)
-        columns = [self._spread(*given) for given in self._weighed(z)]
+        columns = [self._spread(*given) for given in self._iterate_masses(z)]
         for name, (weight, inertia) in self.masses.nodes.items():
             moves, unknowns = self._node(z, name)
             size = np.array([weight, weight, inertia / self.fine.scales.length**2])
@@ -253,7 +253,7 @@ class _VibratingNetwork:
                     stiffness[rows, mean] = stiffness[mean, rows] = -(self.forces.T @ share)
                     stiffness[np.ix_(rows, self.varying[k, other])] = -(self.forces.T * share) @ self.forces
 
-    def _weighed(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
+    def _iterate_masses(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
         """Yield unknowns, what they move the points of beams by, and masses; and the same of sections' rotations."""
         fine, e, u = self.fine, self.fine.elements, self.rule.places
         ends = [poses(fine.attachments, z, e.ends[:, side]).jacobian for side in (0, 1)]

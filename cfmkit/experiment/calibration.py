@@ -213,7 +213,7 @@ def _compare_start(
     shift = next((item for item in parameters if _is_shift(item)), None)
     if shift is None:
         return found
-    parts = [found.curve.on(item.model_branch).motion for item in found.samples]
+    parts = [found.curve.select_branch(item.model_branch).motion for item in found.samples]
     low = max(found.window.lo, max(float(part.min()) for part in parts) + shift.high)
     high = min(found.window.hi, min(float(part.max()) for part in parts) + shift.low)
     if not low < high:

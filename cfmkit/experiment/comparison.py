@@ -245,7 +245,7 @@ def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branche
     from cfmkit.experiment.curves_and_metrics_of_recording import common_window
 
     measured, kind = common_window(source.raw), curve.kind
-    ends = [(float(part.motion.min()), float(part.motion.max())) for part in map(curve.on, branches)]
+    ends = [(float(part.motion.min()), float(part.motion.max())) for part in map(curve.select_branch, branches)]
     common = overlap([*ends, (measured.lo, measured.hi)], wanted)
     if common is None:
         reported = span_text(measured.lo, measured.hi, kind)
@@ -259,7 +259,7 @@ def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branche
 
 
 def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> Samples:
-    parts = [curve.on(branch) for curve in source.raw]
+    parts = [curve.select_branch(branch) for curve in source.raw]
     slack = 1e-9 * (window.hi - window.lo)
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]
     times = np.split(elapsed_fraction(source, branch), np.cumsum([len(inside) for inside in keep])[:-1])

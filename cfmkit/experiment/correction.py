@@ -144,9 +144,9 @@ def correct(
     if _largest_departure(explanations[:1], corrected, aim) > LARGEST_REMAINDER:
         raise redesign.not_makeable(x, after.value)
     changes = {
-        path: (float(spec.at(path)), float(value))
+        path: (float(spec.get_value(path)), float(value))
         for path, value in zip(redesign.limits, x, strict=True)
-        if abs(value / float(spec.at(path)) - 1.0) > 1e-5
+        if abs(value / float(spec.get_value(path)) - 1.0) > 1e-5
     }
     stated = _state_modulus(corrected, best) if len(explanations) == 1 else corrected
     return DesignCorrection(
@@ -204,7 +204,7 @@ def _warnings(spec: Spec, explanations: Sequence[Explanation]) -> Iterator[Findi
         yield Finding("not_told_apart", reported)
     best = explanations[0]
     for item, value in zip(best.errors, best.values, strict=True):
-        material = spec.at(item.path.rpartition(".")[0]) if item.path.endswith(".youngs_modulus") else None
+        material = spec.get_value(item.path.rpartition(".")[0]) if item.path.endswith(".youngs_modulus") else None
         known = MATERIALS.get(getattr(material, "name", None) or "")
         if known is None or known.scatter.youngs_modulus[0] <= value <= known.scatter.youngs_modulus[1]:
             continue

@@ -53,7 +53,7 @@ def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterva
     for curve in curves:
         cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
         for branch in curve.branches:
-            places = np.sort(curve.on(branch).motion)
+            places = np.sort(curve.select_branch(branch).motion)
             found += [
                 UnrecordedInterval(low, high, branch, cycle)
                 for low, high in holes_between(places, window.lo, window.hi)

@@ -388,7 +388,7 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
         (branch, number_of(curve)): (float(part.min()), float(part.max()))
         for curve in source.raw
         for branch in curve.branches
-        for part in [curve.on(branch).motion]
+        for part in [curve.select_branch(branch).motion]
     }
     widest = min(low for low, _ in extents.values()), max(high for _, high in extents.values())
     # Passages at reversals are left out of one branch or the other of every recording.

@@ -186,7 +186,7 @@ def _joint(spec: Spec, kind: str, paths: tuple[str, ...]) -> FitParameter:
     first = paths[0]
     quantity = leaf(type(spec), first).quantity
     dimension = quantity.dimensions[0] if quantity else "ratio"
-    start = float(spec.at(first))
+    start = float(spec.get_value(first))
     if kind in ("modulus", "rate"):
         ends = (start / LARGEST_FACTOR, start * LARGEST_FACTOR)
         return FitParameter(first, dimension, start, *ends, start, paths, by_factor=True)
@@ -198,10 +198,10 @@ def _joint(spec: Spec, kind: str, paths: tuple[str, ...]) -> FitParameter:
 
 def _thinnest(spec: Spec, paths: tuple[str, ...]) -> float:
     """Return the smallest thickness of those at some paths, or beside them where they are errors from zero."""
-    values = [float(spec.at(path)) for path in paths]
+    values = [float(spec.get_value(path)) for path in paths]
     if min(values) > 0.0:
         return min(values)
-    beside = spec.at(paths[0].rpartition(".")[0] + ".thickness")
+    beside = spec.get_value(paths[0].rpartition(".")[0] + ".thickness")
     return float(min(beside) if isinstance(beside, tuple) else beside)
 
 

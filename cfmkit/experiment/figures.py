@@ -91,7 +91,7 @@ def _named_holes(holes: Sequence[UnrecordedInterval]) -> dict[tuple[float, float
 
 def broken_at_holes(curve: Curve) -> Curve:
     """Return a curve with a point without effort in each hole: its line ends there and begins again."""
-    places = [np.sort(curve.on(name).motion) for name in curve.branches]
+    places = [np.sort(curve.select_branch(name).motion) for name in curve.branches]
     after = [set(part[:-1][is_hole_after(part)].tolist()) for part in places]
     breaks = []
     for name, holes in zip(curve.branches, after, strict=True):
@@ -116,7 +116,7 @@ def broken_at_holes(curve: Curve) -> Curve:
 def _draw_faint(curve: Curve, ax: Axes) -> None:
     """Draw the raw samples of a curve in grey, branch by branch."""
     for name in curve.branches:
-        part = curve.on(name)
+        part = curve.select_branch(name)
         x, y = to_border(part.motion, curve.motion_dimension), to_border(part.effort, curve.kind)
         ax.plot(x, y, color=GREY, linewidth=0.5, alpha=0.55, zorder=2, gid="no-obstacle")
 

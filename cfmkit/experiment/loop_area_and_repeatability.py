@@ -35,7 +35,7 @@ def branch_at(curve: Curve, branch: str, places: FloatArray) -> FloatArray:
     places : (n,) array
         Motion [m or rad], inside what the branch covers.
     """
-    part = curve.on(branch)
+    part = curve.select_branch(branch)
     way = 1 if part.motion[-1] >= part.motion[0] else -1
     values: FloatArray = np.interp(places, part.motion[::way], part.effort[::way])
     return values
@@ -71,7 +71,7 @@ def turned_loop(curves: Sequence[Curve]) -> bool:
     for curve in curves:
         if len(curve.branches) < 2:
             continue
-        up, down = curve.on("load").motion, curve.on("unload").motion
+        up, down = curve.select_branch("load").motion, curve.select_branch("unload").motion
         low, high = max(up.min(), down.min()), min(up.max(), down.max())
         if low < high:
             places = np.linspace(low, high, PLACES)

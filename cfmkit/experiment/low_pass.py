@@ -60,7 +60,7 @@ class LowPass:
         if self.cutoff * step >= 0.5:
             raise DataError(
                 f"the cut-off {self.reported} is not below half the sampling rate; "
-                f"use one below {self._reported(0.5 / step)}"
+                f"use one below {self._format_cutoff(0.5 / step)}"
             )
         tangent = math.tan(math.pi * self.cutoff * step)
         if self.corrected:
@@ -73,9 +73,9 @@ class LowPass:
     @property
     def reported(self) -> str:
         """The cut-off with its unit."""
-        return self._reported(self.cutoff)
+        return self._format_cutoff(self.cutoff)
 
-    def _reported(self, cutoff: float) -> str:
+    def _format_cutoff(self, cutoff: float) -> str:
         if self.per == "time":
             return f"{cutoff:.4g} Hz"
         if self.per == "length":

@@ -59,8 +59,8 @@ class FitParameter:
         if not self.joint:
             return {self.path: value}
         if self.by_factor:
-            return {path: float(spec.at(path)) * value / self.start for path in self.joint}
-        return {path: float(spec.at(path)) + value - self.start for path in self.joint}
+            return {path: float(spec.get_value(path)) * value / self.start for path in self.joint}
+        return {path: float(spec.get_value(path)) + value - self.start for path in self.joint}
 
 
 def parameters(
@@ -151,7 +151,7 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Fit
 
 def _value(spec: Spec, path: str) -> float:
     try:
-        value: Any = spec.at(path)
+        value: Any = spec.get_value(path)
     except KeyError:
         value = None
     if value is None:

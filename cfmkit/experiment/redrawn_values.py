@@ -97,16 +97,16 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
     stated = family(spec.family).errors
     kinds: dict[str, str] = {} if stated is None else dict(function_named(stated)(spec))
     design = getattr(spec, "design", None)
-    ranges = {path: _widen(float(spec.at(path)), *ends) for path, ends in free_of(spec, spec).items()}
+    ranges = {path: _widen(float(spec.get_value(path)), *ends) for path, ends in free_of(spec, spec).items()}
     if not getattr(design, "free", None):
         for path in section_paths(spec):
-            value = float(spec.at(path))
+            value = float(spec.get_value(path))
             ranges.setdefault(path, (value / MOST_CHANGE, value * MOST_CHANGE))
     ranges = {path: ends for path, ends in ranges.items() if kinds.get(path) not in ("rate", "friction")}
     if not ranges:
         places = [path for path, kind in kinds.items() if kind == "position"]
-        ranges = {path: range_about(float(spec.at(path))) for path in places if float(spec.at(path))}
-    sheet, process = sheet_of(getattr(spec.at("mechanism"), "part", None)), assume_errors(spec)
+        ranges = {path: range_about(float(spec.get_value(path))) for path in places if float(spec.get_value(path))}
+    sheet, process = sheet_of(getattr(spec.get_value("mechanism"), "part", None)), assume_errors(spec)
     fixed = {f"mechanism.{key}" for key in spec.out_of_plane_widths} if sheet is not None else set()
     limits = {}
     for path, (low, high) in ranges.items():
@@ -114,7 +114,7 @@ def limits_of(spec: Spec) -> dict[str, DrawnRange]:
             continue
         limit = DrawnRange(low, high)
         if process is not None and _is_section(path) and process.process.least_feature > low:
-            thinnest = min(process.process.least_feature, float(spec.at(path)))
+            thinnest = min(process.process.least_feature, float(spec.get_value(path)))
             limit = DrawnRange(thinnest, max(high, thinnest), f"the least that {process.process.name} makes")
         if limit.low < limit.high:
             limits[path] = limit
@@ -181,7 +181,7 @@ class Redesign:
     @cached_property
     def start(self) -> FloatArray:
         """The values as drawn, (n,) [SI]."""
-        return np.array([float(self.drawn.at(path)) for path in self.limits])
+        return np.array([float(self.drawn.get_value(path)) for path in self.limits])
 
     @property
     def _ends(self) -> tuple[FloatArray, FloatArray]:
@@ -317,7 +317,7 @@ class Redesign:
 
 def _has(spec: Spec, path: str) -> bool:
     try:
-        return isinstance(spec.at(path), float)
+        return isinstance(spec.get_value(path), float)
     except KeyError:
         return False
 

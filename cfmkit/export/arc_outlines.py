@@ -92,7 +92,7 @@ def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
     chain = ArcChain(nodes, bulges)
     whole = edges[0] if len(edges) == 1 and isinstance(edges[0], Arc) and edges[0].full else None
     circle = (complex(*whole.center), whole.radius) if whole and contour.closed else None
-    return Outline(chain.closed() if contour.closed else chain, contour.layer, contour.closed, contour.hole, circle)
+    return Outline(chain.close() if contour.closed else chain, contour.layer, contour.closed, contour.hole, circle)
 
 
 def _is_point(edge: Edge, gap: float) -> bool:
@@ -151,7 +151,7 @@ def flat_sagitta(chain: ArcChain) -> float:
 
 def flat_points(chain: ArcChain) -> Any:
     """Return points (n, 2) on the chain [m], no farther than `flat_sagitta` from it in between."""
-    points = chain.flattened(flat_sagitta(chain))
+    points = chain.flatten(flat_sagitta(chain))
     return np.column_stack([points.real, points.imag])
 
 

@@ -197,7 +197,7 @@ class _Lines:
         along, across, turn, direction = support.along, support.across, support.rotation, support.direction
         if isinstance(drive, Rotation) and drive.node == name:
             turn = False
-            yield from self._turned(name, float(drive.points[-1]))
+            yield from self._write_torque_drive(name, float(drive.points[-1]))
         driven = isinstance(drive, Displacement) and drive.node == name
         if isinstance(drive, Displacement) and driven:
             end = float(drive.points[-1])
@@ -212,7 +212,7 @@ class _Lines:
         if turn:
             self.moves.append(f"{number}, 4, 6, 0")
 
-    def _turned(self, name: str, angle: float) -> Iterator[str]:
+    def _write_torque_drive(self, name: str, angle: float) -> Iterator[str]:
         """Yield a lever at a node, and the node DRIVE that leads its end around a circle, by springs along x and y.
 
         CalculiX prints no moment of a node of beams: it is the reaction of DRIVE times the lever.
@@ -268,11 +268,11 @@ class _Lines:
         yield ", ".join(f"{one}, {axis}, {factor:.12g}" for one, axis, factor in [*factors, (leader, 1, -1.0)])
         self.moves.append(f"{leader}, 2, 3, 0")
         if driven:
-            yield from self._pulled(leader, end, (node.x, node.y))
+            yield from self._write_force_drive(leader, end, (node.x, node.y))
         else:
             self.moves.append(f"{leader}, 1, 1, {end:.10g}")
 
-    def _pulled(self, number: int, end: float, place: tuple[float, float]) -> Iterator[str]:
+    def _write_force_drive(self, number: int, end: float, place: tuple[float, float]) -> Iterator[str]:
         """Yield the node DRIVE, which is displaced and pulls by a spring: its reaction is the force.
 
         CalculiX prints no reaction of nodes that carry equations and nothing else.

@@ -40,11 +40,11 @@ class Line:
         """First and last point as x + iy [m]."""
         return complex(*self.start), complex(*self.end)
 
-    def reversed(self) -> Line:
+    def reverse(self) -> Line:
         """Return the same edge, run the other way."""
         return Line(self.end, self.start)
 
-    def mirrored(self) -> Line:
+    def mirror(self) -> Line:
         """Return the mirror image about the y axis, run in the same order of points."""
         return Line((-self.start[0], self.start[1]), (-self.end[0], self.end[1]))
 
@@ -64,9 +64,9 @@ class Arc:
     @property
     def ends(self) -> tuple[complex, complex]:
         """First and last point as x + iy [m]."""
-        return self._at(self.start), self._at(self.end)
+        return self._locate(self.start), self._locate(self.end)
 
-    def _at(self, angle: float) -> complex:
+    def _locate(self, angle: float) -> complex:
         return complex(*self.center) + self.radius * complex(math.cos(angle), math.sin(angle))
 
     @property
@@ -74,11 +74,11 @@ class Arc:
         """Whether the edge is one whole circle."""
         return math.isclose(abs(self.end - self.start), 2 * math.pi, rel_tol=1e-12)
 
-    def reversed(self) -> Arc:
+    def reverse(self) -> Arc:
         """Return the same edge, run the other way."""
         return Arc(self.center, self.radius, self.end, self.start)
 
-    def mirrored(self) -> Arc:
+    def mirror(self) -> Arc:
         """Return the mirror image about the y axis, run in the same order of points."""
         return Arc((-self.center[0], self.center[1]), self.radius, math.pi - self.start, math.pi - self.end)
 
@@ -102,11 +102,11 @@ class Smooth:
         """First and last point as x + iy [m]."""
         return complex(*self.points[0]), complex(*self.points[-1])
 
-    def reversed(self) -> Smooth:
+    def reverse(self) -> Smooth:
         """Return the same edge, run the other way."""
         return Smooth(self.points[::-1], -self.tangents[::-1])
 
-    def mirrored(self) -> Smooth:
+    def mirror(self) -> Smooth:
         """Return the mirror image about the y axis, run in the same order of points."""
         flip = np.array([-1.0, 1.0])
         return Smooth(self.points * flip, self.tangents * flip)

@@ -74,7 +74,7 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[La
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
         raise GeometryError(f"nothing says how thick the part is: {where}")
     cut = [one for one in drawn if one.layer == "cut" and one.closed]
-    chains = [(one, one.chain.flattened(tolerance)) for one in cut]
+    chains = [(one, one.chain.flatten(tolerance)) for one in cut]
     rings = [(one, Polygon(np.column_stack([points.real, points.imag]))) for one, points in chains]
     solids = [ring for one, ring in rings if not one.hole]
     if not solids:
@@ -141,7 +141,7 @@ def _body(plate: LayeredPolygon) -> Body:
         shell.add_lid(triangle, half)
     for start, end, below, above in _steps(corners, halves):
         shell.add_wall(start, end, below, above)
-    return shell.closed()
+    return shell.build_body()
 
 
 def _triangles(plate: LayeredPolygon) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
@@ -183,25 +183,27 @@ class _Shell:
         self._level = {float(level): k for k, level in enumerate(levels)}
         self._triangles: list[tuple[int, int, int]] = []
 
-    def _at(self, point: int, level: int) -> int:
+    def _index_vertex(self, point: int, level: int) -> int:
         return point * len(self._levels) + level
 
     def add_lid(self, triangle: list[int], half: float) -> None:
         """Add a triangle of the upper and of the lower side."""
         a, b, c = triangle
         top, bottom = self._level[half], self._level[-half]
-        self._triangles.append((self._at(a, top), self._at(b, top), self._at(c, top)))
-        self._triangles.append((self._at(a, bottom), self._at(c, bottom), self._at(b, bottom)))
+        self._triangles.append((self._index_vertex(a, top), self._index_vertex(b, top), self._index_vertex(c, top)))
+        self._triangles.append(
+            (self._index_vertex(a, bottom), self._index_vertex(c, bottom), self._index_vertex(b, bottom))
+        )
 
     def add_wall(self, start: int, end: int, below: float, above: float) -> None:
         """Add what stands on an edge: one wall around the part, two where it steps."""
         spans = ((-above, -below), (below, above)) if below else ((-above, above),)
         for low, high in spans:
             for k in range(self._level[low], self._level[high]):
-                a, b = self._at(start, k), self._at(end, k)
+                a, b = self._index_vertex(start, k), self._index_vertex(end, k)
                 self._triangles += [(a, b, b + 1), (a, b + 1, a + 1)]
 
-    def closed(self) -> Body:
+    def build_body(self) -> Body:
         """Return the body, on z = 0; GeometryError where an edge has no second triangle."""
         triangles = np.array(self._triangles)
         edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)

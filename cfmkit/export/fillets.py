@@ -81,10 +81,10 @@ def _round_corner(before: Edge, after: Edge, radius: float, side: float) -> tupl
         return _round_onto_smooth(before, after, radius, side)
     if isinstance(before, Smooth) and isinstance(after, Line):
         # the mirror image of the same, run backwards: the waste is then on the other hand
-        if (found := _round_onto_smooth(after.reversed(), before.reversed(), radius, -side)) is None:
+        if (found := _round_onto_smooth(after.reverse(), before.reverse(), radius, -side)) is None:
             return None
         line, arc, smooth = found
-        return smooth.reversed(), arc.reversed(), line.reversed()
+        return smooth.reverse(), arc.reverse(), line.reverse()
     return None
 
 

@@ -123,7 +123,7 @@ class _Piece:
     begin: float = 0.0
     end: float = 1.0
 
-    def at(self, fraction: float) -> complex:
+    def locate(self, fraction: float) -> complex:
         return complex(points_on(np.array(self.start), np.array(self.chord), np.array(self.turn), np.array(fraction)))
 
     def slope(self, fraction: float) -> complex:
@@ -161,7 +161,7 @@ def parallel(chain: ArcChain, distance: float) -> ArcChain | None:
             return None
     if len(kept) < 2:
         return None
-    nodes = [pieces[index].at(pieces[index].begin) for index in kept]
+    nodes = [pieces[index].locate(pieces[index].begin) for index in kept]
     return ArcChain(np.array([*nodes, nodes[0]]), np.array([pieces[index].bulge for index in kept]))
 
 
@@ -211,7 +211,7 @@ def _crossing(first: _Piece, second: _Piece) -> tuple[float, float] | None:
     """Return the fractions of both pieces, extended if need be, where they cross near their common corner."""
     at, tolerance = np.array([1.0, 0.0]), 1e-13
     for _ in range(40):
-        gap = second.at(at[1]) - first.at(at[0])
+        gap = second.locate(at[1]) - first.locate(at[0])
         a, b = first.slope(at[0]), second.slope(at[1])
         cross = (a.conjugate() * b).imag
         if cross == 0:

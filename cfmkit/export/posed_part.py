@@ -73,11 +73,11 @@ class PosedBody:
         left = math.atan2(y, x) + 0.5 * math.pi
         return np.vstack([arc(core[-1], half, left - math.pi, math.pi), arc(core[0], half, left, math.pi)])
 
-    def moved(self, x: float, y: float) -> PosedBody:
+    def move(self, x: float, y: float) -> PosedBody:
         """Return it moved by so much [m]."""
         return replace(self, core=self.core + np.array([x, y]))
 
-    def mirrored(self) -> PosedBody:
+    def mirror(self) -> PosedBody:
         """Return its mirror image about the y axis; a polygon runs in the same sense."""
         return replace(self, core=(self.core[:, ::-1] if self.closed else self.core) * MIRROR)
 

@@ -46,7 +46,7 @@ class DrawnStrip:
     thickness: FloatArray  # (n,) there [m]
     ends: tuple[str, str]  # nodes that it joins
 
-    def sampled(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def sample(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points (k, 2), the way to them from the start (k,) and half thicknesses (k,) there, closely [m]."""
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
         step = (float(self.thickness.min()) + 2.0 * fillet) / FINE
@@ -123,7 +123,7 @@ def joined_away_from_nodes(
     import shapely
 
     look = _Look(strips, nodes, fillet)
-    found = [*look.between_strips(), *look.beside_blocks(blocks), *look.between_blocks(blocks)]
+    found = [*look.find_close_strips(), *look.find_strips_close_to_blocks(blocks), *look.find_close_blocks(blocks)]
     if not found:
         return ()
     whole = _material(contours, look.thinnest)
@@ -161,7 +161,7 @@ class _Look:
         self.thinnest = min((float(strip.thickness.min()) for strip in strips), default=1.0)
         self.filled = 2.0 * fillet + TOUCHING * self.thinnest
         self.names = [strip.name for strip in strips]
-        sampled = [strip.sampled(fillet) for strip in strips]
+        sampled = [strip.sample(fillet) for strip in strips]
         self.points, self.way, self.half = (
             np.concatenate([one[k] for one in sampled]) if sampled else np.zeros((0, 2) if k == 0 else 0)
             for k in range(3)
@@ -175,7 +175,7 @@ class _Look:
             np.array([[self.number[end] for end in strip.ends] for strip in strips]).reshape(-1, 2)[self.strip].T
         )
 
-    def between_strips(self) -> Iterator[Candidates]:
+    def find_close_strips(self) -> Iterator[Candidates]:
         """Yield strips that come close to each other, or to themselves, although they are apart."""
         from scipy.spatial import cKDTree
 
@@ -203,7 +203,7 @@ class _Look:
             along = np.minimum(along, self.to_ends[i, one] + through + self.to_ends[j, other])
         return np.asarray(along)
 
-    def beside_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
+    def find_strips_close_to_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
         """Yield strips that come close to a rigid block although they are apart from it."""
         import shapely
 
@@ -221,7 +221,7 @@ class _Look:
                 ends = shapely.get_coordinates(shapely.shortest_line(places[own], shape)).reshape(-1, 2, 2)
                 yield self.names[which], block.name, ends[:, 0], ends[:, 1], gap[own]
 
-    def between_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
+    def find_close_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
         """Yield blocks of different bodies that come close to each other."""
         import shapely
 

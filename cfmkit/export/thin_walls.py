@@ -83,7 +83,7 @@ class EdgeLines:
     around: FloatArray  # (r,) lengths of the outlines [m]
 
     @classmethod
-    def of(cls, contours: Sequence[Contour], sagitta: float) -> EdgeLines:
+    def from_contours(cls, contours: Sequence[Contour], sagitta: float) -> EdgeLines:
         """Return those of closed contours that are cut, within `sagitta` [m] of their arcs."""
         starts, along, ring, at = [], [], [], []
         around: list[float] = []
@@ -127,7 +127,7 @@ def thin_walls(contours: Sequence[Contour], least: float, tolerance: float = TOL
     cut = [one for one in contours if one.layer == "cut" and one.closed]
     if not cut or least <= 2.0 * tolerance:
         return ()
-    edges = EdgeLines.of(cut, 0.2 * tolerance)
+    edges = EdgeLines.from_contours(cut, 0.2 * tolerance)
     line, share = edges.places(least / PER_WALL)
     lengths = np.hypot(*edges.along.T)
     places = edges.starts[line] + share[:, None] * edges.along[line]

@@ -30,7 +30,7 @@ class TracedEdge:
     moved: float = 0.0
 
     @classmethod
-    def of(cls, edge: Edge, sagitta: float) -> TracedEdge:
+    def from_edge(cls, edge: Edge, sagitta: float) -> TracedEdge:
         """Return an edge whose polygon is within `sagitta` [m] of it, a smooth one with its own points."""
         if isinstance(edge, Line):
             return cls(edge, np.array(edge.ends))
@@ -53,11 +53,11 @@ class TracedEdge:
             return np.asarray(self.edge.tangents @ np.array([1, 1j]))
         return np.array([self.ahead(float(k)) for k in range(len(self.z))])
 
-    def beside(self, distance: float) -> TracedEdge:
+    def shift_right(self, distance: float) -> TracedEdge:
         """Return the curve that runs at a distance [m] on the right."""
         return TracedEdge(self.edge, self.z - 1j * distance * self.tangents, distance)
 
-    def at(self, u: float) -> complex:
+    def locate(self, u: float) -> complex:
         """Return the point at a parameter, a little beyond the ends as well."""
         return self.foot(u) - 1j * self.moved * self.ahead(u) if self.moved else self.foot(u)
 
@@ -70,7 +70,7 @@ class TracedEdge:
         if isinstance(edge, Arc):
             angle = edge.start + (edge.end - edge.start) * u / count
             return complex(*edge.center) + edge.radius * complex(math.cos(angle), math.sin(angle))
-        return complex(cubic(*self._between(u))[0])
+        return complex(cubic(*self._select_piece(u))[0])
 
     def ahead(self, u: float) -> complex:
         """Return the unit tangent."""
@@ -83,10 +83,10 @@ class TracedEdge:
         elif u == int(u) and 0 <= u < len(self.z):
             way = complex(*edge.tangents[int(u)])
         else:
-            way = complex(slope(*self._between(u))[0])
+            way = complex(slope(*self._select_piece(u))[0])
         return way / abs(way)
 
-    def _between(self, u: float) -> tuple[Any, ...]:
+    def _select_piece(self, u: float) -> tuple[Any, ...]:
         """Return ends and tangents of the piece of a smooth edge that holds a parameter, and the share there."""
         assert isinstance(self.edge, Smooth)
         k = min(max(int(u), 0), len(self.z) - 2)

@@ -63,7 +63,7 @@ class OutlinePiece:
         return cls(tuple(Line(a, b) for a, b in zip(ends, [*ends[1:], ends[0]], strict=True) if a != b))
 
     @classmethod
-    def around(cls, points: FloatArray) -> list[OutlinePiece]:
+    def from_convex_hull(cls, points: FloatArray) -> list[OutlinePiece]:
         """Return the convex hull of points (n, 2) [m]; none if they are on one line."""
         from shapely import MultiPoint
 
@@ -76,17 +76,17 @@ class OutlinePiece:
         return cls((Arc(center, radius, 0.0, 2.0 * math.pi),))
 
     @classmethod
-    def within(cls, contour: Contour) -> OutlinePiece:
+    def from_contour(cls, contour: Contour) -> OutlinePiece:
         """Return what is within a closed contour."""
         if _encloses(contour.edges) > 0:
             return cls(contour.edges)
-        return cls(tuple(edge.reversed() for edge in reversed(contour.edges)))
+        return cls(tuple(edge.reverse() for edge in reversed(contour.edges)))
 
-    def removed(self) -> tuple[Edge, ...]:
+    def reverse_edges(self) -> tuple[Edge, ...]:
         """Return its edges as they bound what is left when it is cut out."""
-        return tuple(edge.reversed() for edge in reversed(self.edges))
+        return tuple(edge.reverse() for edge in reversed(self.edges))
 
-    def covered(self, size: float) -> tuple[FloatArray, ...]:
+    def to_polygons(self, size: float) -> tuple[FloatArray, ...]:
         """Return its polygons, arcs as fine as a size [m] of the thinnest piece needs them."""
         return self.areas or (_corners(self.edges, size),)
 
@@ -119,15 +119,15 @@ def merge_pieces(
         If nothing is left.
     """
     near = NEAR * GRID * size
-    tracks = [TracedEdge.of(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
-    whole = _unite([area for piece in pieces for area in piece.covered(size)], size)
+    tracks = [TracedEdge.from_edge(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
+    whole = _unite([area for piece in pieces for area in piece.to_polygons(size)], size)
     rings = [_recognise_edges(_ring(runs, near), near) for runs in _trace_rings(whole, tracks, size)]
     if fillet > 0:
         rings = _round_chains(rings, fillet, size)
     if holes:
-        tracks = [TracedEdge.of(edge, SAGITTA * size) for ring in rings for edge in ring]
-        tracks += [TracedEdge.of(edge, SAGITTA * size) for hole in holes for edge in hole.removed()]
-        left = _area(rings, size).difference(_unite([area for hole in holes for area in hole.covered(size)], size))
+        tracks = [TracedEdge.from_edge(edge, SAGITTA * size) for ring in rings for edge in ring]
+        tracks += [TracedEdge.from_edge(edge, SAGITTA * size) for hole in holes for edge in hole.reverse_edges()]
+        left = _area(rings, size).difference(_unite([area for hole in holes for area in hole.to_polygons(size)], size))
         rings = [_ring(runs, near) for runs in _trace_rings(left, tracks, size)]
     if not rings:
         raise GeometryError("the pieces of the part leave nothing to cut")
@@ -153,14 +153,14 @@ def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
 
 
 def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
-    return np.concatenate([TracedEdge.of(edge, SAGITTA * size).corners[:-1] for edge in ring])
+    return np.concatenate([TracedEdge.from_edge(edge, SAGITTA * size).corners[:-1] for edge in ring])
 
 
 def _encloses(ring: Sequence[Edge]) -> float:
     """Return the area of a closed chain of edges [m2], negative where it runs clockwise; of smooth ones by points."""
     found = 0.0
     for edge in ring:
-        z = TracedEdge.of(edge, math.inf).z
+        z = TracedEdge.from_edge(edge, math.inf).z
         found += 0.5 * float((np.conj(z[:-1]) * z[1:]).imag.sum())
     return found
 
@@ -235,9 +235,9 @@ class _Sources:
             place = float(self.number[source[k]])
             ends = place + float(first[k].real), place + float(last[k].real)
             found.setdefault(int(line[k]), []).append((int(self.owner[source[k]]), *ends))
-        return self._joined([found.get(k) for k in range(len(corners))], a, b)
+        return self._join_runs([found.get(k) for k in range(len(corners))], a, b)
 
-    def _joined(
+    def _join_runs(
         self, found: list[list[tuple[int, float, float]] | None], a: NDArray[Any], b: NDArray[Any]
     ) -> list[_Run]:
         """Return the runs that lines with some possible sources each make: the same track as long as it goes on."""
@@ -291,8 +291,8 @@ def _meeting(one: _Run, other: _Run) -> _Meeting:
     step = 1e-4
     crossing = abs((a.ahead(u).conjugate() * b.ahead(v)).imag) > TANGENT
     for _ in range(30 if crossing else 0):
-        gap = b.at(v) - a.at(u)
-        p, q = ((track.at(w + step) - track.at(w - step)) / (2 * step) for track, w in ((a, u), (b, v)))
+        gap = b.locate(v) - a.locate(u)
+        p, q = ((track.locate(w + step) - track.locate(w - step)) / (2 * step) for track, w in ((a, u), (b, v)))
         cross = (p.conjugate() * q).imag
         if abs(cross) < TANGENT * abs(p) * abs(q):
             break
@@ -301,10 +301,10 @@ def _meeting(one: _Run, other: _Run) -> _Meeting:
         if max(abs(u - one.last), abs(v - other.first)) > 1.5:
             break
         if max(map(abs, by)) < 1e-12:
-            return _Meeting(a.at(u), u, v)
+            return _Meeting(a.locate(u), u, v)
     u, v = one.last, other.first
     ends = [(a, u, float(len(a.z) - 1)), (b, v, 0.0)]
-    at = next((track.at(end) for track, w, end in ends if abs(w - end) < 1e-3), a.at(u))
+    at = next((track.locate(end) for track, w, end in ends if abs(w - end) < 1e-3), a.locate(u))
     return _Meeting(at, *(end if abs(w - end) < 1e-3 else w for _, w, end in ends))
 
 
@@ -363,19 +363,19 @@ def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -
     ways: list[TracedEdge] = []
     areas: list[FloatArray] = []
     for ring in rings:
-        tracks = [TracedEdge.of(edge, fine) for edge in ring]
+        tracks = [TracedEdge.from_edge(edge, fine) for edge in ring]
         for track, following in zip(tracks, [*tracks[1:], tracks[0]], strict=True):
-            beside = track.beside(radius)
+            beside = track.shift_right(radius)
             ways.append(beside)
             areas += _bands(track.z, beside.z)
             out, turn = -1j * track.tangents[-1], float(np.angle(following.tangents[0] / track.tangents[-1]))
             if turn > SMOOTH:  # an outside corner: the cutter turns about it
                 start = float(np.angle(out))
-                around = TracedEdge.of(Arc(pair(track.z[-1]), radius, start, start + turn), fine)
+                around = TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, start, start + turn), fine)
                 ways.append(around)
                 areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
             elif turn < -SMOOTH:  # an inside corner: beside edges shorter than the radius only it is near enough
-                areas.append(TracedEdge.of(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
+                areas.append(TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
     reach = _unite(areas, size, _area(rings, size))
     near = NEAR * GRID * size
     touched = (_touch_edges(runs, radius, near) for runs in _trace_rings(reach, ways, size))

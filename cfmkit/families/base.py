@@ -147,7 +147,7 @@ class BoundingBox:
     faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
 
     @classmethod
-    def around(cls, part: PosedPart) -> BoundingBox:
+    def from_part(cls, part: PosedPart) -> BoundingBox:
         """Return the box around a mechanism over its motion, along its travel and along x and y."""
         from cfmkit.export.posed_part import box
 
@@ -289,7 +289,7 @@ class Family:
     def envelope(self, result: Result) -> BoundingBox | None:
         """Return the box that a solved mechanism stays in; None if it is not known."""
         part = function_named(self.part)(result) if self.part else None
-        return None if part is None else BoundingBox.around(part)
+        return None if part is None else BoundingBox.from_part(part)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""

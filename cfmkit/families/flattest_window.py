@@ -33,7 +33,7 @@ def flattest(result: Result, length: float) -> tuple[float, float] | None:
     starts = np.linspace(low, high - length, PLACES)
     worst = np.zeros(PLACES)
     for branch in curve.branches:
-        part = curve.on(branch)
+        part = curve.select_branch(branch)
         order = np.argsort(part.motion, kind="stable")
         worst = np.maximum(worst, ripples(part.motion[order], part.effort[order], starts, length))
     best = int(np.argmin(worst))

@@ -25,7 +25,7 @@ class GuideFriction:
     tilt: float = 0.0
 
     @classmethod
-    def of(cls, guide: Guide | None) -> Self:
+    def from_guide(cls, guide: Guide | None) -> Self:
         """Return the friction of a guide; that of None is nothing."""
         if guide is None:
             return cls()

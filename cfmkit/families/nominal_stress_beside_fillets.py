@@ -73,7 +73,7 @@ def nominal_stresses(
         own = np.flatnonzero(sense * travel > 0.0).tolist()
         solid = np.array([rows[k].stress for k in own])
         reported = [
-            np.array([beams.beside(placed(rows[k].arc.ends), float(travel[k])) for k in own])
+            np.array([beams.evaluate_stress(placed(rows[k].arc.ends), float(travel[k])) for k in own])
             for beams in (map(SolvedBeams, images(travel[own])) if len(own) else ())
         ]
         if reported:
@@ -126,7 +126,7 @@ class SolvedBeams:
         """Largest stress of all beams at each point (n,) [Pa]."""
         return self.path.peak_stress().value
 
-    def beside(self, edge: FloatArray, travel: float) -> float:
+    def evaluate_stress(self, edge: FloatArray, travel: float) -> float:
         """Return the stress at points on edges of beams (m, 2) [m], of largest size [Pa]; NaN where it is negligible.
 
         At a travel of the drive [m or rad]; NaN where the path does not come to it, or no beam is at the points.
@@ -138,7 +138,7 @@ class SolvedBeams:
             stress
             for name, beam in self.path.network.beams.items()
             for place in edge
-            if (stress := self._on_edge(name, beam, place, point)) is not None
+            if (stress := self._evaluate_edge_stress(name, beam, place, point)) is not None
         ]
         worst = max(stresses, key=abs, default=0.0)
         return worst if abs(worst) > NEGLIGIBLE * float(self.largest[point]) else float("nan")
@@ -152,7 +152,7 @@ class SolvedBeams:
         point = int(known[off.argmin()])
         return point if self.path.accurate[point] else None
 
-    def _on_edge(self, name: str, beam: Beam, place: FloatArray, point: int) -> float | None:
+    def _evaluate_edge_stress(self, name: str, beam: Beam, place: FloatArray, point: int) -> float | None:
         """Return the stress of a beam at a place on its edge (2,) [m]; None if it is not on it."""
         axis, found = self.axes[name], self.sections[name]
         k, share, off = _foot(axis, place)

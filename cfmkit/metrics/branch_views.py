@@ -107,7 +107,7 @@ class Function(NamedTuple):
     motion: FloatArray
     effort: FloatArray
 
-    def at(self, place: float) -> float:
+    def interpolate(self, place: float) -> float:
         """Return the effort at a place, by linear interpolation."""
         return float(np.interp(place, self.motion, self.effort))
 
@@ -144,9 +144,9 @@ class Branch:
     @cached_property
     def _inside(self) -> BranchTrace | str:
         part = self.part(self.window) if self.window else self.trace
-        return part if isinstance(part, str) else self._solved(part)
+        return part if isinstance(part, str) else self._require_finite(part)
 
-    def _solved(self, part: BranchTrace) -> BranchTrace | str:
+    def _require_finite(self, part: BranchTrace) -> BranchTrace | str:
         """Return a part all of whose points have a finite effort."""
         if isfinite(part.effort.sum()):
             return part
@@ -169,16 +169,16 @@ class Branch:
     def part(self, window: Window) -> BranchTrace | str:
         """Return the part of the branch in some window, or why there is none."""
         if covers(self.extent, window):
-            return self._asked(restrict(self.trace, window))
+            return self._evaluate_ends(restrict(self.trace, window))
         return f"branch {self.name!r} covers only {self.span(*self.extent)}"
 
-    def _asked(self, part: BranchTrace) -> BranchTrace:
+    def _evaluate_ends(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends, where they lie between two samples, have effort and stress of the model."""
         model, motion = self.frame.closed, self.trace.motion
         if part is self.trace:
             return part
         if model is None:
-            return self._stated(part)
+            return self._apply_stated_ends(part)
         ends = [end for end in (0, -1) if not (motion == part.motion[end]).any()]
         if not ends:
             return part
@@ -192,7 +192,7 @@ class Branch:
 
         return replace(part, effort=effort, read_stress=part.changed_stress(at_ends))
 
-    def _stated(self, part: BranchTrace) -> BranchTrace:
+    def _apply_stated_ends(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends have effort and stress of the points that the model has there, if it has some."""
         stated = self.frame.ends
         if stated is None:
@@ -258,7 +258,7 @@ class Branch:
         """Mean and extremes in the window."""
         effort = self.inside.effort
         mean = self.mean_over_motion(effort) if self.frame.over_motion else float(effort.sum()) / len(effort)
-        return Spread.of(mean, *self._extremes, self.error)
+        return Spread.from_extremes(mean, *self._extremes, self.error)
 
     def mean_over_motion(self, values: FloatArray) -> float:
         """Return the mean of values at the points in the window over the motion, by trapezoids."""
@@ -341,7 +341,7 @@ class Branch:
             If the branch does not reach the reference pose, is many-valued, or has no effort there.
         """
         place, model = self.reference, self.frame.closed
-        here = self.at(place)
+        here = self.evaluate(place)
         if model is not None:  # an interpolated value may hide that there is no effort
             here = float(model.effort(self.name, np.array([place]))[0])
         if abs(here) <= max(self.error, ZERO * float(np.nanmax(np.abs(self.function.effort)))):
@@ -389,7 +389,7 @@ class Branch:
         lo, hi = self.ends
         return (lo + hi) / 2 if self.frame.reference is None else self.frame.reference
 
-    def at(self, place: float) -> float:
+    def evaluate(self, place: float) -> float:
         """Return the effort at one place of the branch.
 
         Raises
@@ -401,7 +401,7 @@ class Branch:
         slack = 1e-9 * (hi - lo)
         if not lo - slack <= place <= hi + slack:
             raise Undefined(f"branch {self.name!r} covers only {self.span(lo, hi)}")
-        return self.function.at(place)
+        return self.function.interpolate(place)
 
     def span(self, lo: float, hi: float) -> str:
         """Return ``2 ... 240 mm`` for messages."""

@@ -151,7 +151,7 @@ def compare(
         return Differences({"": Difference(nothing, f"there is no {missing.name} curve")}, nothing, None, changes)
     fine, coarse = reference.curve, other.curve
     pairs = {name: counterpart(coarse, name, _way(fine, name)) for name in fine.branches}
-    parts = [part for name, its in pairs.items() for part in (fine.on(name), coarse.on(its))]
+    parts = [part for name, its in pairs.items() for part in (fine.select_branch(name), coarse.select_branch(its))]
     window = overlap([(float(part.motion.min()), float(part.motion.max())) for part in parts], over)
     if window is None:
         return Differences({"": Difference(nothing, "they have no travel in common")}, nothing, None, changes)
@@ -161,7 +161,7 @@ def compare(
 
 
 def _way(curve: Curve, branch: str) -> float:
-    motion = curve.on(branch).motion
+    motion = curve.select_branch(branch).motion
     return float(motion[-1] - motion[0])
 
 
@@ -225,7 +225,7 @@ def counterpart(curve: Curve, branch: str, way: float) -> str:
     if branch in curve.branches or len(curve.branches) == 1:
         return branch if branch in curve.branches else curve.branches[0]
     for name in curve.branches:
-        motion = curve.on(name).motion
+        motion = curve.select_branch(name).motion
         if way * (motion[-1] - motion[0]) > 0:
             return name
     return curve.branches[0]

@@ -64,10 +64,10 @@ class Survey:
     def each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
         """Return the values of a metric: of one branch, of every branch, or of the cycle as a whole."""
         if (definition, branch) not in self._known:
-            self._known[definition, branch] = self._found(definition, branch)
+            self._known[definition, branch] = self._compute_values(definition, branch)
         return self._known[definition, branch]
 
-    def _found(self, definition: Definition, branch: str | None) -> tuple[Value, ...]:
+    def _compute_values(self, definition: Definition, branch: str | None) -> tuple[Value, ...]:
         function = definition.function
         if function is None:
             return (Value(None, "it was not computed"),)

@@ -46,7 +46,7 @@ class RowSamples:
         """Whether all curves have the same places."""
         return self.motion.strides[0] == 0 and bool((self.count == self.motion.shape[1]).all())
 
-    def between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[RowSamples, NDArray[np.bool_]]:
+    def select_between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[RowSamples, NDArray[np.bool_]]:
         """Return the samples inside of windows, the ends left out; and which of the columns are of each row."""
         low, high = (end[:, None] for end in window)
         margin = np.reshape(slack, (-1, 1))
@@ -66,7 +66,7 @@ class RowSamples:
 
     def with_ends(self, window: Ends, values: FloatArray, slack: FloatArray | float = 0.0) -> RowSamples:
         """Return the samples inside of windows and their ends, with values (d, 2) there."""
-        cut, own = self.between(window, slack)
+        cut, own = self.select_between(window, slack)
         ends = np.stack(window, axis=1)
         motion, inner = (np.where(own, item, last[:, 1:]) for item, last in ((cut.motion, ends), (cut.values, values)))
         return RowSamples(
@@ -75,7 +75,7 @@ class RowSamples:
             cut.count + 2,
         )
 
-    def joined(self, places: FloatArray, values: FloatArray) -> RowSamples:
+    def merge(self, places: FloatArray, values: FloatArray) -> RowSamples:
         """Return these samples and others, in order and without doubles; others must lie between the ends of a row."""
         motion, known = np.hstack([self.motion, places]), np.hstack([self.values, values])
         order = np.argsort(motion, axis=1, kind="stable")
@@ -154,7 +154,7 @@ class CurveRows(ShortRepr):
         """First and last place of each row."""
         return self.samples.motion[:, 0], self.samples.motion[:, -1]
 
-    def within(self, window: Ends | None) -> RowsInWindow:
+    def restrict_to_window(self, window: Ends | None) -> RowsInWindow:
         """Return the curves in windows, (d,) each; None: over their full travel."""
         key = None if window is None else tuple(end.tobytes() for end in window)
         if key not in self._windows:
@@ -216,7 +216,7 @@ class RowsInWindow:
         return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (count < FEW))
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
-        known = self.inside.joined(*self._peaks) if self._peaks[0].shape[1] else self.inside
+        known = self.inside.merge(*self._peaks) if self._peaks[0].shape[1] else self.inside
         return known.extremes(self.curves.all_at, self._uneven)
 
     @cached_property
@@ -252,7 +252,7 @@ class RowsInWindow:
             return np.full(len(self.ends[0]), np.nan)
         sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
         places, _ = self._peaks
-        top, _ = sizes.joined(places, function(places)).extremes(function, self._uneven)
+        top, _ = sizes.merge(places, function(places)).extremes(function, self._uneven)
         return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
 
     def stress_max(self) -> FloatArray:
@@ -271,7 +271,7 @@ class RowsInWindow:
         top = known.extremes(lambda places: stress.at(places, rows))[0]
         for other in beside:
             start, stop = np.maximum(other.motion[:, 0], low), np.minimum(other.motion[:, -1], high)
-            within, inside = other.between((start, stop))
+            within, inside = other.select_between((start, stop))
             inner = np.where(inside, within.values, -np.inf).max(axis=1, initial=-np.inf)
             most = np.maximum(inner, np.maximum(_value_at(other, start), _value_at(other, stop)))
             top = np.where(start < stop, np.maximum(top, most), top)
@@ -292,7 +292,7 @@ class RowsInWindow:
         reached = (place >= first - slack) & (place <= last + slack)
         found = RANGES[name](many)
         if not name.startswith("range_95"):
-            here = np.abs(many.at(many.reference[:, None])[:, 0])
+            here = np.abs(many.interpolate(many.reference[:, None])[:, 0])
             largest = np.nanmax(np.abs(self.curves.samples.values), axis=1)
             reached &= here > np.maximum(self.curves.error, ZERO * largest)
         return np.where(reached, found, np.nan)

@@ -39,7 +39,7 @@ def range_95_fraction(branch: Branch) -> float:
 
 def _rising(branch: Branch) -> ManyBranches:
     """Return a branch whose effort at the end of the window is something to compare with."""
-    if abs(branch.at(branch.ends[1])) <= branch.error:
+    if abs(branch.evaluate(branch.ends[1])) <= branch.error:
         raise Undefined(f"the {branch.kind} at the end is zero within its numerical error, {branch.error_text}")
     return branch.many
 

@@ -70,7 +70,7 @@ class ManyBranches:
         """The second; with the first in the same calls unless that is known."""
         return _solve_ends(self, with_rise=False)[1] if "rise" in self.__dict__ else self.solved[1]
 
-    def at(self, places: FloatArray) -> FloatArray:
+    def interpolate(self, places: FloatArray) -> FloatArray:
         """Return the effort at places of each row, (d, m), by linear interpolation."""
         if self.exact is not None:
             return self.exact(places, np.arange(len(places)))
@@ -89,7 +89,7 @@ class ManyBranches:
 
 def rms_to_target(many: ManyBranches, target: FloatArray) -> FloatArray:
     """Return the root mean square of F - target at `uniform_places` of each row, (d,); `target` is (d,)."""
-    offset = many.at(uniform_places(many)) - target[:, None]
+    offset = many.interpolate(uniform_places(many)) - target[:, None]
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / UNIFORM_POINTS))
 
 
@@ -121,7 +121,7 @@ def _first_95(many: ManyBranches) -> FloatArray:
 def _rise(many: ManyBranches) -> tuple[FloatArray, NDArray[np.intp], Pair, Pair]:
     """Return efforts at the ends of windows, the first samples with 95 % of it, and those steps: places, efforts."""
     motion, effort, rows = many.motion, many.effort, np.arange(len(many.motion))
-    nominal = many.at(many.high[:, None])[:, 0]
+    nominal = many.interpolate(many.high[:, None])[:, 0]
     before = (motion < many.high[:, None]).sum(axis=1)
     reached = (effort / nominal[:, None] >= 0.95 - ROUNDING) & (np.arange(motion.shape[1]) < before[:, None])
     first = np.where(reached.any(axis=1), reached.argmax(axis=1), before)
@@ -141,7 +141,7 @@ def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
     if many.exact is not None:
         return many.bands[:, list(BAND_RANGES.values()).index(tolerance)]
     motion, place = many.motion, many.reference
-    here = many.at(place[:, None])[:, 0]
+    here = many.interpolate(place[:, None])[:, 0]
     offset = many.effort / here[:, None] - 1
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
     index = (motion < place[:, None]).sum(axis=1)
@@ -207,7 +207,7 @@ def _solve_ends(many: ManyBranches, with_rise: bool = True, with_bands: bool = T
 def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
     """Return efforts at the poses, (d, 1), and of both ends of `BAND_RANGES` places inside, outside, and known ends."""
     motion, place = many.motion, many.reference
-    here = many.at(place[:, None])
+    here = many.interpolate(place[:, None])
     offset, last = np.abs(many.effort / here - 1), motion.shape[1] - 1
     index, samples = (motion < place[:, None]).sum(axis=1)[:, None], np.arange(motion.shape[1])
     inside, outside, ends = [], [], []

@@ -57,7 +57,7 @@ class Bounds:
     text: str
 
     @classmethod
-    def of(cls, requirement: Requirement, dimension: str) -> Bounds:
+    def from_requirement(cls, requirement: Requirement, dimension: str) -> Bounds:
         """Return the bounds of a requirement that has been validated."""
         low, high = bound(requirement.min, (dimension,)), bound(requirement.max, (dimension,))
         if requirement.min is None:
@@ -68,7 +68,7 @@ class Bounds:
             text = f"required {requirement.min} ... {requirement.max}"
         return cls(dimension, low, high, text)
 
-    def met(self, value: float | None) -> bool:
+    def is_met(self, value: float | None) -> bool:
         """Return whether a value keeps both bounds."""
         return value is not None and bool(self.met_by(np.array(value)))
 
@@ -90,13 +90,13 @@ class Bounds:
         name = words(metric)
         if item.value is None:
             return f"{name}{over}: no value ({item.reason}), {self.text}: missed"
-        return f"{name} {self.shown(item.value)}{over}, {self.text}: {'ok' if self.met(item.value) else 'missed'}"
+        return f"{name} {self.format_value(item.value)}{over}, {self.text}: {'ok' if self.is_met(item.value) else 'missed'}"
 
-    def shown(self, value: float) -> str:
+    def format_value(self, value: float) -> str:
         """Return a value rounded for reading, but never so far that it seems to be on the other side of a bound."""
         for digits in range(4, 18):
             rounded = float(f"{to_border(value, self.dimension):.{digits}g}") / float(to_border(1.0, self.dimension))
-            if self.met(rounded) == self.met(value):
+            if self.is_met(rounded) == self.is_met(value):
                 break
         if self.dimension == "ratio" and "%" not in self.text:
             return f"{value:.{digits}g}"
@@ -273,12 +273,12 @@ def check(
 
 def of_many(requirement: Requirement, found: Quantity) -> Outcome:
     """Return the outcome of a requirement on a metric of many parts, such as their yield."""
-    limits = Bounds.of(requirement, found.dimension)
+    limits = Bounds.from_requirement(requirement, found.dimension)
     value = Value(found.value, found.reason)
     reported = limits.sentence(requirement.metric, value, "")
     ends = limits.min, limits.max
     return Outcome(
-        requirement.metric, found.dimension, found.value, *ends, None, "force", limits.met(found.value), reported
+        requirement.metric, found.dimension, found.value, *ends, None, "force", limits.is_met(found.value), reported
     )
 
 
@@ -292,7 +292,7 @@ def _outcome(
     definition = _intended_definition(requirement, table[split_name(requirement.metric)[0]])
     window = window_of(result, requirement.over)
     values = _values(requirement.metric, definition, survey_of(result, window, surveys), result)
-    limits = Bounds.of(requirement, definition.dimension)
+    limits = Bounds.from_requirement(requirement, definition.dimension)
     value = min(values, key=limits.margin)
     kind = kind_of(result) or "force"
     measured = window if definition.scope != "value" else None
@@ -304,7 +304,7 @@ def _outcome(
         limits.max,
         (measured.lo, measured.hi) if measured else None,
         kind,
-        limits.met(value.value),
+        limits.is_met(value.value),
         limits.sentence(requirement.metric, value, _format_window(definition, window, kind)),
     )
 

@@ -39,7 +39,7 @@ class Spread(NamedTuple):
     error: Number = 0.0  # numerical error of the effort [N or N m]: what is not above it is no reference
 
     @classmethod
-    def of(cls, mean: Number, largest: Number, smallest: Number, error: Number = 0.0) -> Spread:
+    def from_extremes(cls, mean: Number, largest: Number, smallest: Number, error: Number = 0.0) -> Spread:
         """Return the spread of efforts with this mean, these extremes and this numerical error."""
         if isinstance(mean, float):
             mean = 0.0 if abs(mean) <= max(ROUNDED * max(abs(largest), abs(smallest)), error) else mean
@@ -166,7 +166,7 @@ class ManyWindows:
     @cached_property
     def spread(self) -> Spread:
         """Mean and extremes of each curve."""
-        return Spread.of(self.mean, *self.extremes, self.error)
+        return Spread.from_extremes(self.mean, *self.extremes, self.error)
 
     @property
     def deviation(self) -> FloatArray:

@@ -84,7 +84,7 @@ def _level_cycle(cycle: Cycle) -> Cycle:
     model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
     frame = replace(cycle.frame, target=size, curve=None, closed=model, valid=tuple((a, b) for a, b in valid if a < b))
     branches = (
-        replace(b, frame=frame, trace=replace(b.trace, effort=b.trace.effort - curve.at(b.trace.motion) + size))
+        replace(b, frame=frame, trace=replace(b.trace, effort=b.trace.effort - curve.evaluate(b.trace.motion) + size))
         for b in cycle.branches
     )
     return Cycle(tuple(branches), frame)
@@ -110,7 +110,7 @@ class LevelledModel:
 
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the effort less the curve, plus the constant [N or N m]."""
-        return np.asarray(self.model.effort(branch, places) - self.curve.at(places) + self.size)
+        return np.asarray(self.model.effort(branch, places) - self.curve.evaluate(places) + self.size)
 
     def stress(self, branch: str, places: FloatArray) -> FloatArray:
         """Return that of the model [Pa]."""
@@ -158,7 +158,7 @@ def _bad_on_way(
 
     def above(ways: FloatArray) -> FloatArray:
         motion, effort = path.states(ways)
-        return np.asarray((effort if curve is None else effort - curve.at(motion) + reference) / reference - 1)
+        return np.asarray((effort if curve is None else effort - curve.evaluate(motion) + reference) / reference - 1)
 
     bad = winding_branches.list_broken_intervals(path, lambda ways: above(ways) - band)
     bad += winding_branches.list_broken_intervals(path, lambda ways: -band - above(ways))

@@ -107,7 +107,7 @@ def _uniform(branch: Branch) -> tuple[FloatArray, FloatArray]:
     """Return places uniform in the motion, the start of the window left out, and the efforts there."""
     branch.inside  # noqa: B018  (raises where the window is not covered)
     places = ranges_many.uniform_places(branch.many)
-    return places[0], branch.many.at(places)[0]
+    return places[0], branch.many.interpolate(places)[0]
 
 
 def deviation_from_curve(branch: Branch) -> float:
@@ -117,12 +117,12 @@ def deviation_from_curve(branch: Branch) -> float:
     size = curve.largest(low, high)
     if size <= branch.error:
         raise Undefined("the target curve is zero in the window")
-    offset = part.effort - curve.at(part.motion)
+    offset = part.effort - curve.evaluate(part.motion)
     top, bottom = offset.max(), offset.min()
     if model is not None:
 
         def beside(places: FloatArray) -> FloatArray:
-            return np.asarray(model.effort(branch.name, places) - curve.at(places))
+            return np.asarray(model.effort(branch.name, places) - curve.evaluate(places))
 
         top, bottom = (float(one[0]) for one in extremes(beside, part.motion[None, :], offset[None, :]))
     return float(max(top, -bottom)) / size
@@ -131,7 +131,7 @@ def deviation_from_curve(branch: Branch) -> float:
 def rms_to_curve(branch: Branch) -> float:
     """Return the root mean square of F - F* at places uniform in the motion, the window's start excluded."""
     places, effort = _uniform(branch)
-    offset = effort - branch.frame.needed_curve(*branch.ends, branch.kind).at(places)
+    offset = effort - branch.frame.needed_curve(*branch.ends, branch.kind).evaluate(places)
     return sqrt(float(offset @ offset) / UNIFORM_POINTS)
 
 

@@ -67,15 +67,15 @@ class ArcChain:
         segment = np.where(flat, turns / 12, (safe - np.sin(safe)) / (8 * np.sin(safe / 2) ** 2))
         return polygon + float(np.sum(chords**2 * segment))
 
-    def joined(self, other: ArcChain) -> ArcChain:
+    def append(self, other: ArcChain) -> ArcChain:
         """Return this chain followed by `other`, whose first node is dropped."""
         return ArcChain(np.append(self.nodes, other.nodes[1:]), np.append(self.bulges, other.bulges))
 
-    def closed(self) -> ArcChain:
+    def close(self) -> ArcChain:
         """Return the chain with its last node exactly on its first."""
         return ArcChain(np.append(self.nodes[:-1], self.nodes[0]), self.bulges)
 
-    def flattened(self, sagitta: float) -> ComplexArray:
+    def flatten(self, sagitta: float) -> ComplexArray:
         """Return points on the chain, all nodes among them, whose chords stay within `sagitta` of it."""
         turns = np.abs(self.turns)
         step = np.minimum(np.sqrt(8 * sagitta * np.abs(self.curvatures)), np.pi / 4)

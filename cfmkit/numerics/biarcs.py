@@ -209,8 +209,8 @@ def fit_arcs(points: FloatArray, tangents: FloatArray, tolerance: float, lean: f
     CoarseDataError
         If the samples are too far apart for the tolerance, or the curve has a corner.
     """
-    curve = _Curve.of(points, tangents, (tolerance, lean), _SEARCH)
-    check = _Curve.of(points, tangents, (tolerance, lean), _CHECK)
+    curve = _Curve.from_samples(points, tangents, (tolerance, lean), _SEARCH)
+    check = _Curve.from_samples(points, tangents, (tolerance, lean), _CHECK)
     for knots in curve.proposals():
         used = [check.usage(i, j) for i, j in pairwise(knots)]
         if max(used) <= 1:
@@ -242,7 +242,7 @@ class _Curve:
     stride: int
 
     @classmethod
-    def of(cls, points: FloatArray, tangents: FloatArray, limits: tuple[float, float], stride: int) -> _Curve:
+    def from_samples(cls, points: FloatArray, tangents: FloatArray, limits: tuple[float, float], stride: int) -> _Curve:
         tolerance = limits[0]
         z, t = check_samples(points, tangents, tolerance)
         unsure = doubt(z, t)

@@ -45,7 +45,7 @@ class ChebyshevPanels(ShortRepr):
     spans: FloatArray
     coefficients: FloatArray  # (k, NODES) of the Chebyshev polynomials; NaN where a node is not known
 
-    def at(self, x: FloatArray) -> FloatArray:
+    def evaluate(self, x: FloatArray) -> FloatArray:
         """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""
         panel = np.searchsorted(self.ends[1:-1], x, side="right")
         low, high = self.spans[panel].T
@@ -97,7 +97,7 @@ def resolve_panels(
     Examples
     --------
     >>> (bow,) = resolve_panels(lambda x: np.abs(x - 0.3)[None, :], np.array([0.0, 1.0]), (1e-6,), 12)
-    >>> float(bow.at(np.array([0.75]))[0].round(12)), len(bow.ends) > 4
+    >>> float(bow.evaluate(np.array([0.75]))[0].round(12)), len(bow.ends) > 4
     (0.45, True)
     """
     wanted = list(pairwise(np.asarray(ends).tolist()))

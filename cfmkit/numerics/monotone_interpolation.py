@@ -28,7 +28,7 @@ class ThroughPoints:
     Examples
     --------
     >>> step = ThroughPoints((0.0, 1.0, 2.0, 3.0), (1.0, 1.0, 2.0, 2.0))
-    >>> [float(step.at(x)) for x in (-1.0, 0.5, 1.5, 9.0)]
+    >>> [float(step.evaluate(x)) for x in (-1.0, 0.5, 1.5, 9.0)]
     [1.0, 1.0, 1.5, 2.0]
     >>> float(step.integral(3.0))
     4.5
@@ -69,7 +69,7 @@ class ThroughPoints:
         piece = np.clip(np.searchsorted(self._knots, inside, side="right") - 1, 0, len(self._knots) - 2)
         return piece, inside - self._knots[piece]
 
-    def at(self, x: Any) -> Any:
+    def evaluate(self, x: Any) -> Any:
         """Return values at places, a number or an array."""
         piece, t = self._piece(x)
         a, b, c, d = self._terms[:, piece]
@@ -92,5 +92,5 @@ class ThroughPoints:
     def extremes(self, low: float, high: float) -> tuple[float, float]:
         """Return the smallest and the largest value between two places: these functions have no extreme off a point."""
         between = self._knots[(self._knots > low) & (self._knots < high)]
-        values = self.at(np.concatenate([[low], between, [high]]))
+        values = self.evaluate(np.concatenate([[low], between, [high]]))
         return float(values.min()), float(values.max())

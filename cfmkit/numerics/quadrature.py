@@ -88,9 +88,9 @@ class RunningIntegral:
 
     def __call__(self, t: FloatArray | float) -> Any:
         """Return the integral from `start` to `t`, a number or an array inside the interval."""
-        return self._at(float(t)) if isinstance(t, float) else self._over(t)
+        return self._evaluate_number(float(t)) if isinstance(t, float) else self._evaluate_array(t)
 
-    def _over(self, t: FloatArray) -> FloatArray:
+    def _evaluate_array(self, t: FloatArray) -> FloatArray:
         panel = np.searchsorted(self._inner, t)
         place = (t - self._middle[panel]) * self._scale[panel]
         powers = np.take(self._powers, panel, axis=1)
@@ -105,7 +105,7 @@ class RunningIntegral:
         """The panels as plain numbers: for a single point they are faster than arrays."""
         return self._inner.tolist(), self._middle.tolist(), self._scale.tolist(), self._powers.T.tolist()
 
-    def _at(self, t: float) -> float:
+    def _evaluate_number(self, t: float) -> float:
         inner, middle, scale, powers = self._lists
         panel = bisect_left(inner, t)
         place, result = (t - middle[panel]) * scale[panel], 0.0

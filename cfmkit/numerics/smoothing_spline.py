@@ -31,7 +31,7 @@ class SmoothedFunction:
     low: float
     high: float
 
-    def at(self, places: FloatArray, derivative: int = 0) -> FloatArray:
+    def evaluate(self, places: FloatArray, derivative: int = 0) -> FloatArray:
         """Return the function or one of its derivatives; constant beyond the ends."""
         inside = np.clip(places, self.low, self.high)
         values: FloatArray = self.spline(inside, nu=derivative)

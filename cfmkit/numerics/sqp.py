@@ -113,11 +113,11 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     z = np.clip(start, *bounds.T)
     memory = _Memory(program, effort)
     try:
-        if memory.at(z) is None:
+        if memory.evaluate(z) is None:
             return memory.optimum(z, None, SearchEnding.NO_ANSWER)
         last, ending = _run_solver(memory, z, bounds)
         if effort.last:
-            answer = memory.at(last)
+            answer = memory.evaluate(last)
             return memory.optimum(last, answer, ending if answer is not None else SearchEnding.STUCK)
     except _Enough as end:
         ending = end.ending
@@ -164,7 +164,7 @@ class _Memory:
         self.best: tuple[tuple[float, float], FloatArray, float, FloatArray] | None = None
         self.fell, self.since = np.inf, 0
 
-    def at(self, z: FloatArray) -> Any:
+    def evaluate(self, z: FloatArray) -> Any:
         if self.point is None or not np.array_equal(z, self.point):
             if self.effort.stop():
                 raise _Enough(SearchEnding.OUT_OF_TIME)
@@ -198,11 +198,11 @@ class _Memory:
         return Optimum(z, objective, constraints, ending, self.evaluations, self.effort.violation)
 
     def objective(self, z: FloatArray) -> float:
-        answer = self.at(z)
+        answer = self.evaluate(z)
         return float(answer[0]) if answer is not None else self._worst() + _FAR
 
     def constraints(self, z: FloatArray) -> FloatArray:
-        answer = self.at(z)
+        answer = self.evaluate(z)
         if answer is not None:
             return np.asarray(answer[1])
         assert self.best is not None

@@ -89,7 +89,7 @@ class Heading:
     note: str = ""
 
     @classmethod
-    def of(cls, result: Result, subject: str) -> Heading:
+    def from_result(cls, result: Result, subject: str) -> Heading:
         """Return the heading of a picture of a result; the note says why the run did not complete."""
         done = result.status.key == "complete"
         return cls(result.spec.name, subject, "" if done else f"{result.status.key}: {result.message}")

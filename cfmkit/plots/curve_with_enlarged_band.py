@@ -51,7 +51,7 @@ def loop_figure(result: Result, look: CurveLook | None = None, subject: str = ""
     look = look or CurveLook()
     curve = result.curve
     figure = new_figure()
-    heading = Heading.of(result, subject or f"{curve.kind} over {curve.motion_name}")
+    heading = Heading.from_result(result, subject or f"{curve.kind} over {curve.motion_name}")
     write_heading(figure, heading)
     room = 86.5 - heading.height_mm
     detail = None if is_plain() else choose_enlarged_range(result, look)

@@ -156,7 +156,7 @@ def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
 
 
 def _line(curve: Curve, branch: str, color: str, name: str, faint: bool = False) -> _Line:
-    part = curve.on(branch)
+    part = curve.select_branch(branch)
     motion, effort = to_border(part.motion, curve.motion_dimension), to_border(part.effort, curve.kind)
     return _Line(np.column_stack([motion, effort]), part.stable, color, name, faint)
 
@@ -265,7 +265,7 @@ def _target_line(result: Result) -> _Line | None:
     if not low < high:
         return None
     places = np.linspace(low, high, 201)
-    effort = to_border(target.at(places), curve.kind)
+    effort = to_border(target.evaluate(places), curve.kind)
     points = np.column_stack([to_border(places, curve.motion_dimension), effort])
     return _Line(points, np.ones(len(places), dtype=np.bool_), GREY, "target")
 

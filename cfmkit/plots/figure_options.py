@@ -71,7 +71,9 @@ class FigureForm:
         for stem, make in makers.items():
             yield from self.write(self.draw(make), stem)
 
-    def for_page(self, makers: Mapping[str, Callable[[], Figure]], drawn: Mapping[str, Figure]) -> dict[str, Figure]:
+    def select_page_figures(
+        self, makers: Mapping[str, Callable[[], Figure]], drawn: Mapping[str, Figure]
+    ) -> dict[str, Figure]:
         """Return figures as a page shows them: with its own headings and width, whatever is drawn for print.
 
         Parameters

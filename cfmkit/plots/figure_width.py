@@ -73,13 +73,13 @@ class FigureLayout:
     own_numbers: bool = False  # whether every axis has numbers, also those whose neighbour had them for both
     broken: tuple[int, ...] = ()  # axes of the figure whose vertical name takes two lines
 
-    def sized(self, width: float, height: float) -> tuple[float, float]:
+    def record_size(self, width: float, height: float) -> tuple[float, float]:
         """Return the size of the figure, and note it where none is set."""
         if not self.boxes:
             self.size = (width, height)
         return self.size
 
-    def placed(self, box: Box) -> Box:
+    def place_box(self, box: Box) -> Box:
         """Return the box that axes get, and note the one that was requested."""
         self.asked.append(box)
         return self.boxes[len(self.asked) - 1] if self.boxes else box

@@ -95,14 +95,14 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
     if not label.text:
         return None
     points = ground.to_points(label.points)
-    points = _thin_points(points[ground.inside(points)])
+    points = _thin_points(points[ground.is_inside(points)])
     if not len(points):
         return None
     text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
     box = ground.size_of(text)
     together = _together(points, others)
     center, cost = _best(ground, label, (points, together), box)
-    covered = float(ground.covered(center[None, :], box)[0])
+    covered = float(ground.count_covered(center[None, :], box)[0])
     if covered > 0:
         chosen, cost = label.text, cost + 2.0 * COVERING * covered
         for words in (label.text, _in_two_lines(label.text)):
@@ -174,8 +174,8 @@ def _best(
     share = np.repeat(np.linspace(0.0, 1.0, len(points)) if len(points) > 1 else [label.prefer], len(offsets))
     slanted = np.tile(np.abs(sides).sum(axis=1) > 1, len(points))
     weight = 3.0 * COVERING if tried is FINER else COVERING
-    covered = ground.covered(centers, box)
-    near = ground.covered(centers, box + 5.0)
+    covered = ground.count_covered(centers, box)
+    near = ground.count_covered(centers, box + 5.0)
     cost = (
         weight * covered + 2.0 * near + np.tile(away, len(points)) + 14.0 * np.abs(share - label.prefer) + 3.0 * slanted
     )
@@ -290,7 +290,7 @@ class _Ground:
         box = text.get_window_extent()
         return np.array([box.width, box.height]) * self.scale
 
-    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+    def is_inside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points lie in the axes."""
         slack = 1e-6 * self.extent
         inside: NDArray[np.bool_] = np.all((points >= -slack) & (points <= self.extent + slack), axis=1)
@@ -331,7 +331,7 @@ class _Ground:
         self._fill(center - box / 2, center + box / 2, name=True)
         self._sum()
 
-    def covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
+    def count_covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
         """Return how many taken cells a box covers at each centre, in units of its own height."""
         a = np.clip(np.floor((centers - box / 2) / CELL).astype(int), 0, self.shape)
         b = np.clip(np.ceil((centers + box / 2) / CELL).astype(int), 0, self.shape)

@@ -145,7 +145,7 @@ def _summary(drawn: FloatArray, known: FloatArray, limits: tuple[Bounds, ...]) -
         low, high = np.percentile(known, (2.5, 97.5))
         reported.append(f"95 % in {low:.5g} ... {high:.5g}")
     if limits and len(known):
-        inside = sum(all(one.met(value) for one in limits) for value in drawn[np.isfinite(drawn)].tolist())
+        inside = sum(all(one.is_met(value) for one in limits) for value in drawn[np.isfinite(drawn)].tolist())
         reported.append(f"{100 * inside / len(drawn):.1f} % within limits")
     return ";  ".join(reported)
 

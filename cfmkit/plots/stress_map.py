@@ -48,14 +48,14 @@ class StressView:
     @property
     def moved(self) -> FloatArray:
         """Nodes where they are now (n, 2) [m]."""
-        return np.asarray(self.solved.problem.elements.mesh.nodes + self.solved.moved(self._balance))
+        return np.asarray(self.solved.problem.elements.mesh.nodes + self.solved.evaluate_displacements(self._balance))
 
     @property
     def stress(self) -> FloatArray:
         """Von Mises' equivalent stress at the nodes (n,) [Pa]."""
         from cfmkit.solid.elements import equivalent
 
-        return equivalent(self.solved.problem.elements.stress(self.solved.moved(self._balance))[0])
+        return equivalent(self.solved.problem.elements.stress(self.solved.evaluate_displacements(self._balance))[0])
 
     @property
     def peak(self) -> float:
@@ -107,7 +107,7 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
     beside = bool(height > width)
     scale = min((WIDE / len(views) if beside else WIDE) / width, (BESIDE if beside else ABOVE) / height)
     step = np.array([width * scale + 3.0, 0.0]) if beside else np.array([0.0, height * scale + GAP])
-    heading = Heading.of(result, f"{subject}; peaks marked")
+    heading = Heading.from_result(result, f"{subject}; peaks marked")
     tall = (1 if beside else len(views)) * (height * scale + GAP)
     figure = new_figure(160.0, tall + 18.0 + heading.height_mm)
     write_heading(figure, heading)

@@ -148,7 +148,7 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     """Return an empty figure of a print size in millimetres, on the Agg canvas; in a layout, the one that it has."""
     layout = active_layout()
     if layout is not None:
-        width_mm, height_mm = layout.sized(width_mm, height_mm)
+        width_mm, height_mm = layout.record_size(width_mm, height_mm)
     figure = Figure(figsize=(width_mm * MM, height_mm * MM))
     FigureCanvasAgg(figure)
     return figure
@@ -237,7 +237,7 @@ def axes_mm(figure: Figure, box: tuple[float, float, float, float], **options: A
     """Return new axes in a box (left, bottom, width, height) [mm of print]."""
     width, height = size_mm(figure)
     layout = active_layout()
-    left, bottom, across, up = box if layout is None else layout.placed(box)
+    left, bottom, across, up = box if layout is None else layout.place_box(box)
     axes = figure.add_axes((left / width, bottom / height, across / width, up / height), **options)
     if layout is not None:
         layout.axes.append(axes)

@@ -63,7 +63,7 @@ class BatchWork:
         start = time.perf_counter()
         entry = Entry(job.spec, job.folder)
         try:
-            entry = self._done(entry)
+            entry = self._run_entry(entry)
         except CfmError as error:
             entry = _failed_entry(entry, error)
         except Exception as error:
@@ -78,7 +78,7 @@ class BatchWork:
             return _failed_entry(Entry(job.spec, job.folder), error)
         return None
 
-    def _done(self, entry: Entry) -> Entry:
+    def _run_entry(self, entry: Entry) -> Entry:
         wanted = replace(self.common, spec=entry.spec, out=os.path.join(self.common.out, entry.folder))
         spec = spec_of(wanted)
         verb = _verb(self.verb or _natural(spec), self.fresh)
@@ -166,7 +166,7 @@ class BatchMonitor(Protocol):
     def total(self, points: int) -> None:
         """Take how many specifications there are."""
 
-    def done(self, points: int, failed: int, reused: bool) -> None:
+    def add_finished(self, points: int, failed: int, reused: bool) -> None:
         """Take that more are finished."""
 
     def stopping(self) -> bool:
@@ -182,7 +182,7 @@ class Unwatched:
     def total(self, points: int) -> None:
         """Ignore it."""
 
-    def done(self, points: int, failed: int, reused: bool) -> None:
+    def add_finished(self, points: int, failed: int, reused: bool) -> None:
         """Ignore it."""
 
     def stopping(self) -> bool:
@@ -213,7 +213,7 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[En
 
     def note(job: BatchJob, entry: Entry) -> None:
         found[job.index] = entry
-        crew.progress.done(1, int(entry.code is not ExitCode.OK), entry.reused)
+        crew.progress.add_finished(1, int(entry.code is not ExitCode.OK), entry.reused)
 
     def new() -> Iterator[BatchJob]:
         for job in jobs:

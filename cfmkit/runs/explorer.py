@@ -93,7 +93,7 @@ class Explorer:
         self.folder = Path(self.source).absolute().parent
 
     @classmethod
-    def of(cls, source: str, changes: tuple[str, ...] = ()) -> Explorer:
+    def from_file(cls, source: str, changes: tuple[str, ...] = ()) -> Explorer:
         """Return the explorer of a file.
 
         Raises

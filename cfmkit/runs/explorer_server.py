@@ -211,7 +211,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(403, b"{}")
             return
         try:
-            asked = self._asked()
+            asked = self._read_request()
         except ValueError:
             self._send(400, b"{}")
             return
@@ -220,7 +220,7 @@ class _Handler(BaseHTTPRequestHandler):
             status, found = self._answer(self.path, *asked)
         self._send(status, json.dumps(found, allow_nan=False).encode())
 
-    def _asked(self) -> tuple[list[str], str]:
+    def _read_request(self) -> tuple[list[str], str]:
         """Return the changes and the name in a request."""
         lengths = self.headers.get_all("Content-Length", [])
         if len(lengths) != 1 or "Transfer-Encoding" in self.headers or not re.fullmatch("[0-9]{1,9}", lengths[0]):

@@ -88,7 +88,10 @@ def files(
         heading = "Input" if designed is None else "The design"
         every = ("Input with every default and derived value", api.dumps(api.resolve(result.spec), complete=True))
         texts = [(heading, api.dumps(result.spec)), every]
-        yield html_of_run.NAME, html_of_run.page(report, form.for_page(makers, drawn), command, texts, started)
+        yield (
+            html_of_run.NAME,
+            html_of_run.page(report, form.select_page_figures(makers, drawn), command, texts, started),
+        )
 
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:

@@ -51,7 +51,7 @@ class AnalysisView(Result):
     """A result with its metrics and requirements, computed when they are first needed."""
 
     @classmethod
-    def of(cls, result: Result) -> AnalysisView:
+    def from_result(cls, result: Result) -> AnalysisView:
         """Return a result as an analysis."""
         return cls(**{item.name: getattr(result, item.name) for item in fields(result)})
 

@@ -263,7 +263,7 @@ class _Scope:
     changes: tuple[str, ...] = ()
     verb: str = "analyze"
 
-    def changed(self, change: str) -> _Scope:
+    def add_change(self, change: str) -> _Scope:
         return _Scope(self.spec, (*self.changes, change), self.verb)
 
     def specification(self) -> Spec:
@@ -341,7 +341,7 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _TWO:
             return _TWO[type(op)](_value(left, scope), _value(right, scope))
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
-            return _value(inner, scope.changed(change))
+            return _value(inner, scope.add_change(change))
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
             return _varied_values(scope.specification(), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _FUNCTIONS:
@@ -358,7 +358,7 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
 def _value_named(name: str, scope: _Scope) -> Any:
     """Return a value of the specification, or a metric."""
     if name.startswith(tuple(f"{block}." for block in _BLOCKS)):
-        return scope.specification().at(name.replace("[", ".").replace("]", ""))
+        return scope.specification().get_value(name.replace("[", ".").replace("]", ""))
     metric = scope.result().metrics.get(name)
     if metric is None or metric.value is None:
         raise ValueError(f"{name} has no value")
@@ -380,7 +380,7 @@ def _value_on_curve(curve: Curve, column: str, place: float, branch: str | None 
     """Return a column at a place, linear between the points."""
     import numpy as np
 
-    on = curve if branch is None else curve.on(branch)
+    on = curve if branch is None else curve.select_branch(branch)
     values = on.effort if column in ("force", "torque") else on.extra[column].values if column in on.extra else None
     if values is None:
         raise ValueError(f"the curve has no column {column!r}")

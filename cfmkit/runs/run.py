@@ -240,7 +240,7 @@ def _options_judged(found: Report, given: Spec, document: YamlDocument) -> Repor
         and not isclose(before[path], after.get(path, inf), rel_tol=1e-9)
         and f"'{path}'" not in told
     ]
-    return found.beside({}, run_outcome.Supplement(warnings=tuple(warnings))) if warnings else found
+    return found.extend({}, run_outcome.Supplement(warnings=tuple(warnings))) if warnings else found
 
 
 def _text_at(content: Any, path: str) -> str:
@@ -276,7 +276,7 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
 def run_analysis(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
     found = run_outcome.report_on(api.analyze(spec, run))
-    return found.beside({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
+    return found.extend({}, run_outcome.Supplement(lines=_assumed_lines(spec)))
 
 
 def _assumed_lines(spec: Spec) -> tuple[tuple[str, str], ...]:
@@ -300,7 +300,7 @@ def run_design(spec: Spec, run: Run) -> Report:
     known = {one.name for one in result.warnings}
     more = tuple(one for one in drawn if one.name not in known)
     lines = (*design.notes, *_assumed_lines(result.spec))
-    found = found.beside({}, run_outcome.Supplement(files=tables, lines=lines, warnings=more))
+    found = found.extend({}, run_outcome.Supplement(files=tables, lines=lines, warnings=more))
     if design.spec is None or result.status is not Status.COMPLETE:
         return found
     # as it was written: what follows from other values follows from those of each part
@@ -314,7 +314,7 @@ def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Rep
 
     found = _with_yield(found, nominal, given, run)
     lines = ("test plan", expected_forces(nominal, run)), ("friction", friction_note(nominal, run))
-    return found.beside({}, run_outcome.Supplement(lines=tuple((word, text) for word, text in lines if text)))
+    return found.extend({}, run_outcome.Supplement(lines=tuple((word, text) for word, text in lines if text)))
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
@@ -327,9 +327,9 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
 
         reported = expected_yield(nominal, run)
         more = run_outcome.Supplement(lines=(("yield", reported),) if reported else ())
-        return found.beside(no_yields(given), more).of_many_parts()
+        return found.extend(no_yields(given), more).of_many_parts()
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
-    return found.beside(yields.quantities(), more).of_many_parts()
+    return found.extend(yields.quantities(), more).of_many_parts()
 
 
 def _csv(table: Callable[[], Table]) -> bytes:

@@ -95,7 +95,7 @@ def _make_files(
         return [("design.yaml", proposal.text.encode())]
     spec = proposal.spec
     design = Design(spec, Status.COMPLETE)
-    left = deadlines.files.left()
+    left = deadlines.files.get_time_left()
     if left is not None and left < SLOWER * proposal.seconds:  # its analysis would not end in time, its drawing does
         return [
             ("design.yaml", proposal.text.encode()),

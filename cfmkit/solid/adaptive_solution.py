@@ -146,7 +146,7 @@ class DrivenPart:
     every_pose: bool = False  # solved on the last mesh, too: reactions are not read off poses that are put together
 
     @one_blas_thread
-    def solved(self, report: Report = lambda _share, _text: None) -> AdaptiveSolution:
+    def solve(self, report: Report = lambda _share, _text: None) -> AdaptiveSolution:
         """Return the part on a mesh on which its force is known as requested, or as closely as `MAX_NODES` allow.
 
         Raises
@@ -154,7 +154,7 @@ class DrivenPart:
         cfmkit.errors.GeometryError
             If the outline cannot be meshed, or no node is where the part is held.
         """
-        meshed = self.part.meshed()
+        meshed = self.part.create_mesh()
         coarse = meshed.densely(
             self.stops, lambda share: report(FIRST_SHARE * share, "coarse mesh"), BETWEEN_SHARE * self.error
         )
@@ -172,7 +172,7 @@ class DrivenPart:
         for _ in range(MAX_ROUNDS):
             if level.error <= allowed or len(level.meshed.grid.nodes) > MAX_NODES:
                 break
-            if (refined := level.refined(allowed)) is None:
+            if (refined := level.refine(allowed)) is None:
                 break
             level, refinement = refined
             guide, followed = PoseGuide(coarse, level.meshed, (*guide.refinements, refinement)), None
@@ -184,7 +184,7 @@ class DrivenPart:
             solution = replace(_followed_alike(guide, self.stops, report_fine), between=coarse.between)
         left = level.error * _largest_beside(solution, guide, [state.pose.travel for state in level.states])
         force = max(left + float(np.nan_to_num(solution.between)), FORCE_ROUNDING)
-        compared = meshed.at(*(guide.poses[state.pose.travel] for state in first.states))
+        compared = meshed.collect_poses(*(guide.poses[state.pose.travel] for state in first.states))
         differences = first.states[0].solution.differences(compared)
         error = MeshError(*differences, force, self.error, solution.between)
         return AdaptiveSolution(solution, error, level.meshed, _critical_points(solution, coarse))
@@ -193,15 +193,15 @@ class DrivenPart:
         self, meshed: Meshed, coarse: MeshSolution, report: Callable[[float], None]
     ) -> tuple[Level, PoseGuide, MeshSolution | None]:
         """Return the mesh with all triangles split, at trial poses; followed along its path if these are not found."""
-        finer, refinement = meshed.refined()
+        finer, refinement = meshed.refine()
         guide = PoseGuide(coarse, finer, (refinement,))
         poses, followed = solve_some(guide, _trial_travels(guide)), None
         if len(poses) < 2:
             followed = replace(_followed_alike(guide, self.stops, report), between=coarse.between)
             poses = tuple(pose for pose in followed.course.poses if pose.travel in guide.poses)
-        states = tuple(MeshedPose(finer.at(*poses), pose) for pose in poses)
+        states = tuple(MeshedPose(finer.collect_poses(*poses), pose) for pose in poses)
         before = tuple(MeshedPose(coarse, guide.poses[pose.travel]) for pose in poses)
-        return Level.of(finer, refinement, states, before), guide, followed
+        return Level.from_poses(finer, refinement, states, before), guide, followed
 
 
 FIRST_SHARE = 0.25
@@ -211,7 +211,7 @@ FIRST_SHARE = 0.25
 def _followed_alike(guide: PoseGuide, stops: tuple[float, ...], report: Callable[[float], None]) -> MeshSolution:
     """Return the poses of a part at all travels at which a coarser mesh has one, and at the stops."""
     travels = sorted({*guide.travels, *stops}, reverse=bool(stops[-1] < stops[0]))
-    return guide.meshed.followed(travels, report, guide)
+    return guide.meshed.follow_stops(travels, report, guide)
 
 
 def _largest_beside(solution: MeshSolution, guide: PoseGuide, trial: Sequence[float]) -> float:
@@ -269,7 +269,7 @@ class MeshedPose:
     @property
     def moved(self) -> FloatArray:
         """Displacements of the nodes (n, 2) [m]."""
-        return self.solution.moved(self.pose)
+        return self.solution.evaluate_displacements(self.pose)
 
     @property
     def slope(self) -> FloatArray:
@@ -291,7 +291,7 @@ class Level:
         return float(self.left.sum(axis=1).max())
 
     @classmethod
-    def of(
+    def from_poses(
         cls,
         meshed: Meshed,
         refinement: RefinedMesh,
@@ -320,7 +320,7 @@ class Level:
                 found[row, ~split] = left[row, refinement.parents[~split]]
         return cls(meshed, states, found)
 
-    def marked(self, allowed: float) -> NDArray[np.bool_]:
+    def mark(self, allowed: float) -> NDArray[np.bool_]:
         """Return the triangles to split, (m,): those with the most error left, so that a part of `allowed` remains."""
         worst = self.left[self.left.sum(axis=1).argmax()]
         gain = worst * (1.0 - np.where(self.meshed.singular, SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT))
@@ -333,14 +333,14 @@ class Level:
         marked[order[:count]] = gain[order[:count]] > 0.0
         return marked
 
-    def refined(self, allowed: float) -> tuple[Level, RefinedMesh] | None:
+    def refine(self, allowed: float) -> tuple[Level, RefinedMesh] | None:
         """Return the level with triangles split; None if an equilibrium is not found on it."""
-        meshed, refinement = self.meshed.refined(self.marked(allowed))
+        meshed, refinement = self.meshed.refine(self.mark(allowed))
         states = []
         for state in self.states:
             guess = PoseGuide(state.solution, meshed, (refinement,))(state.pose.travel)
             pose = None if guess is None else meshed.problem.solve(guess, state.pose.travel)
             if pose is None or pose.unstable > state.pose.unstable:
                 return None
-            states.append(MeshedPose(meshed.at(pose.kept()), pose.kept()))
-        return Level.of(meshed, refinement, tuple(states), self.states, self.left), refinement
+            states.append(MeshedPose(meshed.collect_poses(pose.drop_factors()), pose.drop_factors()))
+        return Level.from_poses(meshed, refinement, tuple(states), self.states, self.left), refinement

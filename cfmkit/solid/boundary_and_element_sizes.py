@@ -53,7 +53,7 @@ class Ring:
     points: FloatArray  # (n, 2) vertices, the first not repeated [m]
 
     @classmethod
-    def of(cls, points: FloatArray, hole: bool, step: float = 0.0) -> Ring:
+    def from_points(cls, points: FloatArray, hole: bool, step: float = 0.0) -> Ring:
         """Return the ring through closed points (n, 2) [m], turned so that the material is on its left.
 
         Of a `step` [m] or less, two opposite corners, one vertex is left.
@@ -108,7 +108,7 @@ class Ring:
         jumps = np.abs(curvature - np.roll(curvature, 1))
         return np.asarray(np.where(np.abs(self.turns) > CORNER, 0.0, jumps))
 
-    def at(self, arc: FloatArray) -> FloatArray:
+    def locate(self, arc: FloatArray) -> FloatArray:
         """Return the points (k, 2) [m] at arc lengths (k,) [m], taken round the ring."""
         closed = np.concatenate([self.points, self.points[:1]])
         s = np.mod(arc, self.places[-1])
@@ -213,7 +213,7 @@ def _wanted_sizes(
     def joined(found: Iterable[FloatArray]) -> FloatArray:
         return np.concatenate(list(found))
 
-    places = joined(ring.at(arc) for ring, arc in zip(rings, arcs, strict=True))
+    places = joined(ring.locate(arc) for ring, arc in zip(rings, arcs, strict=True))
     wanted = joined(np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in zip(rings, arcs, strict=True))
     for behind in (False, True):
         normals = joined(ring.normals(arc, behind) for ring, arc in zip(rings, arcs, strict=True))

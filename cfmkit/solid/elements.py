@@ -63,14 +63,14 @@ class Elements:
     @cached_property
     def _parent(self) -> tuple[FloatArray, FloatArray]:
         """Slopes of the shape functions in the plane, (6, 2, points x m) [1/m], and the volumes (points x m,) [m3]."""
-        return self._mapped(POINTS, WEIGHTS)
+        return self._map_slopes(POINTS, WEIGHTS)
 
     @cached_property
     def _at_nodes(self) -> FloatArray:
         """Slopes of the shape functions at the nodes of each element, (6, 2, 6 x m) [1/m]."""
-        return self._mapped(CORNERS, np.zeros(6))[0]
+        return self._map_slopes(CORNERS, np.zeros(6))[0]
 
-    def _mapped(self, at: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _map_slopes(self, at: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         x = self.mesh.nodes[self.mesh.triangles]  # (m, 6, 2)
         parent = slopes(at)
         jacobian = np.einsum("qai,maj->qmij", parent, x)
@@ -89,9 +89,9 @@ class Elements:
         volume = weights[:, None] * det * self.width
         return np.ascontiguousarray(gradient.reshape(6, 2, -1)), volume.ravel()
 
-    def _strained(self, gradient: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _evaluate_strain(self, gradient: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the deformation gradient (2, 2, k) and Green's strain (3, k) at points with these slopes."""
-        f = self._sloped(gradient, moved)
+        f = self._evaluate_slopes(gradient, moved)
         # from the displacements' slopes, before 1 is added: tiny strains keep their digits
         strain = np.stack(
             [
@@ -104,7 +104,7 @@ class Elements:
         f[1, 1] += 1.0
         return f, strain
 
-    def _sloped(self, gradient: FloatArray, moved: FloatArray) -> FloatArray:
+    def _evaluate_slopes(self, gradient: FloatArray, moved: FloatArray) -> FloatArray:
         """Return the slopes of displacements (2, 2, k) at points where the shape functions have these."""
         times = gradient.shape[-1] // len(self.mesh.triangles)
         u = np.tile(moved[self.mesh.triangles].transpose(1, 2, 0), times)  # (6, 2, k)
@@ -113,36 +113,36 @@ class Elements:
     def forces(self, moved: FloatArray) -> FloatArray:
         """Return what holds the nodes in place (n, 2) [N], at displacements (n, 2) [m]."""
         gradient, volume = self._parent
-        f, strain = self._strained(gradient, moved)
-        return self._gathered(_times(f, volume * self.law(strain)[0]))
+        f, strain = self._evaluate_strain(gradient, moved)
+        return self._assemble_forces(_times(f, volume * self.law(strain)[0]))
 
-    def along(self, moved: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+    def linearize(self, moved: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
         """Return forces (n, 2) [N], and the tangent as a function of a direction (n, 2), in which they change so.
 
         A product of the tangent and a vector takes a quarter of what it takes to assemble the tangent.
         """
         gradient, volume = self._parent
-        f, strain = self._strained(gradient, moved)
+        f, strain = self._evaluate_strain(gradient, moved)
         stress, modulus, _ = self.law(strain)
         s, d = volume * stress, volume * modulus
 
         def changed(direction: FloatArray) -> FloatArray:
-            df = self._sloped(gradient, direction)
-            return self._gathered(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, _strain_change(f, df))))
+            df = self._evaluate_slopes(gradient, direction)
+            return self._assemble_forces(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, _strain_change(f, df))))
 
-        return self._gathered(_times(f, s)), changed
+        return self._assemble_forces(_times(f, s)), changed
 
     def tangent_energies(self, moved: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
         """Return first' K second of every element (m,) [N m], K its tangent at displacements; each (n, 2) [m]."""
         gradient, volume = self._parent
-        f, strain = self._strained(gradient, moved)
+        f, strain = self._evaluate_strain(gradient, moved)
         stress, modulus, _ = self.law(strain)
-        df, dg = self._sloped(gradient, first), self._sloped(gradient, second)
+        df, dg = self._evaluate_slopes(gradient, first), self._evaluate_slopes(gradient, second)
         energy = (df * _times(dg, stress)).sum((0, 1))
         energy += np.einsum("ik,ijk,jk->k", _strain_change(f, df), modulus, _strain_change(f, dg))
         return np.asarray((volume * energy).reshape(len(POINTS), -1).sum(0))
 
-    def _gathered(self, p: FloatArray) -> FloatArray:
+    def _assemble_forces(self, p: FloatArray) -> FloatArray:
         """Return nodal forces (n, 2) [N] from the first Piola-Kirchhoff stress times volume (2, 2, k) [N m]."""
         gradient, _ = self._parent
         each = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(POINTS), -1).sum(2)
@@ -152,7 +152,7 @@ class Elements:
     def tangent(self, moved: FloatArray) -> tuple[FloatArray, csc_array]:
         """Return forces (n, 2) [N] and their derivative (2n, 2n) [N/m] with respect to the displacements."""
         gradient, volume = self._parent
-        f, strain = self._strained(gradient, moved)
+        f, strain = self._evaluate_strain(gradient, moved)
         stress, modulus, _ = self.law(strain)
         s, d = volume * stress, volume * modulus
         # B of a node: row 11: F[:,0] g0; row 22: F[:,1] g1; row 12: F[:,0] g1 + F[:,1] g0
@@ -178,12 +178,14 @@ class Elements:
                 row = row.reshape(-1, points[1])[i:]  # from its own diagonal on
                 entries[first : first + len(row)] = row
                 first += len(row)
-        return self._gathered(_times(f, s)), self._pattern.assembled(entries)
+        return self._assemble_forces(_times(f, s)), self._pattern.assemble(entries)
 
     @cached_property
     def _pattern(self) -> Pattern:
         unknowns = (2 * self.mesh.triangles[:, :, None] + np.arange(2)).reshape(len(self.mesh.triangles), 12).T
-        return Pattern.of(unknowns[UPPER[:, 0]].ravel(), unknowns[UPPER[:, 1]].ravel(), 2 * len(self.mesh.nodes))
+        return Pattern.from_entries(
+            unknowns[UPPER[:, 0]].ravel(), unknowns[UPPER[:, 1]].ravel(), 2 * len(self.mesh.nodes)
+        )
 
     def stress(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return Cauchy's stress at the nodes, averaged over the elements that meet there.
@@ -195,7 +197,7 @@ class Elements:
         spread : (n,) array
             Largest difference of an element's stress from it, as the equivalent stress of the difference [Pa].
         """
-        f, strain = self._strained(self._at_nodes, moved)
+        f, strain = self._evaluate_strain(self._at_nodes, moved)
         s, _, across = self.law(strain)
         det = (f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]) * across
         full = np.stack([np.stack([s[0], s[2]]), np.stack([s[2], s[1]])])
@@ -209,7 +211,7 @@ class Elements:
         np.maximum.at(spread, nodes, equivalent(each - mean[:, nodes]))
         return mean, spread
 
-    def along_edges(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.int64]]:
+    def evaluate_edge_stress(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.int64]]:
         """Return Cauchy's stress along the free edges.
 
         On a free edge nothing acts across, so the stress along it is all there is.
@@ -274,7 +276,7 @@ class Pattern:
     starts: NDArray[np.int32]
 
     @classmethod
-    def of(cls, rows: NDArray[np.int64], columns: NDArray[np.int64], size: int) -> Pattern:
+    def from_entries(cls, rows: NDArray[np.int64], columns: NDArray[np.int64], size: int) -> Pattern:
         """Return the pattern of a matrix with entries in these rows and columns, and as many below its diagonal."""
         pairs, slots = np.unique(np.maximum(rows, columns) * size + np.minimum(rows, columns), return_inverse=True)
         above, below = pairs % size * size + pairs // size, pairs
@@ -285,7 +287,7 @@ class Pattern:
         starts = np.searchsorted(keys, np.arange(size + 1) * size)
         return cls(slots, found, row.astype(np.int32), starts.astype(np.int32))
 
-    def assembled(self, entries: FloatArray) -> csc_array:
+    def assemble(self, entries: FloatArray) -> csc_array:
         """Return the matrix with the sums of the entries (k,), each of its pair."""
         size = len(self.starts) - 1
         data = np.bincount(self.slots, entries.ravel())[self.pairs]

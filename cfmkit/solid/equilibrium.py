@@ -53,7 +53,7 @@ class Balance:
     factors: Factors | None  # of the tangent
     solved: bool = True  # false if it is put together from poses that are
 
-    def kept(self) -> Balance:
+    def drop_factors(self) -> Balance:
         """Return the same without the factors, which take a hundred times the room of all the rest."""
         return replace(self, factors=None)
 
@@ -107,7 +107,7 @@ class Selection:
     starts: NDArray[np.int32]
 
     @classmethod
-    def of(cls, stiffness: csc_array, loose: NDArray[np.int64]) -> Selection:
+    def from_matrix(cls, stiffness: csc_array, loose: NDArray[np.int64]) -> Selection:
         """Return the selection of some displacements of a matrix, whose pattern stays."""
         own = csc_array(stiffness[loose][:, loose])
         first = splu(own, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -118,7 +118,7 @@ class Selection:
         kept.sort_indices()
         return cls(order, kept.data.astype(np.int64) - 1, kept.indices, kept.indptr)
 
-    def taken(self, stiffness: csc_array) -> csc_array:
+    def extract(self, stiffness: csc_array) -> csc_array:
         """Return these entries as a matrix (l, l)."""
         size = len(self.order)
         return csc_array((stiffness.data[self.entries], self.indices, self.starts), shape=(size, size))
@@ -137,9 +137,9 @@ class SolidProblem:
         """Larger side of the box around the part [m]."""
         return float(np.ptp(self.elements.mesh.nodes, axis=0).max())
 
-    def under(self, share: float) -> SolidProblem:
+    def scale_loads(self, share: float) -> SolidProblem:
         """Return the part under a share of its constant loads."""
-        part = replace(self, supports=self.supports.under(share))
+        part = replace(self, supports=self.supports.scale_loads(share))
         part.__dict__.update(
             {name: self.__dict__[name] for name in ("size", "_found_selection") if name in self.__dict__}
         )
@@ -147,12 +147,12 @@ class SolidProblem:
 
     def linearise(self, unknowns: FloatArray, travel: float) -> LinearisedPart:
         """Return the problem's linearisation at some displacements; RuntimeError where it is singular at first."""
-        moved = self.supports.displaced(unknowns, travel)
+        moved = self.supports.evaluate_displacements(unknowns, travel)
         forces, stiffness = self.elements.tangent(moved)
-        beside, corner, slope, _ = self.supports.carried(unknowns, travel, forces).borders(stiffness)
+        beside, corner, slope, _ = self.supports.linearize_motion(unknowns, travel, forces).borders(stiffness)
         selection = self._selection(stiffness)
         order = np.concatenate([selection.order, np.arange(len(selection.order), self.supports.size)])
-        matrix = selection.taken(stiffness)
+        matrix = selection.extract(stiffness)
         if len(corner):  # free motions are last: their full rows fill nothing in
             side = csc_array(beside[selection.order])
             matrix = csc_array(block_array([[matrix, side], [side.T, csc_array(corner)]], format="csc"))
@@ -162,7 +162,7 @@ class SolidProblem:
         """Return the selection of the loose displacements, found once."""
         found: Selection | None = self.__dict__.get("_found_selection")
         if found is None:
-            found = Selection.of(stiffness, self.supports.loose)
+            found = Selection.from_matrix(stiffness, self.supports.loose)
             self.__dict__["_found_selection"] = found
         return found
 
@@ -176,21 +176,21 @@ class SolidProblem:
             for _ in range(ROUNDS):
                 try:
                     here = self.linearise(place[:-1], place[-1])
-                    correct = _Correction.of(here, border)
+                    correct = _Correction.from_state(here, border)
                 except RuntimeError:  # exactly singular
                     return None
                 step = correct(here.residual, place)
-                if not self._believed(here.forces, step):
+                if not self._is_credible(here.forces, step):
                     return None
                 left = float(np.abs(here.residual).max(initial=0.0) / np.abs(here.forces).max())
                 rounded = 0.5 * least < left <= ROUGH and self._still(step, ROUNDED)
-                if on_border and (self._balanced(here.residual, here.forces) or self._still(step) or rounded):
+                if on_border and (self._is_balanced(here.residual, here.forces) or self._still(step) or rounded):
                     return self._balance(place, here.factors)
                 place, least, on_border = place - step, min(least, left), True
                 for _ in range(CORRECTIONS):
-                    forces = self.elements.forces(self.supports.displaced(place[:-1], place[-1]))
+                    forces = self.elements.forces(self.supports.evaluate_displacements(place[:-1], place[-1]))
                     residual = self.supports.residual(place[:-1], place[-1], forces)
-                    if self._balanced(residual, forces):
+                    if self._is_balanced(residual, forces):
                         return self._balance(place, here.factors)
                     more = correct(residual, place)
                     if self._still(more):
@@ -200,13 +200,13 @@ class SolidProblem:
                     place, step = place - more, more
         return None
 
-    def _balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
+    def _is_balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
         return bool(np.abs(residual).max(initial=0.0) <= CLOSE * np.abs(forces).max())
 
     def _still(self, step: FloatArray, part: float = STILL) -> bool:
         return bool(np.abs(step[:-1]).max(initial=0.0) <= part * self.size)
 
-    def _believed(self, forces: FloatArray, step: FloatArray) -> bool:
+    def _is_credible(self, forces: FloatArray, step: FloatArray) -> bool:
         """Return True if a correction is small enough to be believed."""
         finite = np.isfinite(np.abs(forces).max())
         return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self.size)
@@ -214,8 +214,8 @@ class SolidProblem:
     def _balance(self, place: FloatArray, factors: Factors) -> Balance:
         """Return the equilibrium, with factors of a tangent close to its own; with its own if they are not close."""
         unknowns, travel = place[:-1], float(place[-1])
-        forces, pull = self.elements.along(self.supports.displaced(unknowns, travel))
-        carried = self.supports.carried(unknowns, travel, forces)
+        forces, pull = self.elements.linearize(self.supports.evaluate_displacements(unknowns, travel))
+        carried = self.supports.linearize_motion(unknowns, travel, forces)
         path = np.append(np.zeros(self.supports.size), 1.0)
         beside = carried.times(pull, path)
         path[:-1] = -factors.solve(beside[:-1])
@@ -236,9 +236,9 @@ class SolidProblem:
 
     def measure(self, unknowns: FloatArray, travel: float, slope: FloatArray, unstable: int) -> Balance:
         """Return the equilibrium at unknowns that are solved for already, with the effort and the stiffness there."""
-        forces, pull = self.elements.along(self.supports.displaced(unknowns, travel))
+        forces, pull = self.elements.linearize(self.supports.evaluate_displacements(unknowns, travel))
         path = np.append(slope, 1.0)
-        stiffness = float(path @ self.supports.carried(unknowns, travel, forces).times(pull, path))
+        stiffness = float(path @ self.supports.linearize_motion(unknowns, travel, forces).times(pull, path))
         return Balance(travel, unknowns, self._effort(unknowns, travel, forces), stiffness, unstable, slope, None)
 
     def _effort(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> float:
@@ -255,7 +255,7 @@ class _Correction:
     rate: FloatArray  # of the unknowns by the travel, (q,); empty without a border
 
     @classmethod
-    def of(cls, here: LinearisedPart, border: Border | None) -> _Correction:
+    def from_state(cls, here: LinearisedPart, border: Border | None) -> _Correction:
         rate = np.empty(0) if border is None else -here.factors.solve(here.slope)
         return cls(here.factors, border, rate)
 

@@ -55,13 +55,13 @@ class PoseGuide:
     def __call__(self, travel: float) -> FloatArray | None:
         """Return the unknowns at a travel [m or rad]; None if the coarser mesh has no pose there."""
         pose = self.poses.get(travel)
-        return None if pose is None else self._interpolate(self.coarse.moved(pose), pose.unknowns)
+        return None if pose is None else self._interpolate(self.coarse.evaluate_displacements(pose), pose.unknowns)
 
     def interpolate(self, travel: float) -> Balance:
         """Return the coarse pose at one of its travels [m or rad] as one on this mesh: unknowns and their slope."""
         if travel not in self._interpolated:
             pose = self.poses[travel]
-            unknowns = self._interpolate(self.coarse.moved(pose), pose.unknowns)
+            unknowns = self._interpolate(self.coarse.evaluate_displacements(pose), pose.unknowns)
             slope = self._interpolate(self.coarse.slope(pose), pose.slope)
             self._interpolated[travel] = replace(pose, unknowns=unknowns, slope=slope, solved=False)
         return self._interpolated[travel]
@@ -146,7 +146,7 @@ class Correction:
         that the solved poses do not see. Then in the middle of the interval where those of the difference may be off.
         """
         places = np.array([self._sense * pose.travel for pose in self.solved])
-        missed = self._missed(travels)
+        missed = self._measure_coarse_error(travels)
         if missed.max() > SEEN:
             return travels[int(missed.argmax())]
         for k in np.argsort(-missed_by_cubics(self.differences), kind="stable"):
@@ -156,7 +156,7 @@ class Correction:
                 return min(inside, key=lambda one: abs(self._sense * one - middle))
         return None
 
-    def _missed(self, travels: Sequence[float]) -> FloatArray:
+    def _measure_coarse_error(self, travels: Sequence[float]) -> FloatArray:
         """Return what the coarse curve is off at travels, drawn through the solved ones only, of its largest effort."""
         poses = self.guide.poses
         drawn = replace(self.guide.coarse.course, poses=tuple(poses[pose.travel] for pose in self.solved))
@@ -183,7 +183,7 @@ def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...
         more = _difference(found[-1], guide.interpolate(found[-1].travel)).unknowns if found else 0.0
         pose = guide.meshed.problem.solve(coarse.unknowns + more, travel)
         if pose is not None and pose.unstable <= coarse.unstable:
-            found.append(pose.kept())
+            found.append(pose.drop_factors())
     return tuple(found)
 
 
@@ -223,7 +223,7 @@ def follow_some(
         if pose is None or pose.unstable > guess.unstable:
             return None
         off.append(abs(pose.effort - guess.effort) / size if size else 0.0)
-        along = sorted([*correction.solved, pose.kept()], key=lambda one: travels.index(one.travel))
+        along = sorted([*correction.solved, pose.drop_factors()], key=lambda one: travels.index(one.travel))
         correction = Correction(guide, tuple(along))
         report(len(along) / len(travels))
     known = {pose.travel: pose for pose in correction.solved}

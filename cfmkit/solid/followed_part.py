@@ -119,7 +119,7 @@ class FollowedPart:
         if math.isnan(at.effort) or math.isnan(at.stiffness):  # not quite at its drive, or singular
             found = self.problem.solve(unknowns, at.drive)
             if found is not None and found.unstable <= at.unstable:
-                return found.kept()
+                return found.drop_factors()
             return self.problem.measure(unknowns, at.drive, slope, at.unstable)
         return Balance(at.drive, unknowns, at.effort, at.stiffness, at.unstable, slope, None)
 
@@ -128,7 +128,7 @@ class FollowedPart:
         if self.held_at is None:
             here = self.problem.linearise(x * self.scale, drive)
             return ScaledTangent(here, here.slope, self.scale)
-        here = self.problem.under(drive).linearise(x * self.scale, self.held_at)
+        here = self.problem.scale_loads(drive).linearise(x * self.scale, self.held_at)
         return ScaledTangent(here, -self._load, self.scale)
 
     def solve(self, x: FloatArray, drive: float, border: Border | None = None) -> PathEquilibrium | None:
@@ -138,7 +138,7 @@ class FollowedPart:
                 border = Border(np.append(border.row[:-1] / self.scale, border.row[-1]), border.level)
             found = self.problem.solve(x * self.scale, drive, border)
         else:
-            found = None if border else self.problem.under(drive).solve(x * self.scale, self.held_at)
+            found = None if border else self.problem.scale_loads(drive).solve(x * self.scale, self.held_at)
         if found is None or found.factors is None:
             return None
         at = self.equilibrium(found)

@@ -108,7 +108,7 @@ def mesh(
         raise _too_many(int(around / size))
     field = sizes(rings, size, share, across)
     laid = [_boundary_nodes(ring, field, _crossings(ring, seams, field, near)) for ring in rings]
-    fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
+    fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
     on_seams = [_sewn(region, field, seam) for seam in seams]
     sewn = np.concatenate([np.zeros((0, 2)), *on_seams])
     kept_from = Spacing(field, sewn)
@@ -117,7 +117,7 @@ def mesh(
         raise _too_many(4 * (len(inside) + len(fixed)))
     inside = _relax_points(region, kept_from, np.concatenate([fixed, sewn]), inside)
     for _ in range(HALVINGS):
-        fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
+        fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
         points = np.concatenate([fixed, *on_seams, inside])
         corners = _triangles(region, points)
         missing = _missing(corners, laid)
@@ -125,7 +125,7 @@ def mesh(
         if not any(len(one) for one in (*missing, *crossed)):
             return _six_nodes(points, corners, rings, laid)
         first = next(
-            (ring.at(arc[at[:1]])[0] for ring, arc, at in zip(rings, laid, missing, strict=True) if len(at)),
+            (ring.locate(arc[at[:1]])[0] for ring, arc, at in zip(rings, laid, missing, strict=True) if len(at)),
             next((middles[0] for middles in crossed if len(middles)), np.zeros(2)),
         )
         on_seams = [np.concatenate([known, more]) for known, more in zip(on_seams, crossed, strict=True)]
@@ -193,8 +193,8 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, near: floa
     arcs = np.unique(np.concatenate([np.zeros(0), *found]))
     if not len(arcs):
         return arcs
-    corners = ring.at(ring.places[ring.corners]) if len(ring.corners) else np.full((1, 2), np.inf)
-    places = ring.at(arcs)
+    corners = ring.locate(ring.places[ring.corners]) if len(ring.corners) else np.full((1, 2), np.inf)
+    places = ring.locate(arcs)
     away = np.hypot(*(places[:, None] - corners).transpose(2, 0, 1)).min(axis=1)
     apart = np.diff(arcs, prepend=-np.inf) > 0.2 * field(places)
     return np.asarray(arcs[(away > 0.2 * field(places)) & apart])
@@ -221,7 +221,7 @@ def _boundary_nodes(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArr
     found = []
     for low, high in zip(stops, ends, strict=True):
         fine = np.linspace(low, high, max(64, int(8 * (high - low) / field.sizes.min()) + 1))
-        density = 1.0 / field(ring.at(fine))
+        density = 1.0 / field(ring.locate(fine))
         count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
         pieces = max(1 if len(stops) > 2 else 3, round(float(count[-1])))
         found.append(np.interp(np.arange(pieces) * count[-1] / pieces, count, fine))
@@ -237,7 +237,7 @@ def _curvature_jumps(ring: Ring, stops: FloatArray, field: Sizes) -> FloatArray:
     """Return the arc lengths (k,) [m] of the ends of arcs, but for those next to other stops (m,) [m]."""
     sizes = field(ring.points)
     jumps = sizes * ring.curvature_jumps
-    taken = list(ring.at(stops))
+    taken = list(ring.locate(stops))
     found = []
     for vertex in np.flatnonzero(jumps > BENT)[np.argsort(-jumps[jumps > BENT], kind="stable")]:
         place = ring.points[vertex]
@@ -465,7 +465,7 @@ def _six_nodes(points: FloatArray, corners: IntArray, rings: tuple[Ring, ...], l
         ends = np.append(arc[1:], arc[0] + ring.places[-1])
         a, b = place[pieces].T
         side = np.searchsorted(keys, np.minimum(a, b) * len(points) + np.maximum(a, b))
-        middles[side] = ring.at(0.5 * (arc + ends))
+        middles[side] = ring.locate(0.5 * (arc + ends))
         edges.append(np.column_stack([a, b, len(points) + side]))
         owners.append(np.full(len(arc), number))
         reaches.append(np.column_stack([arc, ends]))

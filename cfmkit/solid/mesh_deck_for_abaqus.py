@@ -59,7 +59,7 @@ def deck(name: str, driven: DrivenPart) -> bytes:
     part, stops = driven.part, driven.stops
     if any(place.load.any() for place in part.places):
         raise UsageError("--format inp: decks have no constant loads; leave out 'mechanism.loads'")
-    lines = _lines(name, part, part.meshed().refined()[0], stops[-1], len(stops))
+    lines = _lines(name, part, part.create_mesh().refine()[0], stops[-1], len(stops))
     return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
@@ -98,7 +98,7 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
         nodes = number[group.nodes[seen]].tolist()
         if _turns(group):
             places = dict(zip(nodes, grid.nodes[group.nodes[seen]], strict=True))
-            hub = Hub.on(places, group.center, spare)
+            hub = Hub.from_nodes(places, group.center, spare)
             yield from _stiff(word, hub, start, share * to_border(part.width, "length"), part.law.youngs_modulus)
             nodes, start, spare = list(dict.fromkeys([*nodes, hub.center])), start + len(hub.triangles), hub.spare
             made = _guide_lines(group, travel, hub.center, spare)
@@ -188,7 +188,7 @@ class Hub:
     triangles: NDArray[np.int64]  # (m, 3) numbers of nodes, counter-clockwise
 
     @classmethod
-    def on(cls, places: dict[int, FloatArray], center: FloatArray, spare: int) -> Hub:
+    def from_nodes(cls, places: dict[int, FloatArray], center: FloatArray, spare: int) -> Hub:
         """Return the hub of nodes at some places [m], with own nodes from a number on.
 
         Nodes on a line across a beam have one more on each side of it.

@@ -54,7 +54,7 @@ class RefinedMesh:
     node_parents: IntArray  # nodes of the parent triangle of each node, (n, 6)
     node_shares: FloatArray  # values of their shape functions at the node, (n, 6)
 
-    def between(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def transfer_selection(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which nodes (n,) are chosen ones of the other mesh, or in the middle of a side between two of them."""
         corners = self.mesh.triangles[:, :3].max(initial=-1) + 1
         found = np.zeros(len(self.mesh.nodes), bool)
@@ -161,7 +161,7 @@ def _with_side_nodes(
     on_edge = side_of(edges[:, 0], edges[:, 1])
     for owner, ring in enumerate(rings):
         own = owners == owner
-        middles[on_edge[own]] = ring.at(arcs[own].mean(axis=1))
+        middles[on_edge[own]] = ring.locate(arcs[own].mean(axis=1))
     triangles = np.column_stack([number[corners], len(used) + which.reshape(-1, 3)])
     refined = TriangleMesh(
         read_only(np.concatenate([points, middles])),

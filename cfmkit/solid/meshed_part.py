@@ -125,7 +125,7 @@ class Part:
                 found.append(whole[0] if whole else seam)
         return tuple(found)
 
-    def meshed(self, size: float | None = None, across: float = ACROSS) -> Meshed:
+    def create_mesh(self, size: float | None = None, across: float = ACROSS) -> Meshed:
         """Return the part with elements of a size [m], and of so many across the thickness at least.
 
         A part with blocks has as many across as the size leaves. Without a size there are `ACROSS` across the thinnest
@@ -141,19 +141,19 @@ class Part:
         across = self.thinnest / size if self.largest > 1.0 else across
         grid = mesh(self.rings, self.largest * size, share, across, self.faces, self.near)
         check_mesh(grid, sum(ring.area for ring in self.rings), self.sections)
-        meshed = self.on(grid, np.ones(len(grid.nodes), bool))
+        meshed = self.assemble_on(grid, np.ones(len(grid.nodes), bool))
         for _ in range(SINGULAR_SPLITS):
             if meshed.singular.any():
-                meshed, _ = meshed.refined(meshed.singular)
+                meshed, _ = meshed.refine(meshed.singular)
         return meshed
 
-    def on(self, grid: TriangleMesh, holdable: NDArray[np.bool_]) -> Meshed:
+    def assemble_on(self, grid: TriangleMesh, holdable: NDArray[np.bool_]) -> Meshed:
         """Return the part on a mesh, of whose nodes some (n,) can be held; GeometryError if none is at a place."""
         groups, held = self._groups(grid.nodes, holdable)
         moving = np.asarray(~held[grid.triangles].all(axis=1))
         elements = Elements(grid, self.law, self._widths(grid)).only(moving)
         problem = SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles)
-        return Meshed(self, grid, held, moving, problem, held | self._beside_clamps(grid, held))
+        return Meshed(self, grid, held, moving, problem, held | self._find_nodes_beside_clamps(grid, held))
 
     def clamp_ends(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the nodes (k,) at which an edge runs into the face of a rigid piece, not along it."""
@@ -170,7 +170,7 @@ class Part:
                     found.append(edge[0] if held[edge[0]] else edge[1])
         return np.array(found, np.int64)
 
-    def _beside_clamps(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _find_nodes_beside_clamps(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
         from scipy.spatial import cKDTree
 
@@ -216,10 +216,10 @@ class Meshed:
     # (n,) nodes whose stress is not read: they are held or driven, or at the end of a rigid piece
     unjudged: NDArray[np.bool_]
 
-    def refined(self, marked: NDArray[np.bool_] | None = None) -> tuple[Meshed, RefinedMesh]:
+    def refine(self, marked: NDArray[np.bool_] | None = None) -> tuple[Meshed, RefinedMesh]:
         """Return the part on a mesh with some triangles (m,) split in four, all without `marked`, and that mesh."""
         finer = refine(self.grid, self.part.rings, self.moving if marked is None else marked)
-        return self.part.on(finer.mesh, finer.between(self.held)), finer
+        return self.part.assemble_on(finer.mesh, finer.transfer_selection(self.held)), finer
 
     @cached_property
     def singular(self) -> NDArray[np.bool_]:
@@ -237,11 +237,11 @@ class Meshed:
         found[cKDTree(self.grid.nodes).query(places)[1]] = True
         return found
 
-    def at(self, *poses: Balance) -> MeshSolution:
+    def collect_poses(self, *poses: Balance) -> MeshSolution:
         """Return some poses as a solution."""
         return MeshSolution(self.part, self.problem, PosePath(poses, PathEnd.COMPLETE), self.unjudged)
 
-    def followed(
+    def follow_stops(
         self,
         stops: Sequence[float],
         report: Callable[[float], None] = lambda _share: None,
@@ -275,7 +275,10 @@ class MeshSolution:
     @cached_property
     def along_edges(self) -> tuple[FloatArray, NDArray[np.int64]]:
         """Stress along the free edges at each pose (k, e) [Pa], and at which nodes (e,)."""
-        found = [self.problem.elements.along_edges(self.moved(pose), self.unjudged) for pose in self.course.poses]
+        found = [
+            self.problem.elements.evaluate_edge_stress(self.evaluate_displacements(pose), self.unjudged)
+            for pose in self.course.poses
+        ]
         return read_only([stress for stress, _ in found]), found[0][1]
 
     @cached_property
@@ -296,14 +299,14 @@ class MeshSolution:
         there = np.array([coarse.course.poses[k].effort for k in other])
         return _apart(force, there), _apart(self.peaks[0][own], coarse.peaks[0][other])
 
-    def moved(self, pose: Any) -> FloatArray:
+    def evaluate_displacements(self, pose: Any) -> FloatArray:
         """Return the displacements of all nodes at a pose (n, 2) [m]."""
-        return self.problem.supports.displaced(pose.unknowns, pose.travel)
+        return self.problem.supports.evaluate_displacements(pose.unknowns, pose.travel)
 
     def slope(self, pose: Any) -> FloatArray:
         """Return their derivatives with respect to the travel (n, 2)."""
         supports = self.problem.supports
-        carried = supports.carried(pose.unknowns, pose.travel, np.zeros_like(supports.places))
+        carried = supports.linearize_motion(pose.unknowns, pose.travel, np.zeros_like(supports.places))
         return carried.moves(np.append(pose.slope, 1.0))
 
 
@@ -332,7 +335,7 @@ def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[R
         points.
     """
     step = ON * thinnest if math.isfinite(thinnest) else 0.0
-    return tuple(Ring.of(contour.points(RING * thinnest, TURN), contour.hole, step) for contour in contours)
+    return tuple(Ring.from_points(contour.points(RING * thinnest, TURN), contour.hole, step) for contour in contours)
 
 
 HALVED = 16.0

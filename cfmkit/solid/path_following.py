@@ -300,7 +300,7 @@ def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
 
     elements, supports = problem.elements, problem.supports
     edges = elements.mesh.edges
-    places = elements.mesh.nodes + supports.displaced(pose.unknowns, pose.travel)
+    places = elements.mesh.nodes + supports.evaluate_displacements(pose.unknowns, pose.travel)
     pieces = np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
     rigid = -np.ones(len(places), int)
     for number, group in enumerate(supports.groups):

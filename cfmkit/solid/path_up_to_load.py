@@ -54,7 +54,7 @@ class LoadPath:
     how: LoadEnd
 
     @classmethod
-    def of(cls, course: PosePath, load: float, through_maxima: bool) -> LoadPath:
+    def from_course(cls, course: PosePath, load: float, through_maxima: bool) -> LoadPath:
         """Return what a path says of a load of either sign [N or N m]; it may pass maxima if that is allowed."""
         sense = float(np.sign(load))
         law = course.law(sense)
@@ -100,7 +100,7 @@ def travel_for(
         course = follow(meshed.problem, stops, report, lambda effort: sense * effort >= abs(load))
         if len(course.poses) < 2:
             break
-        found = LoadPath.of(course, load, through_maxima)
+        found = LoadPath.from_course(course, load, through_maxima)
         travel = found.end
         if found.how is not LoadEnd.SHORT or course.ended:
             break
@@ -110,7 +110,7 @@ def travel_for(
 def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
     """Return the part's path up to a load [N or N m] or to where it leads, with a pose there, and what that is."""
     course = solved.course
-    found = LoadPath.of(course, load, through_maxima)
+    found = LoadPath.from_course(course, load, through_maxima)
     if found.how is LoadEnd.SHORT:
         return solved, found
     poses = [pose for pose in course.poses if abs(pose.travel) < abs(found.end) * (1 - 1e-12)]

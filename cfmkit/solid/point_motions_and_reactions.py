@@ -48,12 +48,12 @@ def motion(solved: MeshSolution, place: FloatArray, name: str) -> Callable[[Floa
             return np.array([*(np.array([x, y]) + (rotation_matrix(turn) - np.eye(2)) @ arm), turn])
 
         return _reading_between(solved, of_group)
-    found = MaterialPoint.at(solved.problem.elements, place)
+    found = MaterialPoint.from_place(solved.problem.elements, place)
     if found is None:
         return lambda travel: np.full((len(travel), 3), np.nan)
     supports = solved.problem.supports
     return _reading_between(
-        solved, lambda unknowns, travel: found.motion(supports.displaced(unknowns, travel)), turns=True
+        solved, lambda unknowns, travel: found.motion(supports.evaluate_displacements(unknowns, travel)), turns=True
     )
 
 
@@ -72,7 +72,7 @@ def reaction(
     own = elements if counted is None else elements.only(counted)
 
     def read(unknowns: FloatArray, travel: float) -> FloatArray:
-        forces = own.forces(supports.displaced(unknowns, travel))
+        forces = own.forces(supports.evaluate_displacements(unknowns, travel))
         return np.asarray(supports.reactions(unknowns, travel, forces)[number])
 
     return _reading_between(solved, read)
@@ -108,7 +108,7 @@ class MaterialPoint:
     gradient: FloatArray  # (6, 2) slopes of the shares in the plane [1/m]
 
     @classmethod
-    def at(cls, elements: Elements, place: FloatArray) -> MaterialPoint | None:
+    def from_place(cls, elements: Elements, place: FloatArray) -> MaterialPoint | None:
         """Return the point at a place (2,) [m]; None if no element is."""
         triangles = elements.mesh.triangles
         corners = elements.mesh.nodes[triangles]  # (m, 6, 2)

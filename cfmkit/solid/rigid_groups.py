@@ -80,7 +80,7 @@ class Supports:
             first = last
         return found
 
-    def displaced(self, unknowns: FloatArray, travel: float) -> FloatArray:
+    def evaluate_displacements(self, unknowns: FloatArray, travel: float) -> FloatArray:
         """Return the displacements (n, 2) [m] of all nodes."""
         moved = np.zeros((len(self.places), 2))
         moved.ravel()[self.loose] = unknowns[: len(self.loose)]
@@ -115,7 +115,7 @@ class Supports:
         """Whether constant loads act on groups."""
         return any(group.load.any() for group in self.groups)
 
-    def under(self, share: float) -> Supports:
+    def scale_loads(self, share: float) -> Supports:
         """Return the same under a share of the constant loads."""
         return replace(self, groups=tuple(replace(group, load=share * group.load) for group in self.groups))
 
@@ -125,7 +125,7 @@ class Supports:
         ends = [group.free.T @ reaction for group, reaction in zip(self.groups, reactions, strict=True)]
         return np.concatenate([forces.ravel()[self.loose], *ends])
 
-    def carried(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> Carried:
+    def linearize_motion(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> Carried:
         """Return how free motions and the travel move the nodes; forces (n, 2) [N] act on these."""
         motions = self.motions(unknowns, travel)
         count = self.size - len(self.loose)

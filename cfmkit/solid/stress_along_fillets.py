@@ -66,7 +66,7 @@ class FilletArc:
             (np.abs(np.hypot(*way.T) - self.radius) < ON * self.radius) & (off <= 0.5 * self.turn + BEYOND)
         )
 
-    def touched(self, pieces: Mapping[str, Sequence[FloatArray]]) -> tuple[str, ...]:
+    def find_touched(self, pieces: Mapping[str, Sequence[FloatArray]]) -> tuple[str, ...]:
         """Return the names of the pieces, closed polygons (n, 2) [m] each, on whose edges it begins or ends."""
         from shapely import LinearRing, Point
 

@@ -14,7 +14,7 @@ class TargetCurve:
 
     Examples
     --------
-    >>> TargetCurve((10.0, -500.0)).at(0.01)
+    >>> TargetCurve((10.0, -500.0)).evaluate(0.01)
     5.0
     """
 
@@ -22,10 +22,10 @@ class TargetCurve:
     function: ThroughPoints | tuple[float, float]
     kind: str | None = None  # what it is; None if nothing but zeros says so
 
-    def at(self, places: Any) -> Any:
+    def evaluate(self, places: Any) -> Any:
         """Return the effort that is wanted at places [N or N m]."""
         if isinstance(self.function, ThroughPoints):
-            return self.function.at(places)
+            return self.function.evaluate(places)
         level, slope = self.function
         return level + slope * places
 
@@ -36,7 +36,7 @@ class TargetCurve:
             return self.function.places[0], self.function.places[-1]
         return -float("inf"), float("inf")
 
-    def scaled(self, factor: float) -> TargetCurve:
+    def scale(self, factor: float) -> TargetCurve:
         """Return it with all efforts multiplied by a factor."""
         if isinstance(self.function, ThroughPoints):
             values = tuple(factor * value for value in self.function.values)
@@ -50,15 +50,15 @@ class TargetCurve:
         slack = 1e-6 * (high - low)
         return first <= low + slack and high - slack <= last
 
-    def between(self, low: float, high: float) -> ThroughPoints:
+    def to_points(self, low: float, high: float) -> ThroughPoints:
         """Return it as a function through points, of which a line has two [m or rad]."""
         if isinstance(self.function, ThroughPoints):
             return self.function
-        return ThroughPoints((low, high), (float(self.at(low)), float(self.at(high))))
+        return ThroughPoints((low, high), (float(self.evaluate(low)), float(self.evaluate(high))))
 
     def extremes(self, low: float, high: float) -> tuple[float, float]:
         """Return the smallest and the largest effort between two places [N or N m]."""
-        return self.between(low, high).extremes(low, high)
+        return self.to_points(low, high).extremes(low, high)
 
     def largest(self, low: float, high: float) -> float:
         """Return the largest magnitude between two places [N or N m]."""

@@ -45,7 +45,7 @@ class Requirement(Model):
 
     @field_validator("metric", mode="before")
     @classmethod
-    def _named(cls, metric: Any) -> Any:
+    def _name_metric(cls, metric: Any) -> Any:
         return name_of(metric)
 
     @field_validator("metric")
@@ -59,7 +59,7 @@ class Requirement(Model):
         return text
 
     @model_validator(mode="after")
-    def _bounded(self) -> Self:
+    def _require_bounds(self) -> Self:
         if self.min is None and self.max is None:
             raise ValueError("needs 'min', 'max' or both")
         if self.over is not None and not ends_increase(self.over):
@@ -275,8 +275,8 @@ class Spec(Model):
             if one.over is not None:
                 yield ("requirements", index, "over"), one.over
 
-    def at(self, path: str) -> Any:
-        """Return the value at a dotted path, SI for quantities: ``spec.at("mechanism.springs.stiffness")``.
+    def get_value(self, path: str) -> Any:
+        """Return the value at a dotted path, SI for quantities: ``spec.get_value("mechanism.springs.stiffness")``.
 
         Raises
         ------

@@ -98,7 +98,7 @@ class Target(Model):
 
     @field_validator("file", mode="wrap")
     @classmethod
-    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
+    def _resolve_file(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
         folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
         if value is None:
             return None

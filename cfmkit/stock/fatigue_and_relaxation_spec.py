@@ -48,10 +48,10 @@ class Fatigue(Model):
             if after <= before or below > above:
                 raise ValueError("'points' must have increasing cycles and amplitudes that do not rise")
         if self.points is not None:
-            self._within_points(self.points)
+            self._require_range_of_points(self.points)
         return self
 
-    def _within_points(self, points: tuple[tuple[float, float], ...]) -> None:
+    def _require_range_of_points(self, points: tuple[tuple[float, float], ...]) -> None:
         """Raise if an amplitude is more than the material bears once, or more cycles are wanted than were shown."""
         if points[0][1] > self.ultimate_strength:
             reported = (
@@ -76,7 +76,7 @@ class Fatigue(Model):
         return cls(points=result.points, ultimate_strength=result.ultimate_strength, source=result.source)
 
     @classmethod
-    def of(cls, law: FatigueLaw) -> Self:
+    def from_law(cls, law: FatigueLaw) -> Self:
         """Return a law as a specification says it."""
         coefficient, exponent = law.basquin or (None, None)
         return cls(

@@ -174,7 +174,7 @@ class RunFolder:
         duration = timedelta(seconds=time.monotonic() - self._clock)
         manifest = Manifest.of_run(info, self._staged, self._started, duration)
         with reporting(self.path):
-            removed, kept = self._outdated()
+            removed, kept = self._list_outdated()
             new = {name: record.sha256 for name, record in self._staged.items()}
             new |= {spare: self._keep(name, spare) for name, spare in kept.items()}
             new[MANIFEST] = self._stage(MANIFEST, manifest.to_json()).sha256
@@ -225,7 +225,7 @@ class RunFolder:
         safe_disk_changes.duplicate(self.path / name, place)
         return file_hash(place) or ""
 
-    def _outdated(self) -> tuple[list[str], dict[str, str]]:
+    def _list_outdated(self) -> tuple[list[str], dict[str, str]]:
         """Return the old files to remove, and the edited ones to keep under another name."""
         removed: list[str] = []
         kept: dict[str, str] = {}

@@ -188,7 +188,7 @@ def fidelity_of(result: Result) -> str:
         If the family does not write it into the specification of its results.
     """
     # A result that failed early has the specification as it was given: there the family's own rule applies.
-    name = result.spec.at(PATH) or getattr(result.spec, "fidelity", None)
+    name = result.spec.get_value(PATH) or getattr(result.spec, "fidelity", None)
     if not isinstance(name, str):
         raise CfmError(f"a result of the family {result.spec.family} does not say its {PATH}")
     return name

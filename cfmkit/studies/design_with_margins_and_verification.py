@@ -64,7 +64,7 @@ def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.studies.parts.redesign import with_design_margins
 
-    clock = Clock.of(run.time_budget)
+    clock = Clock.from_budgets(run.time_budget)
     half = None if run.time_budget is None else 0.5 * run.time_budget
     found = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
-    return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.left()))
+    return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.get_time_left()))

@@ -130,7 +130,7 @@ class Monitor(Protocol):
     def total(self, points: int) -> None:
         """Take how many points there are."""
 
-    def done(self, points: int, failed: int, reused: bool) -> None:
+    def add_finished(self, points: int, failed: int, reused: bool) -> None:
         """Take that more points are finished."""
 
     def stopping(self) -> bool:
@@ -143,7 +143,7 @@ class Silent:
     def total(self, points: int) -> None:
         """Ignore how many there are."""
 
-    def done(self, points: int, failed: int, reused: bool) -> None:
+    def add_finished(self, points: int, failed: int, reused: bool) -> None:
         """Ignore what is finished."""
 
     def stopping(self) -> bool:
@@ -192,7 +192,7 @@ class Records:
         rows = self.work.recall(reported)
         if len(rows) != job.stop - job.start:
             return None
-        self._noted(job)
+        self._mark_noted(job)
         self.reused += len(rows)
         return rows
 
@@ -200,14 +200,14 @@ class Records:
         """Note rows: in the journal if they would be the same anywhere, else until the process ends."""
         if rows.keepable:
             self._journal.add(job.key, record(rows))
-            self._noted(job)
+            self._mark_noted(job)
             return
         self._places[job.start : job.stop] = HELD
         self._held[job.start] = rows
         self.bugs += len(rows.bugs)
         self.bug = self.bug or next(iter(rows.bugs.values()), "")
 
-    def _noted(self, job: Job) -> None:
+    def _mark_noted(self, job: Job) -> None:
         self._places[job.start : job.stop] = NOTED
         self._keys[job.start : job.stop] = np.frombuffer(bytes.fromhex(job.key), dtype=np.uint8)
 
@@ -256,11 +256,11 @@ class Records:
         key: bytes = self._keys[index].tobytes()
         return key.hex()
 
-    def _reported(self, index: int) -> Any:
+    def _read_record(self, index: int) -> Any:
         return self._journal.read(self._key(index))
 
     def _read(self, index: int) -> ResultRows | Row:
-        reported = self._reported(index)
+        reported = self._read_record(index)
         return self.work.recall(reported) if "n" in reported else recalled_row(reported)
 
     def row(self, index: int) -> ResultRows:
@@ -268,7 +268,7 @@ class Records:
         if int(self._places[index]) == HELD:
             start = max(at for at in self._held if at <= index)
             return cut_rows(self._held[start], index - start, index - start + 1)
-        rows, start = self.work.recall(self._reported(index)), index - index % self.work.step
+        rows, start = self.work.recall(self._read_record(index)), index - index % self.work.step
         return rows if len(rows) == 1 else cut_rows(rows, index - start, index - start + 1)
 
 
@@ -319,7 +319,7 @@ def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Mo
                 outcome = work.gather(Row(outcome.status, message=outcome.message, bug=outcome.bug))
             for block in job.blocks or (job,):
                 records.keep(block, cut_rows(outcome, block.start - job.start, block.stop - job.start))
-            watch.done(len(outcome), outcome.failed, False)
+            watch.add_finished(len(outcome), outcome.failed, False)
     return lost
 
 
@@ -330,7 +330,7 @@ def _new(records: Records, queue: Iterator[Job], watch: Monitor) -> Iterator[Job
         if rows is None:
             yield job
         else:
-            watch.done(len(rows), rows.failed, True)
+            watch.add_finished(len(rows), rows.failed, True)
 
 
 def _neighbours(queue: Iterator[Job], most: int) -> Iterator[Job]:

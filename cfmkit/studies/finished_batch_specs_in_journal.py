@@ -68,7 +68,7 @@ class KeptRuns:
         if not entry.verb:
             return entry
         data_there = all(_hash_beside(spec, name) == digest for name, digest in reported["data"])
-        if not data_there or not self._untouched(folder, reported["manifest"]):
+        if not data_there or not self._is_untouched(folder, reported["manifest"]):
             return None
         # pages link to its folder, and comparisons read it, as if it had been written now
         return replace(entry, written=reported["manifest"] is not None)
@@ -93,7 +93,7 @@ class KeptRuns:
         head = f"{self._about}\0{spec}\0{folder}\0".encode("utf-8", "surrogateescape")
         return hashlib.sha256(head + text).hexdigest()[:32]
 
-    def _untouched(self, folder: str, manifest: str | None) -> bool:
+    def _is_untouched(self, folder: str, manifest: str | None) -> bool:
         """Return whether a run's folder holds what that run wrote, and nobody is at work there."""
         place = Path(self._out, folder)
         if manifest is None:

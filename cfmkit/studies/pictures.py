@@ -45,7 +45,9 @@ def findings(records: Records, summary: Summary) -> StudyMarks:
     metrics = [_drawn_scale(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
     kinds = [(item.path, item.dimension) for item in plan.variables]
-    varied = scales(study.spec, kinds, [*plan.shown(0, len(plan))], [[*map(str, one.shown)] for one in plan.variables])
+    varied = scales(
+        study.spec, kinds, [*plan.list_shown_values(0, len(plan))], [[*map(str, one.shown)] for one in plan.variables]
+    )
     best = "" if summary.best_by is None else best_words(*summary.best_by, summary.ties)
     return StudyMarks(varied, tuple(drawn), shape_of(plan), meets, summary.best, study.spec.name, best)
 

@@ -73,15 +73,15 @@ class Plan:
 
     def block(self, start: int, stop: int) -> tuple[NDArray[Any], ...]:
         """Return the values of the points from `start` up to `stop`, one array for each variable."""
-        return self._taken([item.values for item in self.variables], start, stop)
+        return self._select_points([item.values for item in self.variables], start, stop)
 
-    def shown(self, start: int, stop: int) -> tuple[NDArray[Any], ...]:
+    def list_shown_values(self, start: int, stop: int) -> tuple[NDArray[Any], ...]:
         """Return the same in border units, for tables."""
-        return self._taken([item.shown for item in self.variables], start, stop)
+        return self._select_points([item.shown for item in self.variables], start, stop)
 
     def part(self, start: int, stop: int) -> Plan:
         """Return the points from `start` up to `stop` as a plan of their own."""
-        taken = zip(self.variables, self.block(start, stop), self.shown(start, stop), strict=True)
+        taken = zip(self.variables, self.block(start, stop), self.list_shown_values(start, stop), strict=True)
         parts = (Variable(item.path, item.dimension, values, shown, item.place) for item, values, shown in taken)
         return Plan(tuple(parts), stop - start, joint=True)
 
@@ -94,7 +94,7 @@ class Plan:
             levels.append(level)
         return levels[::-1]
 
-    def _taken(self, columns: Sequence[Levels], start: int, stop: int) -> tuple[NDArray[Any], ...]:
+    def _select_points(self, columns: Sequence[Levels], start: int, stop: int) -> tuple[NDArray[Any], ...]:
         index = np.arange(start, stop)
         if self.joint:
             return tuple(_array(column)[index] for column in columns)

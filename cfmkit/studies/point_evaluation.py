@@ -114,7 +114,7 @@ class Study:
     def _definitions(self) -> dict[Kind, Mapping[str, Definition]]:
         return {}
 
-    def reported(self, column: int, value: float) -> float | str | None:
+    def format_metric(self, column: int, value: float) -> float | str | None:
         """Return a metric's value as files say it: in the border unit, or a word; None if there is none."""
         one = self.metrics[column]
         if not isfinite(value):

@@ -122,7 +122,7 @@ class Pool:
         """
         with _Crew(self, work, jobs, stopping) as crew:
             while crew.hire():
-                yield from crew.finished()
+                yield from crew.collect_finished()
 
 
 class _Crew:
@@ -170,17 +170,17 @@ class _Crew:
         self.empty = job is None
         return job
 
-    def finished(self) -> Iterator[tuple[Any, Any]]:
+    def collect_finished(self) -> Iterator[tuple[Any, Any]]:
         """Yield what has finished since the last look, or nothing after a short while."""
         with suppress(Empty):
             one, message = self.messages.get(timeout=PATIENCE)
             while True:
                 if one in self.workers:
-                    yield from self._buried(one) if message is None else self._heard(one, message)
+                    yield from self._remove_worker(one) if message is None else self._handle_message(one, message)
                 one, message = self.messages.get_nowait()
         yield from self._late()
 
-    def _heard(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
+    def _handle_message(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
         kind, rest = message[:1], message[1:]
         if kind == worker_process.READY:
             one.begin()
@@ -195,7 +195,7 @@ class _Crew:
                 outcome = Lost(Status.CRASHED, f"{BUG}{outcome[0]}", outcome[1])
             yield job, outcome
 
-    def _buried(self, one: _Worker) -> Iterator[tuple[Any, Any]]:
+    def _remove_worker(self, one: _Worker) -> Iterator[tuple[Any, Any]]:
         """Yield the job that a dead worker took with it, if it was the second time; do the rest again."""
         self.workers.remove(one)
         one.end()

@@ -134,6 +134,6 @@ def _changes(before: Spec, after: Spec, paths: Sequence[str]) -> str:
         f"{path} {format_short(float(old), dimension_of(before, path))} -> "
         f"{format_short(float(new), dimension_of(before, path), 6)}"
         for path in paths
-        if (old := before.at(path)) != (new := after.at(path))
+        if (old := before.get_value(path)) != (new := after.get_value(path))
     ]
     return f"moved so that the requirements are met: {'; '.join(moved)}" if moved else "nothing was moved"

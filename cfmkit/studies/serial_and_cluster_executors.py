@@ -250,7 +250,7 @@ class _ClusterRun:
 
     def _submit(self, job: Any) -> None:
         parcel = pickle.dumps(_parcel(self.work, job), pickle.HIGHEST_PROTOCOL)
-        with self._connected():
+        with self._check_connection():
             future = self.client.submit(do_parcel, dict(self.stamp), self.family, parcel, pure=False)
         self.under_way[future.key] = future, job
         future.add_done_callback(self.finished.put)
@@ -258,14 +258,14 @@ class _ClusterRun:
     def _outcome(self, future: Any) -> Any:
         """Return what came of a job."""
         if future.status == "finished":
-            with self._connected():
+            with self._check_connection():
                 outcome = future.result()
             if isinstance(outcome, OtherCode):
                 raise self._refusal(outcome.worker, outcome.stamp)
             return outcome
         error = future.exception() if future.status == "error" else None
         if error is None:
-            raise self._gone()
+            raise self._build_error()
         if type(error).__name__ == "KilledWorker":
             return Lost(Status.CRASHED, f"the workers that worked on this point died {RETRIES + 1} times")
         # `do_parcel` lets no error of a point out: this worker could not even read the job.
@@ -280,7 +280,7 @@ class _ClusterRun:
         cfmkit.errors.UsageError
             If the scheduler has gone, or there has been no worker for too long.
         """
-        with self._connected():
+        with self._check_connection():
             threads = int(sum(self.client.nthreads().values()))
         if threads:
             self.last_worker = time.monotonic()
@@ -289,7 +289,7 @@ class _ClusterRun:
         return threads
 
     def _wait_for_workers(self) -> None:
-        with suppress(TimeoutError), self._connected():
+        with suppress(TimeoutError), self._check_connection():
             self.client.wait_for_workers(1, timeout=WORKERS_WITHIN)
             return
         raise self._no_workers()
@@ -299,25 +299,25 @@ class _ClusterRun:
         return UsageError(f"--cluster {self.address}: no worker for {WORKERS_WITHIN} s; {start}{more}")
 
     @contextmanager
-    def _connected(self) -> Iterator[None]:
+    def _check_connection(self) -> Iterator[None]:
         """Raise if the scheduler has gone: it forgets the jobs of a client that it has lost."""
         if self.client.status != "running":
-            raise self._gone()
+            raise self._build_error()
         try:
             yield
         except TimeoutError:
             if self.client.status == "running":
                 raise
-            raise self._gone() from None
+            raise self._build_error() from None
         except OSError:
-            raise self._gone() from None
+            raise self._build_error() from None
 
-    def _gone(self) -> UsageError:
+    def _build_error(self) -> UsageError:
         return UsageError(f"--cluster {self.address}: the Dask scheduler has gone; {_KEPT}")
 
     def _refuse_other_code(self) -> None:
         """Raise if a worker that is there now has other code; it may be too old to compare stamps itself."""
-        with self._connected():
+        with self._check_connection():
             stamps = self.client.run(_stamp_function(self.family), on_error="return")
         for worker, stamp in sorted(stamps.items()):
             if stamp != self.stamp:

@@ -76,7 +76,7 @@ def with_stock_sheet(original: Spec, outcome: Design, finish: Callable[[Spec], D
         return outcome
     if (process is not None and process.prints) or accuracy_of(original).name in ("fdm", "sls"):
         return outcome
-    material = getattr(getattr(original.at("mechanism"), "material", None), "name", None)
+    material = getattr(getattr(original.get_value("mechanism"), "material", None), "name", None)
     series = series_of("sheet", system, material)
     if series is None:
         text = f"no {system} series of {material or 'this material'} is known: its width is not rounded"
@@ -138,7 +138,7 @@ def _levers(original: Spec, leaves: Mapping[str, float], changes: Mapping[str, f
     if beam not in changes or getattr(getattr(original, "design", None), "beam", None) is None:
         return {}
     thinner = max(1.0, leaves[beam] / changes[beam])
-    return {"mechanism.safety_factor": thinner * float(original.at("mechanism").safety_factor)}
+    return {"mechanism.safety_factor": thinner * float(original.get_value("mechanism").safety_factor)}
 
 
 def _is_leaf(path: str, size: Any) -> bool:

@@ -75,7 +75,7 @@ def objective(study: Study) -> Objective | None:
             default=None,
         )
         if best is not None:
-            limits = Bounds.of(one, study.metrics[best].dimension)
+            limits = Bounds.from_requirement(one, study.metrics[best].dimension)
             middle = None if limits.min is None or limits.max is None else 0.5 * (limits.min + limits.max)
             return Objective(best, one.max is None, middle)
     for name in DEFAULT_OBJECTIVES:
@@ -207,15 +207,15 @@ class Summary:
     @property
     def message(self) -> str:
         """Number of points of each status, in one line."""
-        ends = ", ".join(f"{count} {status.key.replace('_', ' ')}" for status, count in self._ordered() if count)
+        ends = ", ".join(f"{count} {status.key.replace('_', ' ')}" for status, count in self._list_counts() if count)
         return f"{self.total} points: {ends}" if self.total else "no point was finished"
 
-    def _ordered(self) -> list[tuple[Status, int]]:
+    def _list_counts(self) -> list[tuple[Status, int]]:
         return [(status, self.counts[status]) for status in Status]
 
     def as_json(self, records: Records) -> dict[str, Any]:
         """Return what metrics.json says of a study: the metrics are those of the best point."""
-        counts = {"total": self.total, **{status.key: count for status, count in self._ordered() if count}}
+        counts = {"total": self.total, **{status.key: count for status, count in self._list_counts() if count}}
         best = self._best(records)
         return {
             "status": _status(self),
@@ -246,7 +246,7 @@ class Summary:
         values = [] if self.best_values is None else self.best_values.tolist()
         return {
             one.name: {
-                "value": self.study.reported(k, value),
+                "value": self.study.format_metric(k, value),
                 "unit": border_unit(one.dimension),
                 "definition": one.definition,
             }

@@ -70,7 +70,7 @@ def varied_columns(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColu
         yield from (_column(item, ()) for item in plan.variables)
         return
     start, stop = int(indices[0]), int(indices[-1]) + 1
-    for item, shown in zip(plan.variables, plan.shown(start, stop), strict=True):
+    for item, shown in zip(plan.variables, plan.list_shown_values(start, stop), strict=True):
         yield _column(item, shown if len(indices) == stop - start else shown[indices - start])
 
 

@@ -123,7 +123,7 @@ class SolvedVariants:
                 self._values[key] = {"": own}
             else:
                 window = self._window(over)
-                inside = {branch: curves.within(window) for branch, curves in self.solved.branches.items()}
+                inside = {branch: curves.restrict_to_window(window) for branch, curves in self.solved.branches.items()}
                 found = metric_of_branches(name, inside)
                 self._values[key] = metric_of_branches(other_name(name), inside) if found is None else found
         return self._values[key]
@@ -152,7 +152,7 @@ class SolvedVariants:
         met = np.ones((len(self), len(self.study.spec.part_requirements)), dtype=bool)
         for k, one in enumerate(self.study.spec.part_requirements):
             plain, branch = split_name(one.metric)
-            limits = Bounds.of(one, self._definitions[plain].dimension)
+            limits = Bounds.from_requirement(one, self._definitions[plain].dimension)
             chosen = [item for name, item in self._by_branch(plain, one.over).items() if branch in (None, name)]
             met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in chosen]) if chosen else False
         return ResultRows(values, met, warned=self._findings() if self.study.findings else {})

@@ -120,7 +120,9 @@ def _relevel(
     made = again.spec.replace({path: wanted, FIDELITY: "solid"})
     other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
     note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
-    if getattr(given.at("design"), "yield", None) is not None:  # these are judged by requirements about what is wanted
+    if (
+        getattr(given.get_value("design"), "yield", None) is not None
+    ):  # these are judged by requirements about what is wanted
         note += "; the margins of design.yield are not repeated for that force"
     return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
 
@@ -166,14 +168,14 @@ def _widths(spec: Spec) -> Mapping[str, float]:
 
 def _sheet(spec: Spec) -> bool:
     try:
-        return spec.at("mechanism.part.sheet") is not None
+        return spec.get_value("mechanism.part.sheet") is not None
     except KeyError:
         return False
 
 
 def _level(spec: Spec, path: str) -> float:
     try:
-        return float(spec.at(path) or 0.0)
+        return float(spec.get_value(path) or 0.0)
     except KeyError:
         return 0.0
 

@@ -56,13 +56,13 @@ def flanks_csv(profile) -> str:
 def loop_csv(spec) -> str:
     """Return the file with the force on the cam as it was built, with the decimal commas of a German machine."""
     rng = np.random.default_rng(5)
-    rest = spec.at("mechanism.rest_half_width") + LONGER
+    rest = spec.get_value("mechanism.rest_half_width") + LONGER
     changes = {"mechanism.rolling_friction": FRICTION, "mechanism.rest_half_width": rest}
     curve = cfmkit.analyze(spec.replace(changes)).curve
     way = np.arange(5e-3, 130e-3, SPEED / RATE)
     lines, time = ["synthetic: made by configs/synthetic/make_cam_data.py", "Zeit [s];Weg [mm];Kraft [N]"], 0.0
     for branch, places in (("load", way), ("unload", way[::-1])):
-        part = curve.on(branch)
+        part = curve.select_branch(branch)
         order = np.argsort(part.motion)
         forces = np.interp(places, part.motion[order], part.effort[order]) + rng.normal(0.0, FORCE_NOISE, len(places))
         for place, force in zip(places, forces, strict=True):

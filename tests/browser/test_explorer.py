@@ -34,7 +34,7 @@ def page(fresh):
 def fresh(tmp_path):
     text = (CONFIGS / "cam.yaml").read_text().replace("200 mm", "200.00012345 mm", 1)  # more digits than a field shows
     (tmp_path / "cam.yaml").write_text(text)
-    server = ExplorerServer(Explorer.of(str(tmp_path / "cam.yaml")))
+    server = ExplorerServer(Explorer.from_file(str(tmp_path / "cam.yaml")))
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
     thread.start()
     errors, urls = [], []

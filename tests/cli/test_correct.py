@@ -22,7 +22,7 @@ def recorded(cli, factor):
     """Write a design of beams and the recording of a part of a material with so much of its modulus."""
     spec = cfmkit.load("configs/beam_rescaled.yaml")
     (cli.folder / "beams.yaml").write_text(cfmkit.dumps(spec))
-    curve = cfmkit.analyze(spec.replace({MODULUS: factor * spec.at(MODULUS)})).curve
+    curve = cfmkit.analyze(spec.replace({MODULUS: factor * spec.get_value(MODULUS)})).curve
     force = np.concatenate([1.01 * curve.force, 0.99 * curve.force[::-1]]) + 0.1
     force += np.random.default_rng(3).normal(0.0, 0.02, len(force))
     motion = np.concatenate([curve.motion, curve.motion[::-1]])

@@ -131,7 +131,7 @@ def test_a_study_says_what_it_counts(monkeypatch, capsys, things):
     quiet = type("Screen", (), {"json": False, "quiet": False})()
     with progress.watching(quiet, things) as monitor:
         monitor.total(4)
-        monitor.done(1, 0, False)
+        monitor.add_finished(1, 0, False)
         monitor.interrupt(2, None)
     told = capsys.readouterr().err
     assert f"1 of 4 {things}, " in told
@@ -145,7 +145,7 @@ def test_points_that_are_drawn_again_are_counted_with_those_before(monkeypatch, 
     with progress.watching(type("Screen", (), {"json": False, "quiet": False})()) as monitor:
         for points in (4, 2):
             monitor.total(points)
-            monitor.done(points, 0, False)
+            monitor.add_finished(points, 0, False)
     assert "6 of 6 points" in capsys.readouterr().err
 
 

@@ -194,8 +194,8 @@ def test_every_numeric_leaf_can_be_replaced(path):
     for leaf, value in leaves.items():
         new = value if isinstance(value, int) else value * (1 + 1e-9)
         changed = spec.replace({leaf: new})
-        assert changed.at(leaf) == new, leaf
-        assert spec.at(leaf) == value, leaf
+        assert changed.get_value(leaf) == new, leaf
+        assert spec.get_value(leaf) == value, leaf
         others = {other: item for other, item in changed.leaves() if other != leaf}
         assert others == {other: item for other, item in leaves.items() if other != leaf}, leaf
 

@@ -70,7 +70,7 @@ def test_models_are_compared_or_one_sentence_says_why_not(path):
     assert {item.name for item in found.variants} == set(choices.specs)
     for item in found.variants:
         assert fidelity_of(item.result) == item.name
-        assert item.result.spec.at(PATH) == item.name
+        assert item.result.spec.get_value(PATH) == item.name
     assert found.finest == [name for name in choices.names if name in choices.specs][-1]
     assert set(found.metrics()) >= {f"fidelity_rms[{item.name}]" for item in found.compared}
 

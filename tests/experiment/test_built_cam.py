@@ -41,7 +41,7 @@ def test_exact_points_give_the_forces_of_the_design(tmp_path):
     found = built(tmp_path, Errors(), "0.000000001 mm")
     designed = cfmkit.analyze(cfmkit.load(Path(__file__).parents[2] / "configs/cam.yaml")).curve
     for branch in ("load", "unload"):
-        one, other = found.curve.on(branch), designed.on(branch)
+        one, other = found.curve.select_branch(branch), designed.select_branch(branch)
         order = np.argsort(other.motion)
         expected = np.interp(one.motion, other.motion[order], other.effort[order])
         assert np.abs(one.effort - expected)[one.motion > 0.005].max() < 2e-4
@@ -85,7 +85,7 @@ def test_the_parts_of_the_force_add_up_to_it(tmp_path):
 def test_the_force_of_a_long_wave_is_that_of_its_slope(tmp_path):
     """The contact's normal turns by e' = 2 pi a / L; the force by e' (1 + f^2) A / D at most: the note's eps/mu."""
     wave = Errors(waviness=0.01e-3, length=40e-3)
-    share = built(tmp_path, wave, "0.00001 mm").curve.on("load")
+    share = built(tmp_path, wave, "0.00001 mm").curve.select_branch("load")
     inside = (share.motion > 0.05) & (share.motion < 0.13)
     largest = np.abs(share.extra["added_by_profile"].values[inside]).max() / 50.0
     slope = 2 * np.pi * 0.01e-3 / 40e-3
@@ -157,7 +157,7 @@ def test_what_is_uncertain_and_what_was_not_measured_is_reported(tmp_path):
 def test_a_travel_that_ends_before_the_first_measured_point_is_refused(tmp_path):
     write(tmp_path, [side[side[:, 1] > 0.03] for side in measured()])
     spec = spec_of(tmp_path).replace({"analysis.window": None, "requirements": ()})
-    motion = cfmkit.analyze(spec.replace({"analysis.travel": 0.02})).curve.on("load").motion
+    motion = cfmkit.analyze(spec.replace({"analysis.travel": 0.02})).curve.select_branch("load").motion
     assert (motion[0], motion[-1]) == (pytest.approx(0.01795, abs=1e-5), pytest.approx(0.02))
     with pytest.raises(DataError, match=r"is 5 mm, but the flanks were measured from 17.95 mm of travel on only"):
         cfmkit.analyze(spec.replace({"analysis.travel": 0.005}))
@@ -167,7 +167,7 @@ def test_the_spec_survives_changes_and_pickling(tmp_path):
     write(tmp_path, measured())
     spec = spec_of(tmp_path)
     changed = pickle.loads(pickle.dumps(spec.replace({"mechanism.rolling_friction": 0.003})))
-    assert changed.at("mechanism.profile.file").path == tmp_path / "measured.csv"
+    assert changed.get_value("mechanism.profile.file").path == tmp_path / "measured.csv"
     assert cfmkit.analyze(changed).status.key == "complete"
     assert "file: measured.csv" in cfmkit.dumps(spec)
 
@@ -276,8 +276,8 @@ def test_a_cam_that_is_wider_has_the_force_of_one_cut_with_that_offset_from_its_
     cut = spec.replace(
         {"mechanism.profile.file": None, "mechanism.profile.noise": None, "mechanism.profile.offset": offset}
     )
-    truth = cfmkit.analyze(cut).curve.on("load")
-    curve = found.curve.on("load")
+    truth = cfmkit.analyze(cut).curve.select_branch("load")
+    curve = found.curve.select_branch("load")
     assert curve.motion[0] < 2.7e-3  # the points begin at 15.5 mm of height
     inside = curve.motion > 0.006
     expected = np.interp(curve.motion[inside], truth.motion, truth.effort)
@@ -369,7 +369,7 @@ def test_a_part_of_a_flank_without_points_leaves_no_force_there(tmp_path, cut, h
     )
     spec = spec_of(tmp_path).replace({"analysis.window": (0.04, 0.12)})
     found = cfmkit.analyze(spec)
-    force = found.curve.on("load")
+    force = found.curve.select_branch("load")
     unknown = force.motion[~np.isfinite(force.effort)]
     if hole:
         assert (unknown.min(), unknown.max()) == (pytest.approx(hole[0], abs=2e-3), pytest.approx(hole[1], abs=2e-3))

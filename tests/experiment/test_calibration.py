@@ -116,7 +116,7 @@ def test_the_built_cam_keeps_its_shape_while_the_rest_length_is_fitted():
     source = recording(built(rest_half_width="68.25 mm", friction=0.0))
     found = calibrate(start, source, parameters(start, [REST]))
     assert found.fit.values == pytest.approx([0.06825], rel=1e-7)
-    assert found.spec.at("mechanism.profile.rest_half_width") == 0.068
+    assert found.spec.get_value("mechanism.profile.rest_half_width") == 0.068
 
 
 def test_stiffness_and_force_constant_cannot_be_told_apart_without_friction_and_are_named():
@@ -217,7 +217,7 @@ def test_zeros_of_the_recording_are_fitted_beside_the_mechanism(name, made, seed
     assert (np.abs(found.fit.values - truth) < 1.6 * found.fit.half_widths()).all()
     assert "lack_of_fit" not in {item.name for item in found.warnings}
     assert found.after.metrics()["data_rmse"].value == pytest.approx(0.05, rel=0.1)
-    assert [item.at("mechanism.rolling_friction") for item in (found.spec,)] == [found.fit.values[1]]
+    assert [item.get_value("mechanism.rolling_friction") for item in (found.spec,)] == [found.fit.values[1]]
 
 
 def test_vibration_that_the_sampling_resolves_is_no_lack_of_fit():
@@ -255,7 +255,7 @@ def test_python_calibrates_from_a_recording_with_bounds_as_text_or_numbers():
     )
     assert one.fit.values == pytest.approx([0.00225], abs=2e-5)
     assert one.fit.values == other.fit.values
-    assert one.spec.at(FRICTION) == one.fit.values[0]
+    assert one.spec.get_value(FRICTION) == one.fit.values[0]
     with pytest.raises(UsageError, match="there is no 'least'; there are linear, soft_l1, huber, cauchy"):
         cfmkit.calibrate(built(), case, FRICTION, loss="least")
 
@@ -263,7 +263,7 @@ def test_python_calibrates_from_a_recording_with_bounds_as_text_or_numbers():
 def lossy(spec, gap=1.0, thin=1):
     """The loop of a cam without friction, with a constant loss added; of the way back only every `thin`-th point."""
     curve = analyze(spec).curve
-    load = curve.on("load")
+    load = curve.select_branch("load")
     motion = np.concatenate([load.motion, load.motion[::-1][::thin]])
     way = np.repeat([1.0, -1.0], [len(load.motion), len(load.motion[::thin])])
     effort = np.interp(motion, load.motion, load.effort) + 0.5 * gap * way
@@ -278,7 +278,7 @@ def test_a_model_without_losses_is_fitted_to_the_mean_of_the_branches(thin, loss
     truth, start = built(0.0), built(0.0)
     source = lossy(truth, 3.0, thin)
     found = calibrate(start.replace({STIFFNESS: 700.0}), source, parameters(start, [STIFFNESS]), loss)
-    assert found.fit.values[0] == pytest.approx(truth.at(STIFFNESS), rel=1e-4)
+    assert found.fit.values[0] == pytest.approx(truth.get_value(STIFFNESS), rel=1e-4)
     width = found.after.window.hi - found.after.window.lo
     values = found.after.loss()
     assert values["data_loss"].value == pytest.approx(3.0 * width, rel=1e-3)
@@ -297,7 +297,7 @@ def test_a_model_whose_friction_is_fitted_is_fitted_to_both_branches_though_it_s
 def test_a_fit_counts_the_way_and_not_the_samples():
     """A rig that dwells over one part of the travel: a model that is wrong there by 1 N over a third of the way."""
     spec = built(0.0)
-    load = analyze(spec).curve.on("load")
+    load = analyze(spec).curve.select_branch("load")
     places = np.concatenate([np.linspace(0.006, 0.08, 4000)[:-1], np.linspace(0.08, 0.229, 200)])
     effort = np.interp(places, load.motion, load.effort) + np.where(places < 0.08, 1.0, 0.0)
     dense = measure_recording(Recording("dense.csv", places, effort), None)

@@ -41,10 +41,12 @@ class Hidden:
     def made_of(self, drawn):
         """Return the part that is made of a drawing; its modulus is that of the stock, whatever the drawing states."""
         nominal = self.drawn
-        changes = {path: float(drawn.at(path)) + self.thicker for path in self.leaves}
-        changes |= {path: float(nominal.at(path)) * factor for path, factor in self.factors.items()} | self.friction
+        changes = {path: float(drawn.get_value(path)) + self.thicker for path in self.leaves}
+        changes |= {
+            path: float(nominal.get_value(path)) * factor for path, factor in self.factors.items()
+        } | self.friction
         if MODULUS not in changes and "material" in type(nominal.mechanism).model_fields and nominal.mechanism.material:
-            changes[MODULUS] = float(nominal.at(MODULUS))
+            changes[MODULUS] = float(nominal.get_value(MODULUS))
         return drawn.replace(changes, as_made=True)
 
     def recording(self, seed=1):
@@ -67,7 +69,7 @@ def curve_of(part):
 
 
 def at(curve, branch, places):
-    own = curve.on(branch)
+    own = curve.select_branch(branch)
     order = np.argsort(own.motion)
     return np.interp(places, own.motion[order], own.effort[order], left=np.nan, right=np.nan)
 
@@ -140,7 +142,7 @@ def test_beams_whose_modulus_is_not_told_from_their_thickness_get_other_widths_a
         "thickness",
     }
     assert list(found.changes) == ["mechanism.width"]
-    assert found.corrected.at(MODULUS) == hidden.drawn.at(MODULUS)  # said, not guessed
+    assert found.corrected.get_value(MODULUS) == hidden.drawn.get_value(MODULUS)  # said, not guessed
     assert [item.name for item in found.warnings] == ["not_told_apart"]
 
 
@@ -159,7 +161,7 @@ def test_springs_and_friction_of_a_cam_stay_and_its_profile_changes():
     before, after = found.changes["mechanism.profile.force_constant"]
     assert after / before == pytest.approx(1.0 / 0.95, rel=0.005)
     for path in ("mechanism.springs.stiffness", "mechanism.rolling_friction"):
-        assert found.corrected.at(path) == hidden.drawn.at(path)
+        assert found.corrected.get_value(path) == hidden.drawn.get_value(path)
 
 
 def test_a_part_stays_in_the_envelope_that_is_required():

@@ -63,7 +63,7 @@ def test_the_drawn_waviness_has_the_stated_deviation():
     flank = flanks()[0]
     nominal = flank.frame(np.linspace(*flank.ends, 1600))
     rng = np.random.default_rng(0)
-    drawn = [_draw_error(rng, Manufacturing(waviness=20e-6), nominal, places).at(places) for _ in range(200)]
+    drawn = [_draw_error(rng, Manufacturing(waviness=20e-6), nominal, places).evaluate(places) for _ in range(200)]
     assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(20e-6, rel=0.05)
 
 
@@ -74,7 +74,9 @@ def test_the_derivatives_of_a_drawn_error_are_its_differences():
     nominal = flank.frame(np.interp(places, arc[1], arc[0]))
     error = DrawnError(1e-5, np.array([300.0, 90.0]), np.array([1.0, 2.0]), 1e-5, 1e-3, nominal, places)
     inside = slice(100, -100)
-    assert np.gradient(error.at(places), places)[inside] == pytest.approx(error.at(places, 1)[inside], abs=2e-6)
+    assert np.gradient(error.evaluate(places), places)[inside] == pytest.approx(
+        error.evaluate(places, 1)[inside], abs=2e-6
+    )
 
 
 def test_waves_of_the_measured_cam_give_the_force_error_that_the_paper_measured():

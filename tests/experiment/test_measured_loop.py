@@ -63,7 +63,7 @@ def test_filtered_means_over_the_715_points_of_the_closed_window_are_the_printed
     source, numbers, branch, printed, way
 ):
     """The note averages the points, ends included; the metric is over the displacement: the ends count half."""
-    part = source.curve.on(branch)
+    part = source.curve.select_branch(branch)
     inside = (part.motion > 0.040 - 1e-9) & (part.motion < 0.210 + 1e-9)
     assert inside.sum() == 715
     assert part.effort[inside].mean() == pytest.approx(printed, abs=5e-7)
@@ -80,7 +80,7 @@ def test_filtered_means_over_the_715_points_of_the_closed_window_are_the_printed
 )
 def test_filtered_statistics_over_714_points_are_the_printed_ones(source, branch, last, printed):
     """Rounding drops one of the two exact samples 40 and 210 mm in the note: 210 on the way up, 40 on the way down."""
-    part = source.curve.on(branch)
+    part = source.curve.select_branch(branch)
     s = part.motion * 1e3
     inside = (s > 39.9) & (s < last) if branch == "load" else (s > 40.1) & (s < last)
     force = part.effort[inside]
@@ -92,7 +92,7 @@ def test_filtering_across_the_reversal_smears_the_jump_and_filtering_each_branch
     case = reference_case()
     assert case.time is not None
     smeared = low_passed(case.effort, case.time, TWO_HERTZ)[1007]
-    kept = source.curve.on("load").effort[-1]
+    kept = source.curve.select_branch("load").effort[-1]
     assert (smeared, kept, case.effort[1007]) == pytest.approx((50.0821, 51.2547, 51.2578), abs=5e-5)
 
 

@@ -245,7 +245,7 @@ def test_rounding_of_the_tables_costs_what_it_is_said_to():
     numbers = np.random.default_rng(2010)
     found = []
     for _ in range(60):
-        moved = {path: spec.at(path) + bound * numbers.uniform(-1, 1) for path, bound in bounds.items()}
+        moved = {path: spec.get_value(path) + bound * numbers.uniform(-1, 1) for path, bound in bounds.items()}
         result = cfmkit.analyze(spec.replace(moved))
         found.append([value(result, name) for name in ("nominal_force", "range_start")])
     mean, sd = np.mean(found, axis=0), np.std(found, axis=0, ddof=1)

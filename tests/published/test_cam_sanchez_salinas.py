@@ -64,7 +64,7 @@ def test_the_design_targets_give_the_force_constant_of_table_1():
     spec = cam(springs={"stiffness": 690.0, "count": 2}).replace({"design": targets})
     found = design(spec).spec
     assert found is not None
-    assert found.at("mechanism.profile.force_constant") / MM == pytest.approx(9.058, abs=0.0005)
+    assert found.get_value("mechanism.profile.force_constant") / MM == pytest.approx(9.058, abs=0.0005)
 
 
 @pytest.mark.parametrize(("count", "force"), [(2, 50), (4, 100), (6, 150)])

@@ -93,7 +93,7 @@ def test_force_of_a_leaf_against_the_exact_curve():
     """Within 0.0022 N where it is buckled, 0.004 N before and 0.0091 N after, up to 6 mm; the peak is 2.27 N."""
     travel, exact = np.array(list(EXACT)), np.array(list(EXACT.values()))
     error = np.abs(vbeam.VBeam(leaf()).force(travel) - exact)
-    buckled = vbeam.VBeam(leaf()).buckled(travel)
+    buckled = vbeam.VBeam(leaf()).is_buckled(travel)
     assert error[buckled].max() <= 0.0022
     assert error[travel < 0.9].max() <= 0.004
     assert error.max() <= 0.0092
@@ -222,4 +222,4 @@ def test_a_leaf_is_still_buckled_when_flat_above_a_slenderness_of_3_6276():
     assert pytest.approx(3.6276, abs=5e-5) == vbeam.FLAT_BUCKLED_ABOVE
     for slenderness, buckled in ((3.58, False), (3.68, True)):
         strip = LeafStrip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
-        assert bool(vbeam.VBeam(strip).buckled(strip.rise)) is buckled
+        assert bool(vbeam.VBeam(strip).is_buckled(strip.rise)) is buckled

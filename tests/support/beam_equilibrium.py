@@ -160,7 +160,11 @@ class Judge:
     def imbalance(self) -> dict[str, np.ndarray]:
         """Return the sums of forces on every master, and of moments on every body that turns by itself."""
         network = self.network
-        total = {name: self.path.reaction(name)[self.point].copy() for name in network.nodes if not network.moved(name)}
+        total = {
+            name: self.path.reaction(name)[self.point].copy()
+            for name in network.nodes
+            if not network.is_moved_by_link(name)
+        }
         acts = [act for name in self.beams for act in self.pulls(name)] + self.springs() + self.point_loads()
         for node, place, force, moment in acts:
             master, body = network.master_of(node), network.body_of(node)

@@ -34,7 +34,7 @@ def with_springs(count: int, **changes: Any) -> CamSpec:
 def response(spec: CamSpec, points: int = 4001) -> MotionResponse:
     """Return the direct solution at equally spaced times."""
     parts = build(spec)
-    return respond(parts.machine, parts.motion.at(parts.motion.times(points)))
+    return respond(parts.machine, parts.motion.evaluate(parts.motion.times(points)))
 
 
 def peak_over_one_second(spec: CamSpec, points: int = 4001) -> float:

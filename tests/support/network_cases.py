@@ -97,7 +97,7 @@ def observe(path: elastica.Path) -> dict[str, Any]:
     if not len(at):
         return seen
     for name in network.nodes:
-        if not network.moved(name):
+        if not network.is_moved_by_link(name):
             seen["motion"][name] = path.motion(name)[at].tolist()
             seen["reaction"][name] = path.reaction(name)[at].tolist()
     for name in network.beams:

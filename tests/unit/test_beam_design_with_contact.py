@@ -92,10 +92,10 @@ def test_the_goal_and_the_limits_of_a_force_on_a_workpiece_have_the_derivatives_
     task = replace(task_of(spec, spec.design.optimise), limits=TaskLimits(stress=60e6, force_target=1.0))
     program = Shaping(Variables(task, 1), 9e-3, Flattest())
     z = program.begin(np.array([12e-3 / task.size, 1.2]))
-    seen = program.seen(z, sloped=True)
+    seen = program.evaluate(z, sloped=True)
     for k in range(2):
         step = np.where(np.arange(len(z)) == k, 1e-6, 0.0)
-        ahead, behind = (program.seen(z + sign * step, sloped=False) for sign in (1.0, -1.0))
+        ahead, behind = (program.evaluate(z + sign * step, sloped=False) for sign in (1.0, -1.0))
         for rows, after, before in zip(seen.rows, ahead.rows, behind.rows, strict=True):
             change = (after.values - before.values) / 2e-6
             assert rows.slopes[:, k] == pytest.approx(change, rel=1e-3, abs=1e-3 * np.abs(change).max())

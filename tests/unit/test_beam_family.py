@@ -994,7 +994,7 @@ def test_equilibria_between_points_are_those_of_a_path_through_them(name):
     spec = cfmkit.load(f"configs/{name}.yaml")
     coarse = cfmkit.analyze(spec.replace({"analysis.points": 40})).closed
     fine = cfmkit.analyze(spec.replace({"analysis.points": 118}))
-    there = coarse.at(fine.curve.motion)
+    there = coarse.solve_at(fine.curve.motion)
     assert there.accurate.mean() > 0.98
     solved = there.accurate
     largest = np.abs(fine.curve.effort).max()

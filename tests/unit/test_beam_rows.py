@@ -75,7 +75,9 @@ def check_rows_against_single_runs(spec, values, names=()):
 def test_a_row_of_a_study_is_a_run_of_its_own(stem, paths):
     """With every metric that a sweep notes."""
     spec, draw = config(stem, **{"analysis.window": ("11 %", "78.3 %"), "design": None}), np.random.default_rng(7)
-    assert check_rows_against_single_runs(spec, {path: spec.at(path) * draw.uniform(0.99, 1.01, 3) for path in paths})
+    assert check_rows_against_single_runs(
+        spec, {path: spec.get_value(path) * draw.uniform(0.99, 1.01, 3) for path in paths}
+    )
 
 
 @pytest.mark.slow

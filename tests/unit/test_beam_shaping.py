@@ -267,8 +267,8 @@ def test_lengths_and_chords_are_those_of_the_fitted_beams() -> None:
 
 def test_raising_the_order_keeps_the_shape() -> None:
     task = lan()
-    low, x = Variables(task, 2).raised(table_3(task), 1)
-    high, y = low.raised(x, 3)
+    low, x = Variables(task, 2).change_order(table_3(task), 1)
+    high, y = low.change_order(x, 3)
     assert (low.count, high.count) == (9, 17)
     assert high.build(y).beams["b3"].shape == Polynomial((0.0, 0.3013, 0.0, 0.0))
     assert low.build(x).nodes["n3"] == high.build(y).nodes["n3"]

@@ -293,7 +293,7 @@ def test_a_part_that_is_mostly_fillets_has_larger_elements_in_its_blocks(fillet,
     assert one.part.largest == largest
     if largest > 1.0:
         assert (
-            len(one.part.meshed().refined()[0].problem.elements.mesh.nodes) < 9000
+            len(one.part.create_mesh().refine()[0].problem.elements.mesh.nodes) < 9000
         )  # 57 725 with elements of one size
 
 
@@ -324,7 +324,7 @@ def test_a_node_on_a_link_is_moved_over_its_whole_section(tmp_path):
     path.write_text(BRACED)
     spec = cfmkit.load(str(path))
     (one,) = family("beam").driven_parts(spec)
-    solved = one.part.meshed().refined()[0].followed([0.0, 1e-3, 2e-3])
+    solved = one.part.create_mesh().refine()[0].follow_stops([0.0, 1e-3, 2e-3])
     (driven,) = (group for group in solved.problem.supports.groups if group.name == "c")
     at = solved.problem.elements.mesh.nodes[driven.nodes]
     assert np.ptp(at[:, 1]) == pytest.approx(1e-3, abs=0.15e-3)
@@ -353,7 +353,7 @@ def test_turns_do_not_count_as_displacements_where_branches_are_told_apart():
 def test_a_leaf_is_followed_past_both_of_its_bifurcations():
     """Where its branch joins the other path again, the path had been lost on this mesh, which rounds the corner."""
     (one,) = family("beam").driven_parts(cfmkit.loads(VEE))
-    course = one.part.meshed().followed([0.0, 2e-3, 4e-3, 4.4e-3]).course
+    course = one.part.create_mesh().follow_stops([0.0, 2e-3, 4e-3, 4.4e-3]).course
     assert course.ending is PathEnd.COMPLETE
     assert all(pose.unstable == 0 for pose in course.poses)
     # on meshes of 5381 and 16840 nodes: 0.26404 and 0.26403, and 4.1165 mm
@@ -377,12 +377,12 @@ def test_the_moving_part_of_each_stage_in_series_is_a_piece_of_its_own():
 def test_stages_in_series_share_the_travel_and_carry_one_force():
     spec = cfmkit.load("configs/beam_two_layers.yaml", ["analysis.fidelity=solid"])
     (one,) = family("beam").driven_parts(spec)
-    solved = one.part.meshed(1.5e-3).followed([0.0, 1e-3])
+    solved = one.part.create_mesh(1.5e-3).follow_stops([0.0, 1e-3])
     last, supports = solved.course.poses[-1], solved.problem.supports
     names = [group.name for group in supports.groups]
     first = supports.motions(last.unknowns, 1e-3)[names.index("n5")]
     assert 0.35e-3 < -first[1] < 0.5e-3  # the bars below the second stage give a little, too
-    held = supports.reactions(last.unknowns, 1e-3, solved.problem.elements.forces(solved.moved(last)))
+    held = supports.reactions(last.unknowns, 1e-3, solved.problem.elements.forces(solved.evaluate_displacements(last)))
     ground = sum(held[k, 1] for k, name in enumerate(names) if name.rstrip("'") in ("n1", "n2"))
     assert ground == pytest.approx(last.effort, rel=1e-6)
 

@@ -113,7 +113,7 @@ def test_a_node_in_the_middle_of_a_straight_beam_is_moved_over_its_whole_section
     beams = {"left": {"start": "root", "end": "tip"}, "right": {"start": "tip", "end": "end"}}
     spec = spec_of(tmp_path, mechanism__nodes=nodes, mechanism__beams=beams)
     part = driven_part(spec, assemble(spec))
-    problem = part.part.meshed().problem
+    problem = part.part.create_mesh().problem
     (group,) = (one for one in problem.supports.groups if one.name == "tip")
     heights = problem.elements.mesh.nodes[group.nodes, 1]
     assert [heights.min(), heights.max()] == pytest.approx([-0.5e-3, 0.5e-3], abs=2e-6)
@@ -124,7 +124,7 @@ def test_a_strip_of_400_thicknesses_has_poses(tmp_path):
     nodes = {"root": {"at": ["0 mm", "0 mm"], "support": "clamped"}, "tip": {"at": ["400 mm", "0 mm"]}}
     spec = spec_of(tmp_path, mechanism__nodes=nodes, analysis__travel="12 mm")
     part = driven_part(spec, assemble(spec))
-    problem = part.part.meshed().problem
+    problem = part.part.create_mesh().problem
     rest = problem.solve(np.zeros(problem.supports.size), 0.0)
     assert rest is not None
     bent = problem.solve(rest.slope * 3e-3, 3e-3)

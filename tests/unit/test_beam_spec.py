@@ -162,11 +162,11 @@ def test_switches_choose_the_model_and_the_stress():
 
 def test_values_below_names_are_found_by_their_path():
     spec = config("beam_lan2010")
-    assert spec.at("mechanism.nodes.n3.at.1") == pytest.approx(0.01877)
-    assert spec.at("mechanism.beams.b1.shape.coefficients.2") == -1.5707
+    assert spec.get_value("mechanism.nodes.n3.at.1") == pytest.approx(0.01877)
+    assert spec.get_value("mechanism.beams.b1.shape.coefficients.2") == -1.5707
     changed = spec.replace({"mechanism.nodes.n3.at.1": "19 mm"})
-    assert changed.at("mechanism.nodes.n3.at.1") == pytest.approx(0.019)
-    assert changed.at("mechanism.nodes.n4.at") == spec.at("mechanism.nodes.n4.at")
+    assert changed.get_value("mechanism.nodes.n3.at.1") == pytest.approx(0.019)
+    assert changed.get_value("mechanism.nodes.n4.at") == spec.get_value("mechanism.nodes.n4.at")
 
 
 def test_paths_below_names_can_be_varied_and_are_listed():

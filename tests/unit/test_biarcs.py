@@ -290,7 +290,7 @@ def test_the_area_of_a_chain_counts_its_arcs():
 
 @given(st.floats(-0.99, 0.99), st.floats(1e-6, 1e-2))
 def test_a_flattened_arc_keeps_its_sagitta(bulge, sagitta):
-    points = ArcChain(np.array([0, 1 + 1j]), np.array([bulge])).flattened(sagitta)
+    points = ArcChain(np.array([0, 1 + 1j]), np.array([bulge])).flatten(sagitta)
     middle = (points[1:] + points[:-1]) / 2
     if abs(bulge) > 1e-9:
         center = (1 + 1j) / 2 + 1j * (1 + 1j) * (1 - bulge**2) / (4 * bulge)

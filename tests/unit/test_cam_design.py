@@ -45,13 +45,13 @@ def refused(spec):
 
 def on_flank(result, branch="load"):
     """Return the force where the roller runs on the flank."""
-    curve = result.curve.on(branch)
+    curve = result.curve.select_branch(branch)
     return curve.force[curve.extra["contact"].values == "flank"]
 
 
 def test_the_force_constant_follows_from_the_springs():
     spec = designed(targets())
-    assert spec.at("mechanism.profile.force_constant") == pytest.approx(50 / (4 * 1380), rel=1e-15)
+    assert spec.get_value("mechanism.profile.force_constant") == pytest.approx(50 / (4 * 1380), rel=1e-15)
     np.testing.assert_allclose(on_flank(analyze(spec)), 50, rtol=1e-9)
 
 
@@ -81,34 +81,34 @@ def test_a_profile_for_the_way_down_is_exact_on_the_way_down():
 def test_avoiding_undercut_takes_the_smallest_force_constant_and_softer_springs():
     found = design(targets(avoid_undercut=True))
     assert found.spec is not None
-    assert found.spec.at("mechanism.profile.force_constant") == pytest.approx(14.46456 * MM, abs=1e-8)
-    assert found.spec.at("mechanism.springs.stiffness") == pytest.approx(50 / (8 * 14.46456 * MM), rel=1e-6)
+    assert found.spec.get_value("mechanism.profile.force_constant") == pytest.approx(14.46456 * MM, abs=1e-8)
+    assert found.spec.get_value("mechanism.springs.stiffness") == pytest.approx(50 / (8 * 14.46456 * MM), rel=1e-6)
     assert found.active_bounds == ("design.avoid_undercut",)
     assert "from 9.058 mm to 14.46 mm" in found.message
     result = analyze(found.spec)
     assert "undercut" not in names(result)
-    np.testing.assert_allclose(result.curve.on("load").force, 50, rtol=1e-7)
+    np.testing.assert_allclose(result.curve.select_branch("load").force, 50, rtol=1e-7)
 
 
 def test_avoiding_undercut_changes_nothing_where_there_is_none():
     soft = {"springs": {"stiffness": "0.4 N/mm", "count": 2}}
     found = design(targets(soft, avoid_undercut=True))
     assert found.spec is not None
-    assert found.spec.at("mechanism.profile.force_constant") == pytest.approx(50 / 3200, rel=1e-15)
+    assert found.spec.get_value("mechanism.profile.force_constant") == pytest.approx(50 / 3200, rel=1e-15)
     assert found.active_bounds == ()
 
 
 def test_the_stiffness_follows_from_a_force_constant():
     spec = designed(targets(choose="stiffness", force_constant="15 mm"))
-    assert spec.at("mechanism.springs.stiffness") == pytest.approx(50 / (8 * 15 * MM), rel=1e-12)
+    assert spec.get_value("mechanism.springs.stiffness") == pytest.approx(50 / (8 * 15 * MM), rel=1e-12)
     kept = designed(targets(choose="stiffness"))
-    assert kept.at("mechanism.profile.force_constant") == pytest.approx(9.058 * MM)
+    assert kept.get_value("mechanism.profile.force_constant") == pytest.approx(9.058 * MM)
 
 
 def test_measured_springs_keep_their_proportions():
     mechanism = {"springs": {"stiffness": (683.0, 682.0, 681.0)}}
     spec = designed(targets(mechanism, choose="stiffness", force_constant="15 mm"))
-    stiffness = np.array(spec.at("mechanism.springs.stiffness"))
+    stiffness = np.array(spec.get_value("mechanism.springs.stiffness"))
     assert stiffness.sum() == pytest.approx(50 / (4 * 15 * MM))
     np.testing.assert_allclose(stiffness / stiffness[0], np.array([683, 682, 681]) / 683, rtol=1e-12)
 
@@ -178,7 +178,7 @@ def test_the_two_way_gap_is_that_of_the_analysed_curve(constant, friction, cut_f
     spec = cam(**mechanism, analysis__points=2001).replace({"design": design_block | {"choose": "stiffness"}})
     found = design(spec)
     assume(found.spec is not None)
-    law = SlopeLaw(constant, 0.068, 0.2, cut_for, found.spec.at("mechanism.profile.slope_factor"))
+    law = SlopeLaw(constant, 0.068, 0.2, cut_for, found.spec.get_value("mechanism.profile.slope_factor"))
     gap = two_way_gap(law, spec.design, assemble(found.spec).loads, friction)
     curve = analyze(found.spec).curve
     weight = 0.145 * 9.80665 if force else 0.0  # the slider's own does not count in the gap
@@ -193,7 +193,7 @@ def test_the_two_way_gap_is_that_of_the_analysed_curve(constant, friction, cut_f
 def test_a_profile_that_carries_the_weight_is_exact_with_gravity_and_names_its_factor():
     spec = designed(targets(force="60 N", gravity=True))
     pull = 60 - 0.145 * 9.80665
-    assert spec.at("mechanism.profile.slope_factor") == pytest.approx(pull / (pull - 0.837 * 9.80665), rel=1e-12)
+    assert spec.get_value("mechanism.profile.slope_factor") == pytest.approx(pull / (pull - 0.837 * 9.80665), rel=1e-12)
     assert spec.gravity
     np.testing.assert_allclose(on_flank(analyze(spec)), 60, rtol=1e-9)
 
@@ -201,7 +201,7 @@ def test_a_profile_that_carries_the_weight_is_exact_with_gravity_and_names_its_f
 def test_the_designed_spec_is_a_fixed_part():
     spec = designed(targets())
     longer = spec.replace({"mechanism.brace_length": "201 mm"})
-    assert longer.at("mechanism.profile.brace_length") == 0.2
+    assert longer.get_value("mechanism.profile.brace_length") == 0.2
     assert np.ptp(on_flank(analyze(longer))) > 0.01
     assert np.ptp(on_flank(analyze(spec))) < 1e-6
 

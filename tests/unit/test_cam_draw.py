@@ -50,10 +50,10 @@ def small_and_large():
     for factor in (0.01, 100.0):
         spec = cfmkit.load(CAM)
         lengths = ("brace_length", "rest_half_width", "roller_radius", "profile.force_constant", "profile.stroke")
-        changes = {f"mechanism.{name}": factor * spec.at(f"mechanism.{name}") for name in lengths}
+        changes = {f"mechanism.{name}": factor * spec.get_value(f"mechanism.{name}") for name in lengths}
         plate = {"top_margin": 0.01 * factor, "base_height": 0.04 * factor, "hole_diameter": 0.0066 * factor}
         changes |= {"mechanism.plate": plate, "requirements": (), "analysis.window": (0.002 * factor, 0.24 * factor)}
-        changes |= {"mechanism.springs.stiffness": factor * spec.at("mechanism.springs.stiffness")}
+        changes |= {"mechanism.springs.stiffness": factor * spec.get_value("mechanism.springs.stiffness")}
         yield cfmkit.analyze(spec.replace(changes))
 
 
@@ -71,7 +71,7 @@ def exact_flank(solution):
     profile = solution.assembly.profile
     u = profile.start + (profile.end - profile.start) * np.linspace(0.0, 1.0, 4001) ** 2
     offset = solution.assembly.spec.mechanism.profile.offset - profile.roller_radius
-    return np.column_stack(profile.shifted(u, offset))
+    return np.column_stack(profile.offset_points(u, offset))
 
 
 def test_with_material_missing_the_pictures_show_the_corner_and_the_plate_as_cut():
@@ -79,7 +79,7 @@ def test_with_material_missing_the_pictures_show_the_corner_and_the_plate_as_cut
     result = solved("material missing")
     solution, path = result.state, result.state.assembly.profile.path
     u = np.linspace(0.068, 0.08, 2001)
-    line = np.column_stack(solution.assembly.profile.shifted(u, -0.017))
+    line = np.column_stack(solution.assembly.profile.offset_points(u, -0.017))
     centers = np.column_stack([u, path.height(u)])
     nearest = np.array([np.hypot(*(centers - point).T).min() for point in line])
     first = line[np.argmax(nearest > 0.017 - 1e-9)]
@@ -100,7 +100,7 @@ GEOMETRY = ["published", "no undercut", "long springs", "other roller", "brace t
 def test_rollers_touch_the_cam_at_the_contact_and_never_enter_it(name):
     result = solved(name)
     solution = result.state
-    radius, offset = (result.spec.at(f"mechanism.{name}") for name in ("roller_radius", "profile.offset"))
+    radius, offset = (result.spec.get_value(f"mechanism.{name}") for name in ("roller_radius", "profile.offset"))
     flank = exact_flank(solution)
     for index in PLACES:
         _, named = drawn(result, index)
@@ -113,7 +113,7 @@ def test_rollers_touch_the_cam_at_the_contact_and_never_enter_it(name):
             assert np.hypot(*(touch - corner)) == pytest.approx(offset, abs=1e-9)
         else:
             u = float(solution.states.parameter[index])
-            on_flank = solution.assembly.profile.shifted(u, offset - solution.assembly.profile.roller_radius)
+            on_flank = solution.assembly.profile.offset_points(u, offset - solution.assembly.profile.roller_radius)
             np.testing.assert_allclose(touch, on_flank, atol=1e-9)
         assert np.hypot(*(flank - center).T).min() > radius - 1e-9
         on_line = np.hypot(*(named["flank-right"].get_xydata() / 1e3 - center).T).min()

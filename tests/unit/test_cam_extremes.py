@@ -124,7 +124,7 @@ def test_friction_near_one_jams_the_way_up_and_holds_the_way_down(friction):
     result = analyze(cam(rolling_friction=friction, roller_radius="10 mm"))
     assert {"up_jam", "slack_cable"} <= set(names(result))
     curve = result.curve
-    up, down = curve.on("load"), curve.on("unload")
+    up, down = curve.select_branch("load"), curve.select_branch("unload")
     jams = result.state.jams
     assert jams[0] == (0, result.values["jam_travel"].value)
     held = np.any([(low <= up.motion) & (up.motion <= high) for low, high in jams], axis=0)
@@ -154,4 +154,4 @@ def test_the_curve_is_one_closed_loop_up_and_down():
     curve = analyze(cam(rolling_friction=0.002)).curve
     assert curve.branches == ("load", "unload")
     np.testing.assert_array_equal(curve.motion, curve.motion[::-1])
-    assert (curve.on("load").force[10:] > curve.on("unload").force[::-1][10:]).all()
+    assert (curve.select_branch("load").force[10:] > curve.select_branch("unload").force[::-1][10:]).all()

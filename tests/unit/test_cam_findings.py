@@ -273,8 +273,8 @@ def test_weight_diverges_at_the_dead_point_of_a_cam_that_does_not_carry_it():
 def test_weight_and_friction_hold_the_roller_at_the_dead_point_on_the_way_up_only():
     result = run(analysis__gravity=True, rolling_friction=0.002, **FITS)
     assert {"dead_point", "up_jam"} <= set(names(result))
-    assert np.isnan(result.curve.on("load").force[0])
-    assert np.isfinite(result.curve.on("unload").force).all()
+    assert np.isnan(result.curve.select_branch("load").force[0])
+    assert np.isfinite(result.curve.select_branch("unload").force).all()
 
 
 @pytest.mark.parametrize("changes", [{}, {"profile__slope_factor": 1.2, **FITS}])

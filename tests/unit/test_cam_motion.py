@@ -45,7 +45,7 @@ CASES = {
 def both(changes, points=101, scheme=None):
     parts = build(moving(**changes))
     path = NineCoordinates(parts.machine).run(parts.motion, points, scheme)
-    return path, respond(parts.machine, parts.motion.at(path.times))
+    return path, respond(parts.machine, parts.motion.evaluate(path.times))
 
 
 def relative(a, b):
@@ -114,10 +114,10 @@ def test_the_force_does_the_work_that_becomes_energy(changes):
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * np.diff(edges)
     found = respond(
-        parts.machine, parts.motion.at((0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * nodes).ravel())
+        parts.machine, parts.motion.evaluate((0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * nodes).ravel())
     )
     power = (found.force * found.moment.speed).reshape(-1, 8)
-    energy = respond(parts.machine, parts.motion.at(edges)).energy
+    energy = respond(parts.machine, parts.motion.evaluate(edges)).energy
     np.testing.assert_allclose(np.diff(energy), (power @ weights) * half, rtol=0, atol=1e-9 * np.ptp(energy))
 
 
@@ -125,9 +125,9 @@ def test_the_power_is_the_rate_of_the_energy():
     parts = build(moving())
     times, step = np.linspace(0.01, 0.115, 50), 1e-4
     stencil = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
-    energy = {k: respond(parts.machine, parts.motion.at(times + k * step)).energy for k in range(-4, 5)}
+    energy = {k: respond(parts.machine, parts.motion.evaluate(times + k * step)).energy for k in range(-4, 5)}
     rate = sum(weight * (energy[k] - energy[-k]) for k, weight in stencil.items()) / step
-    found = respond(parts.machine, parts.motion.at(times))
+    found = respond(parts.machine, parts.motion.evaluate(times))
     power = found.force * found.moment.speed
     np.testing.assert_allclose(rate, power, rtol=0, atol=1e-9 * np.abs(power).max())
 
@@ -156,7 +156,7 @@ def test_rolling_resistance_costs_the_power_of_force_times_speed_of_the_rollers(
 def test_sides_with_their_parts_exchanged_give_the_same_force():
     parts = build(moving(**UNLIKE))
     mirrored = replace(parts.machine, right=parts.machine.left, left=parts.machine.right)
-    moment = parts.motion.at(parts.motion.times(51))
+    moment = parts.motion.evaluate(parts.motion.times(51))
     one, other = respond(parts.machine, moment), respond(mirrored, moment)
     np.testing.assert_allclose(other.force, one.force, rtol=1e-13)
     np.testing.assert_allclose(other.contact, one.contact[::-1], rtol=1e-13)
@@ -188,10 +188,10 @@ def test_rollers_roll_without_slip():
 def test_the_cycloid_starts_and_ends_at_rest_and_is_consistent():
     motion = Cycloid(0.2, -0.05, 0.4)
     times = np.linspace(0.0, 0.4, 9)
-    position, speed, acceleration = motion.at(times)
+    position, speed, acceleration = motion.evaluate(times)
     assert (position[0], position[-1]) == (pytest.approx(0.2), pytest.approx(0.15))
     assert np.abs([speed[0], speed[-1], acceleration[0], acceleration[-1]]).max() < 1e-12
-    ahead, behind = motion.at(times + 1e-6), motion.at(times - 1e-6)
+    ahead, behind = motion.evaluate(times + 1e-6), motion.evaluate(times - 1e-6)
     np.testing.assert_allclose((ahead.position - behind.position) / 2e-6, speed, rtol=0, atol=1e-9)
     np.testing.assert_allclose((ahead.speed - behind.speed) / 2e-6, acceleration, rtol=0, atol=1e-7)
 
@@ -345,7 +345,7 @@ def test_the_force_of_unlike_sides_is_not_stated_as_that_of_two_right_ones(chang
 
 def test_displacements_of_both_models_are_the_same():
     dynamic = analyze(moving(analysis__dynamics__time="100 s"))
-    static = analyze(moving(analysis__fidelity="quasi-static", analysis__points=2001)).curve.on("load")
+    static = analyze(moving(analysis__fidelity="quasi-static", analysis__points=2001)).curve.select_branch("load")
     there = np.interp(dynamic.curve.displacement, static.displacement, static.force)
     np.testing.assert_allclose(dynamic.curve.force, there, rtol=2e-4)
 

@@ -26,9 +26,9 @@ class Counted:
     def ends(self):
         return self.piece.ends
 
-    def at(self, parameter):
+    def evaluate(self, parameter):
         self.calls.append(np.size(parameter))
-        return self.piece.at(parameter)
+        return self.piece.evaluate(parameter)
 
 
 TURNED = {
@@ -44,7 +44,7 @@ TURNED = {
 @pytest.mark.parametrize("changes", TURNED.values(), ids=TURNED)
 def test_the_guide_is_so_good_that_each_position_needs_one_evaluation_of_the_curve(changes):
     parts = build(moving(**changes))
-    slider = parts.motion.at(parts.motion.times(201)).position
+    slider = parts.motion.evaluate(parts.motion.times(201)).position
     for side in (parts.machine.right, parts.machine.left):
         pieces = tuple(Counted(piece) for piece in side.pieces)
         counting = replace(side, pieces=pieces)

@@ -155,7 +155,7 @@ def test_larger_lengths_scale_displacements_and_forces_alike(mechanism, scale):
     spec = mechanism[0].replace({"analysis.gravity": False})
     lengths = ("brace_length", "rest_half_width", "roller_radius")
     lengths += tuple(f"profile.{name}" for name in ("force_constant", "stroke", "offset", *lengths))
-    values = {f"mechanism.{name}": spec.at(f"mechanism.{name}") for name in lengths}
+    values = {f"mechanism.{name}": spec.get_value(f"mechanism.{name}") for name in lengths}
     larger = spec.replace({path: scale * value for path, value in values.items() if value is not None})
     small, large = curve_of(spec), curve_of(larger)
     np.testing.assert_allclose(large.motion, scale * small.motion, rtol=1e-9)

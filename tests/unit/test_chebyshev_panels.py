@@ -12,8 +12,8 @@ def test_smooth_functions_and_one_with_a_corner_are_resolved() -> None:
     ends = np.linspace(0.0, 3.0, 3)
     wave, bow = resolve_panels(lambda x: np.array([np.sin(9.0 * x), np.abs(x - 1.234)]), ends, (1e-10, 1e-6), 20)
     x = np.linspace(0.0, 3.0, 401)
-    np.testing.assert_allclose(wave.at(x), np.sin(9.0 * x), atol=1e-9)
-    np.testing.assert_allclose(bow.at(x), np.abs(x - 1.234), atol=2e-6)
+    np.testing.assert_allclose(wave.evaluate(x), np.sin(9.0 * x), atol=1e-9)
+    np.testing.assert_allclose(bow.evaluate(x), np.abs(x - 1.234), atol=2e-6)
 
 
 def test_halving_ends_with_noise_that_no_panel_resolves() -> None:
@@ -26,4 +26,4 @@ def test_halving_ends_with_noise_that_no_panel_resolves() -> None:
     (found,) = resolve_panels(noise, np.array([0.0, 1.0]), (1e-8,), 20)
     assert max(rounds) <= 2 * MOST
     assert MOST / NODES < len(found.ends) - 1 <= 2 * MOST / NODES
-    assert found.at(np.array([0.3]))[0] == pytest.approx(1.0, abs=0.02)
+    assert found.evaluate(np.array([0.3]))[0] == pytest.approx(1.0, abs=0.02)

@@ -26,7 +26,7 @@ class Disc(DesignProgram):
     line: float = 10.0
     elastic: tuple[str, ...] = ()
 
-    def seen(self, z: np.ndarray, sloped: bool) -> SeenPoint | None:
+    def evaluate(self, z: np.ndarray, sloped: bool) -> SeenPoint | None:
         x, y = z
         if x < -5.0:
             return None
@@ -55,8 +55,8 @@ def test_slopes_of_a_program_are_those_of_its_values(elastic: tuple[str, ...]) -
 
 def test_a_program_without_rows_and_one_without_an_answer() -> None:
     class Free(Disc):
-        def seen(self, z: np.ndarray, sloped: bool) -> SeenPoint | None:
-            seen = super().seen(z, sloped)
+        def evaluate(self, z: np.ndarray, sloped: bool) -> SeenPoint | None:
+            seen = super().evaluate(z, sloped)
             return None if seen is None else SeenPoint(seen.objective, seen.slope, [])
 
     assert Free().slopes(np.zeros(2))[1].shape == (0, 2)
@@ -170,7 +170,7 @@ def test_processes_that_die_are_told_once_a_reason() -> None:
 
 
 def test_the_shortest_budget_ends_the_time() -> None:
-    assert Clock.of(None, None) == NEVER
+    assert Clock.from_budgets(None, None) == NEVER
     assert not NEVER.late()
-    assert Clock.of(None, -1.0, 100.0).late()
-    assert not Clock.of(50.0, 100.0).late()
+    assert Clock.from_budgets(None, -1.0, 100.0).late()
+    assert not Clock.from_budgets(50.0, 100.0).late()

@@ -40,7 +40,7 @@ def cut_out(spec) -> Polygon:
     for line in document.modelspace().query('LWPOLYLINE[layer=="cut"]'):
         x, y, bulge = np.array(line.get_points("xyb")).T
         nodes = np.append(x, x[0]) + 1j * np.append(y, y[0])
-        z = ArcChain(nodes, bulge).flattened(1e-8 * np.ptp(x))
+        z = ArcChain(nodes, bulge).flatten(1e-8 * np.ptp(x))
         rings.append(Polygon(np.column_stack([z.real, z.imag])))
     rings.sort(key=lambda ring: -ring.area)
     return rings[0].difference(union_all(rings[1:])) if len(rings) > 1 else rings[0]
@@ -271,7 +271,7 @@ def test_a_leg_that_is_not_drawn_as_specified_is_refused(name, monkeypatch):
 
     key = "flexures.pivot.thickness" if name == "lumped" else "beam.offset"
     of, other = Leg.contours.fget, config(f"slider_crank_{name}", f"mechanism.{key}=0.5 mm")
-    monkeypatch.setattr(Leg, "contours", property(lambda _: of(Leg.of(other, as_printed=True))))
+    monkeypatch.setattr(Leg, "contours", property(lambda _: of(Leg.from_spec(other, as_printed=True))))
     with pytest.raises(GeometryError, match="thick in the outline"):
         cfmkit.drawing(config(f"slider_crank_{name}"))
 

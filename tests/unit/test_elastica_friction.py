@@ -140,7 +140,7 @@ def test_what_a_cycle_costs_is_what_friction_takes():
         law = interpolate_path(way)
         marks = [way.drive.min(), *law.corners.tolist(), way.drive.max()]
         for low, high in itertools.pairwise(marks):
-            there = law.at(low + (high - low) * shares)
+            there = law.solve_at(low + (high - low) * shares)
             assert there.accurate.all()
             works.append(sense * (high - low) * float(weights @ there.effort))
             slid, force = tip_x(there), np.abs(there.contact_friction(0)[0])

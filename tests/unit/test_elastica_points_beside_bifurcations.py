@@ -104,11 +104,11 @@ def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
     whole = interpolate_path(path)
     assert whole is not None
     place = float(whole.corners[0])
-    there, left = whole.at(np.array([place])), int(np.searchsorted(path.drive, place))
+    there, left = whole.solve_at(np.array([place])), int(np.searchsorted(path.drive, place))
     kept = slice(0, left) if last else slice(left, None)
     part = path.take(kept)
     corner = replace(there, branch=path.branch[left : left + 1] if last else path.branch[left - 1 : left])
-    law = interpolate_path(part.joined(corner) if last else corner.joined(part))
+    law = interpolate_path(part.append(corner) if last else corner.append(part))
     assert law is not None
     assert law.corners[-1 if last else 0] == pytest.approx(place)
     near = place + (-1e-4 if last else 1e-4) * np.arange(6.0)

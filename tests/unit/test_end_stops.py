@@ -161,6 +161,6 @@ def test_a_sweep_of_every_column_without_stops_is_solved_in_rows(name):
     """Metrics of contacts, which a mechanism without stops never has, had made every point a run of its own."""
     spec = cfmkit.load(CONFIGS / f"{name}.yaml").replace({"requirements": ()})
     path = "mechanism.bistable.thickness"
-    plan = GivenPoints({path: float(spec.at(path)) * np.array([0.99, 1.0, 1.01])})
+    plan = GivenPoints({path: float(spec.get_value(path)) * np.array([0.99, 1.0, 1.01])})
     every = metrics_of(spec, (), cfmkit.analyze(spec).curves[0])
     assert are_solved_together(Study(spec, plan.paths, tuple(every)), plan)

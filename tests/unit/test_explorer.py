@@ -28,12 +28,12 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 @pytest.fixture
 def explorer(tmp_path):
     (tmp_path / "cam.yaml").write_text((CONFIGS / "cam.yaml").read_text())
-    return Explorer.of(str(tmp_path / "cam.yaml"))
+    return Explorer.from_file(str(tmp_path / "cam.yaml"))
 
 
 @pytest.mark.parametrize("name", ["cam", "slider_crank_li2019", "vcfm_ding2022", "cam_six_springs"])
 def test_every_number_has_a_slider_whose_ends_the_file_takes(name):
-    explorer = Explorer.of(str(CONFIGS / f"{name}.yaml"))
+    explorer = Explorer.from_file(str(CONFIGS / f"{name}.yaml"))
     sliders = explorer.sliders
     assert len({slider.path for slider in sliders}) == len(sliders) > 10
     document = explorer.document
@@ -182,7 +182,7 @@ def test_no_name_of_a_spec_becomes_markup(tmp_path):
     hostile = '</script><img src=x onerror="alert(1)">'
     text = (CONFIGS / "cam.yaml").read_text().replace("name: sanchez-salinas-2022", f"name: '{hostile}'")
     (tmp_path / "cam.yaml").write_text(text)
-    page = Explorer.of(str(tmp_path / "cam.yaml")).page("token").decode()
+    page = Explorer.from_file(str(tmp_path / "cam.yaml")).page("token").decode()
     assert "<img" not in page
     assert page.count("</script>") == 2
 

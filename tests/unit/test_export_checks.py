@@ -135,12 +135,12 @@ def test_the_refusal_counts_as_invalid_input():
 )
 def test_edges_reverse_and_mirror_their_ends(edge):
     start, end = edge.ends
-    assert edge.reversed().ends == (end, start)
-    assert edge.mirrored().ends == pytest.approx((-start.conjugate(), -end.conjugate()))
+    assert edge.reverse().ends == (end, start)
+    assert edge.mirror().ends == pytest.approx((-start.conjugate(), -end.conjugate()))
 
 
 def test_a_mirrored_arc_turns_the_other_way():
-    arc = Arc((1.0, 2.0), 3.0, 0.5, 2.5).mirrored()
+    arc = Arc((1.0, 2.0), 3.0, 0.5, 2.5).mirror()
     assert arc.end - arc.start == pytest.approx(-2.0)
     assert arc.center == (-1.0, 2.0)
 

@@ -31,7 +31,7 @@ def plate():
     """A plate with two curved flanks, a straight top and bottom, and two holes; both roller paths beside it."""
     x = REST + 0.08 * np.linspace(0, 1, 1500) ** 2
     right, path = Smooth(*flank(x, ROLLER)), Smooth(*flank(x, 0))
-    left = right.mirrored().reversed()
+    left = right.mirror().reverse()
     (a, b), (c, d) = right.ends, left.ends
     top, bottom = Line((b.real, b.imag), (c.real, c.imag)), Line((d.real, d.imag), (a.real, a.imag))
     contours = (
@@ -39,7 +39,7 @@ def plate():
         circle((-0.04, 0.1), 0.003, "cut", hole=True),
         circle((0.04, 0.1), 0.003, "cut", hole=True),
         Contour((path,), "path"),
-        Contour((path.mirrored(),), "path"),
+        Contour((path.mirror(),), "path"),
     )
     columns = {"x": (right.points[:, 0], "length"), "y": (right.points[:, 1], "length")}
     return Drawing("plate", contours, (Curve2D("flank", columns),))

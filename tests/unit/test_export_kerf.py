@@ -45,7 +45,7 @@ def part():
 
 
 def ring(outline, sagitta=2e-8):
-    points = outline.chain.flattened(sagitta)
+    points = outline.chain.flatten(sagitta)
     return shapely.LinearRing(np.column_stack([points.real, points.imag]))
 
 
@@ -87,7 +87,7 @@ def test_what_is_not_cut_stays_where_it_is(pair):
 
 def test_the_sense_in_which_a_contour_is_drawn_does_not_matter():
     def backwards(contour):
-        return Contour(tuple(e.reversed() for e in contour.edges[::-1]), contour.layer, contour.closed, contour.hole)
+        return Contour(tuple(e.reverse() for e in contour.edges[::-1]), contour.layer, contour.closed, contour.hole)
 
     turned = Drawing("comb", tuple(backwards(contour) for contour in part().contours))
     areas = [
@@ -197,12 +197,12 @@ def test_a_kerf_that_is_no_width_is_refused(kerf):
 def test_a_parallel_chain_keeps_its_distance(radii, bulges, distance):
     corners = np.array(radii) * np.exp(2j * np.pi * np.arange(len(radii)) / len(radii))
     chain = ArcChain(np.append(corners, corners[0]), np.array(bulges[: len(radii)]))
-    points = chain.flattened(5e-7)
+    points = chain.flatten(5e-7)
     area = shapely.Polygon(np.column_stack([points.real, points.imag]))
     moved = parallel(chain, distance)
     assume(area.is_valid)
     assume(moved is not None)  # the chain has room for the tool
-    track = moved.flattened(5e-7)
+    track = moved.flatten(5e-7)
     apart = shapely.distance(shapely.points(track.real, track.imag), area.exterior)
     assert np.abs(apart - abs(distance)).max() < 2e-6
     assert (moved.area > chain.area) == (distance > 0)

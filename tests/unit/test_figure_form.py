@@ -292,7 +292,7 @@ def test_the_curve_of_an_earlier_run_is_drawn_beside_the_new_one(cam, tmp_path):
     figure = form_of(overlay=str(folder)).draw(api.figures(cam)["loop"])
     drawn = [line for line in figure.axes[1].lines if line.get_gid() == "earlier"]
     assert len(drawn) == 2
-    np.testing.assert_allclose(drawn[0].get_ydata(), earlier.curve.on("load").effort)
+    np.testing.assert_allclose(drawn[0].get_ydata(), earlier.curve.select_branch("load").effort)
     assert "earlier: before" in [text.get_text() for text in figure.axes[1].texts]
     assert [line for line in api.figures(cam)["loop"]().axes[1].lines if line.get_gid() == "earlier"] == []
 

@@ -15,9 +15,9 @@ from cfmkit.cli.show_topics import READ_FIRST, explain
 pytestmark = pytest.mark.lists
 
 EXAMPLES = {
-    name: module.EXAMPLE
+    name: module.HELP_EXAMPLE
     for name in names()
-    if hasattr(module := import_module(f"cfmkit.cli.verbs.{name.replace('-', '_')}"), "EXAMPLE")
+    if hasattr(module := import_module(f"cfmkit.cli.verbs.{name.replace('-', '_')}"), "HELP_EXAMPLE")
 }
 
 

@@ -239,7 +239,7 @@ def test_parts_without_common_errors_are_analysed_themselves():
     found, parts = yields_of(nominal, None, Run()), Parts.of_design(spec, spec.design, 0)
     assert found.common == (MODULUS,)
     values = parts.draw()
-    values[:, parts.paths.index(MODULUS)] = spec.at(MODULUS)
+    values[:, parts.paths.index(MODULUS)] = spec.get_value(MODULUS)
     singly = [cfmkit.analyze(parts.part(one)) for one in values]
     good = sum(all(outcome.ok for outcome in one.requirements) for one in singly)
     assert found.frozen.good == good != found.after.good
@@ -251,16 +251,16 @@ def test_the_estimate_and_the_test_plan_draw_the_parts_that_a_study_draws():
     block = {"method": "tolerance", "parameters": {"mechanism.bistable.thickness": {"normal": "0.05 mm"}}, "samples": 5}
     setup = prepare(spec.replace({"sensitivity": block}), seed=3)
     stated = spec.replace({"design.tolerances": {"mechanism.bistable.thickness": {"normal": "0.05 mm"}}})
-    parts, whence = Parts.expected(stated, 3)
+    parts, whence = Parts.from_expected_errors(stated, 3)
     assert whence == "within design.tolerances"
     assert parts.draw(5).tolist() == setup.parts.draw().tolist()
-    assumed = Parts.assumed(spec, 3)
+    assumed = Parts.from_assumed_errors(spec, 3)
     at = assumed.paths.index("mechanism.bistable.thickness")
     assert assumed.parameters[at].spread.deviation == pytest.approx(3e-5)  # what a laser is assumed to hold
 
 
 def test_failed_parts_count_as_bad_ones():
-    share = Share.of(np.arange(10) < 5, np.arange(10) >= 8)
+    share = Share.from_outcomes(np.arange(10) < 5, np.arange(10) >= 8)
     assert (share.good, share.failed, share.count) == (5, 2, 10)
     found = share.as_json()
     assert found["value"] == 0.5

@@ -120,7 +120,7 @@ def test_the_engines_derivatives_are_those_of_neighbouring_parts(changes):
     assert found.sampled.effort["load"] == pytest.approx(seen.effort["load"], rel=1e-12)
     assert found.sampled.stress == pytest.approx(seen.stress, rel=1e-9)
     for path in paths:
-        value = spec.at(path)
+        value = spec.get_value(path)
         ends = [sample_poses(spec.replace({path: value * (1 + sign * 1e-5)}), places) for sign in (1, -1)]
         force, stress = ((a - b) / (2e-5 * value) for a, b in (
             [one.effort["load"] for one in ends], [one.stress for one in ends]))  # fmt: skip
@@ -135,7 +135,7 @@ def test_margins_of_beams_look_at_few_parts():
     free, places = redesign.free_of(spec, spec), places_of(nominal)
     rows = rows_of(nominal, sampled_of(spec, places, Run()), places)
     part = redesign.PartNumbers(made, tuple(free), rows)
-    start = np.array([spec.at(path) for path in free])
+    start = np.array([spec.get_value(path) for path in free])
     found = part.slopes(start, np.zeros(len(made.paths)))
     assert np.isfinite(found.by_x).all()
     assert np.isfinite(found.by_error).all()
@@ -231,7 +231,7 @@ def test_what_a_design_chooses_may_move_for_its_yield_too(config, moving):
     spec = cfmkit.load(f"configs/{config}.yaml")
     found = redesign.free_of(spec, spec)
     assert set(moving) <= set(found)
-    assert all(low <= spec.at(path) <= high and low < high for path, (low, high) in found.items())
+    assert all(low <= spec.get_value(path) <= high and low < high for path, (low, high) in found.items())
 
 
 def test_a_rescaled_beam_with_a_width_of_its_own_may_change_that_one():
@@ -262,7 +262,7 @@ def test_all_springs_that_are_tried_for_a_yield_share_one_time_budget(monkeypatc
     now, left = [1000.0], []
 
     def moved(_given, design, _run, clock, largest):
-        left.append(clock.left())
+        left.append(clock.get_time_left())
         now[0] += 3.0
         return len(left), replace(design, spec=None, message="no")
 
@@ -305,7 +305,7 @@ class TwoLimits:
         self.parts = SimpleNamespace(nominal=np.zeros(2), seed=0, draw=self.draw)
         self._fresh_errors = self.draw(redesign.CHECKED, redesign.SEARCH_SEED + 1)
 
-    checked = redesign.PartNumbers.checked
+    checked = redesign.PartNumbers.count_good_parts
 
     @staticmethod
     def draw(count, seed):
@@ -327,8 +327,8 @@ def test_the_largest_yield_is_found_where_the_worst_parts_cannot_be_helped():
     problem = RobustProblem(
         part, np.array([[0.0, 0.9]]), drawn, np.ones(2), part.rows.matrix, part.rows.constant, about, 0.99
     )
-    alone = part.checked(with_margins(problem, np.array([0.1])).x)
-    largest = max(part.checked(np.array([x])) for x in np.linspace(0.0, 0.9, 46))
+    alone = part.count_good_parts(with_margins(problem, np.array([0.1])).x)
+    largest = max(part.count_good_parts(np.array([x])) for x in np.linspace(0.0, 0.9, 46))
     _, good = redesign._with_margins(problem, part, np.array([0.1]))
     assert alone < 0.85 * largest
     assert good >= 0.95 * largest
@@ -410,7 +410,7 @@ def test_designs_with_other_springs_follow_the_best_one(name):
 def test_parts_that_are_solved_as_rows_have_the_numbers_of_each_part_alone(name):
     """Parts whose yield is designed for were analysed one by one: a vcfm's took ten times as long."""
     result = cfmkit.analyze(f"configs/{name}.yaml")
-    rows, parts = requirement_rows(result, result.spec, Run()), Parts.assumed(result.spec, 0)
+    rows, parts = requirement_rows(result, result.spec, Run()), Parts.from_assumed_errors(result.spec, 0)
     values = parts.draw(6)
     together = numbers_of_parts(
         result.spec, dict(zip(parts.paths, values.T, strict=True)), rows, Run(), stated_places(result.spec)

@@ -164,7 +164,7 @@ def made_of(stem: str, text: str, *more: str):
     """Return a config's specification with another material, and that material."""
     contact = ["mechanism.contact.width=8 mm"] if stem == "cam" else []
     spec = cfmkit.load(CONFIGS / f"{stem}.yaml", [*contact, f"{EVERYWHERE[stem]}={text}", *more])
-    return spec, spec.at(EVERYWHERE[stem])
+    return spec, spec.get_value(EVERYWHERE[stem])
 
 
 @pytest.mark.parametrize("stem", EVERYWHERE)
@@ -183,9 +183,9 @@ def test_a_value_of_a_bare_name_can_be_set_and_replaced_and_another_name_brings_
     assert (changed.name, changed.modulus) == ("pla", 2.5e9)
     named, _ = made_of(stem, "pla")
     assert dict(named.leaves())[f"{path}.youngs_modulus"] == 3e9
-    assert named.replace({f"{path}.youngs_modulus": 2.5e9}).at(path) == changed
-    assert named.replace({f"{path}.name": "pom"}).at(path) == named.replace({path: "pom"}).at(path)
-    assert named.replace({path: "pom"}).at(path).modulus == material("pom").youngs_modulus
+    assert named.replace({f"{path}.youngs_modulus": 2.5e9}).get_value(path) == changed
+    assert named.replace({f"{path}.name": "pom"}).get_value(path) == named.replace({path: "pom"}).get_value(path)
+    assert named.replace({path: "pom"}).get_value(path).modulus == material("pom").youngs_modulus
 
 
 @pytest.mark.parametrize("complete", [False, True])
@@ -196,7 +196,7 @@ def test_a_material_is_written_in_one_form_and_reads_back(stem: str, complete: b
         written = dump(spec, complete=complete)
         assert "material:\n" in written
         assert ("poisson_ratio: 0.36" in written) == (complete or "poisson" in text)
-        assert bind(read_document(written, "again.yaml", CONFIGS)).at(EVERYWHERE[stem]) == found
+        assert bind(read_document(written, "again.yaml", CONFIGS)).get_value(EVERYWHERE[stem]) == found
 
 
 @pytest.mark.parametrize("stem", EVERYWHERE)

@@ -10,8 +10,8 @@ from cfmkit.solid.mesh import mesh
 from cfmkit.solid.mesh_refinement import refine
 
 TURN = np.linspace(0, 2 * np.pi, 400, endpoint=False)
-SQUARE = Ring.of(1e-3 * np.array([[-5.0, -4.0], [5.0, -4.0], [5.0, 4.0], [-5.0, 4.0]]), False)
-PLATE = (SQUARE, Ring.of(2e-3 * np.column_stack([np.cos(TURN), np.sin(TURN)]), True))
+SQUARE = Ring.from_points(1e-3 * np.array([[-5.0, -4.0], [5.0, -4.0], [5.0, 4.0], [-5.0, 4.0]]), False)
+PLATE = (SQUARE, Ring.from_points(2e-3 * np.column_stack([np.cos(TURN), np.sin(TURN)]), True))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_new_nodes_are_held_only_between_held_ones():
     grid = mesh((SQUARE,), 2e-3)
     finer = refine(grid, (SQUARE,))
     held = np.abs(grid.nodes[:, 0] + 5e-3) < 1e-9
-    found = finer.between(held)
+    found = finer.transfer_selection(held)
     assert (found == (np.abs(finer.mesh.nodes[:, 0] + 5e-3) < 1e-9)).all()
 
 

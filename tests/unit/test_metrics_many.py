@@ -92,7 +92,7 @@ def test_a_metric_of_many_windows_is_that_of_each_whichever_way_the_force_acts(n
 
 
 def test_a_spread_is_judged_in_the_direction_of_its_mean_and_without_a_target_nothing_deviates_from_it():
-    assert Spread.of(-0.5, 2.0, -3.0)[:4] == (0.5, 3.0, -2.0, -1.0)
+    assert Spread.from_extremes(-0.5, 2.0, -3.0)[:4] == (0.5, 3.0, -2.0, -1.0)
     rows = ManyWindows(np.arange(2.0), np.array([[-1.0, -3.0], [1.0, -3.0]]), lambda _, e: (e.max(1), e.min(1)))
     assert metric_of("force_ripple", rows, np.nan) == pytest.approx([2 / 3, 4 / 3])
     assert metric_of("force_max", rows, np.nan).tolist() == [-1.0, 1.0]
@@ -115,8 +115,8 @@ def test_the_first_95_percent_alone_are_those_that_are_solved_for_beside_the_ban
 @pytest.mark.parametrize("mean", [-3e-16, 0.0, 3e-16])
 def test_where_the_mean_is_zero_the_larger_extreme_says_the_direction(mean):
     """Over a full turn the rounding of the mean decided: a ripple of 197.5 or 202.6 % by the number of points."""
-    alone = Spread.of(mean, 1.25, -1.5)
-    many = Spread.of(np.array([mean, 0.5]), np.array([1.25, 2.0]), np.array([-1.5, -3.0]))
+    alone = Spread.from_extremes(mean, 1.25, -1.5)
+    many = Spread.from_extremes(np.array([mean, 0.5]), np.array([1.25, 2.0]), np.array([-1.5, -3.0]))
     assert alone == (0.0, 1.5, -1.25, -1.0, 0.0)
     assert tuple(float(item[0]) for item in many[:4]) == alone[:4]
     assert tuple(float(item[1]) for item in many[:4]) == (0.5, 2.0, -3.0, 1.0)

@@ -84,10 +84,10 @@ def test_a_target_below_the_error_is_none():
 
 
 def test_one_curve_and_many_agree_on_what_is_nothing():
-    many = Spread.of(np.array([0.5, 5.0]), np.array([1.0, 6.0]), np.array([0.0, 4.0]), np.array([2.0, 2.0]))
+    many = Spread.from_extremes(np.array([0.5, 5.0]), np.array([1.0, 6.0]), np.array([0.0, 4.0]), np.array([2.0, 2.0]))
     for metric in (ripple, half_band, deviation_from_mean):
         assert np.isnan(metric(many)).tolist() == [True, False]
-        assert np.isnan(metric(Spread.of(0.5, 1.0, 0.0, 2.0)))
+        assert np.isnan(metric(Spread.from_extremes(0.5, 1.0, 0.0, 2.0)))
     motion = np.array([[0.0, 1.0, 2.0]] * 2)
     ends = np.zeros(2), np.full(2, 2.0)
     rows = ManyBranches(motion, np.array([[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]]), *ends, error=np.array([0.5, 0.5]))

@@ -68,7 +68,7 @@ def test_a_result_without_a_curve_is_shown_with_its_reason():
     spec = cfmkit.load(CONFIGS / "cam.yaml").replace({"name": HOSTILE})
     from cfmkit.runs.notebook_result import AnalysisView
 
-    shown = AnalysisView.of(Result(spec, Status.NO_EQUILIBRIUM, "nothing holds it"))._repr_html_()
+    shown = AnalysisView.from_result(Result(spec, Status.NO_EQUILIBRIUM, "nothing holds it"))._repr_html_()
     assert "nothing holds it" in shown
     assert HOSTILE not in shown
 
@@ -194,7 +194,7 @@ def test_a_result_is_drawn_on_axes_of_a_figure_of_ones_own(result):
         assert result.plot(right, bands=False, names=False, arrows=False) is right
         assert left.get_xlabel() == "displacement [mm]"
         assert len(left.texts) > len(right.texts) == 0
-        np.testing.assert_allclose(right.lines[0].get_xdata(), 1e3 * result.curve.on("load").motion)
+        np.testing.assert_allclose(right.lines[0].get_xdata(), 1e3 * result.curve.select_branch("load").motion)
         own = result.plot()
         assert own.figure.get_size_inches() * 25.4 == pytest.approx((160, 100))
         pyplot.close(own.figure)
@@ -205,7 +205,9 @@ def test_a_result_is_drawn_on_axes_of_a_figure_of_ones_own(result):
 def test_what_was_not_solved_cannot_be_drawn():
     from cfmkit.runs.notebook_result import AnalysisView
 
-    failed = AnalysisView.of(Result(cfmkit.load(CONFIGS / "cam.yaml"), Status.NO_EQUILIBRIUM, "nothing holds it"))
+    failed = AnalysisView.from_result(
+        Result(cfmkit.load(CONFIGS / "cam.yaml"), Status.NO_EQUILIBRIUM, "nothing holds it")
+    )
     with pytest.raises(cfmkit.SolutionError, match="nothing holds it"):
         failed.plot()
 

@@ -31,4 +31,4 @@ def test_blas_has_one_thread_inside_unless_the_environment_says_how_many(monkeyp
 
 def test_frequencies_and_solids_ask_for_one_thread():
     assert frequencies.__wrapped__ is not None
-    assert DrivenPart.solved.__wrapped__ is not None
+    assert DrivenPart.solve.__wrapped__ is not None

@@ -103,7 +103,7 @@ def test_a_solid_that_comes_to_its_frame_ends_there():
     )  # fmt: skip
     wall = np.array([[0.02, -0.004], [0.06, -0.004], [0.06, -0.005], [0.02, -0.005]])
     part = Part(rings_of((strip,)), 0.001, 0.01, law, (root, tip), obstacles=(wall,))
-    course = part.meshed(0.0006).followed([0.0, 0.003, 0.006, 0.01]).course
+    course = part.create_mesh(0.0006).follow_stops([0.0, 0.003, 0.006, 0.01]).course
     assert course.ending is PathEnd.CONTACT
     assert course.travel[-1] == pytest.approx(0.004, abs=2e-5)  # the tip's lower edge is then at the wall
     assert course.touching[1] == pytest.approx(-0.004, abs=1e-4)

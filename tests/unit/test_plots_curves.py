@@ -56,7 +56,7 @@ def test_branches_that_coincide_share_one_name_and_have_no_arrows():
 
 
 def labelled(count, branches=1):
-    curve = loop_curve() if branches == 2 else loop_curve().on("load")
+    curve = loop_curve() if branches == 2 else loop_curve().select_branch("load")
     label = ({"preload": (1e-3 * i, "length")} for i in range(count))
     return [
         Curve(curve.motion, curve.effort * (1 + 0.2 * i), curve.branch, curve.stable, label=next(label))

@@ -24,7 +24,7 @@ def leaf():
     driven = np.array([0.0, -1.0, 0.0])
     shuttle = HeldOrDriven("shuttle", (np.array([start - up, start + up]),), start, driven)
     wall = HeldOrDriven("wall", (np.array([end - up, end + up]),), end)
-    return Part(rings_of((outline,)), 2 * t, 0.006, law, (shuttle, wall)).meshed(1.5e-3)
+    return Part(rings_of((outline,)), 2 * t, 0.006, law, (shuttle, wall)).create_mesh(1.5e-3)
 
 
 STOPS = np.linspace(0.0, 0.009, 25).tolist()
@@ -33,7 +33,7 @@ STOPS = np.linspace(0.0, 0.009, 25).tolist()
 @pytest.fixture(scope="module")
 def many(leaf):
     """Return the path with many poses."""
-    return leaf.followed(STOPS).course
+    return leaf.follow_stops(STOPS).course
 
 
 def thinned(many):
@@ -73,7 +73,7 @@ def test_added_poses_are_equilibria_in_order_of_travel_and_keep_the_requested_on
     assert dense.peaks[0].shape == travel.shape
     supports, elements = leaf.problem.supports, leaf.problem.elements
     for pose in dense.course.poses:
-        forces = elements.forces(supports.displaced(pose.unknowns, pose.travel))
+        forces = elements.forces(supports.evaluate_displacements(pose.unknowns, pose.travel))
         out = np.abs(supports.residual(pose.unknowns, pose.travel, forces)).max()
         assert out <= 1e-6 * np.abs(forces).max() + 1e-12
 

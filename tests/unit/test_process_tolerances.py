@@ -35,7 +35,7 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
-    shares = expected_shares(result, Parts.assumed(spec, 0), Run())
+    shares = expected_shares(result, Parts.from_assumed_errors(spec, 0), Run())
     made = Parts.of_design(spec, spec.design, 0)
     assert made.paths == ("mechanism.beam.offset",)
     judged = analyze_parts(made, made.draw(), result, Run()).share()
@@ -114,7 +114,7 @@ def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
     changed = SimpleNamespace(analyze=analysed, **same)
     monkeypatch.setattr(requirement_rows, "family", lambda _name: changed)
     monkeypatch.setattr(requirement_rows, "function_named", lambda _name: seen)
-    expected_shares(result, Parts.assumed(spec, 0), Run())
+    expected_shares(result, Parts.from_assumed_errors(spec, 0), Run())
     nominal = spec.mechanism.model_dump()
     assert sum(part.mechanism.model_dump() == nominal for part in looked) == 1
     again = [part for part in solved if part.mechanism.model_dump() == nominal]

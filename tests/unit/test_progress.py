@@ -20,11 +20,11 @@ def told(monkeypatch):
         monitor = StudyProgress(SimpleNamespace(json=False, quiet=False))
         monitor.total(total)
         if reused:
-            monitor.done(reused, 0, True)
+            monitor.add_finished(reused, 0, True)
         found = []
         for when, points in events:
             clock.now = when
-            monitor.done(points, 0, False)
+            monitor.add_finished(points, 0, False)
             if lines:
                 found.append((when, left(lines.pop())))
         return found

@@ -180,19 +180,19 @@ def test_the_residuals_of_the_smoothing_spline_are_as_large_as_the_stated_noise(
 def test_its_derivative_is_nearer_to_the_truth_than_that_of_interpolation():
     values = 20e-6 * np.sin(2 * np.pi * X / 0.02) + np.random.default_rng(0).normal(0, 2e-6, 300)
     truth = 20e-6 * 2 * np.pi / 0.02 * np.cos(2 * np.pi * X / 0.02)
-    errors = [np.sqrt(np.mean((smoothed(X, values, noise).at(X, 1) - truth) ** 2)) for noise in (0.0, 2e-6)]
+    errors = [np.sqrt(np.mean((smoothed(X, values, noise).evaluate(X, 1) - truth) ** 2)) for noise in (0.0, 2e-6)]
     assert errors[1] < 0.15 * errors[0]
 
 
 def test_noise_larger_than_the_signal_leaves_a_straight_line():
     found = smoothed(X, 3 * X + 1e-9 * np.sin(40 * X), 1e-3)
-    assert np.abs(found.at(X, 2)).max() < 1e-3
-    assert found.at(X, 1) == pytest.approx(np.full(300, 3.0), abs=1e-3)
+    assert np.abs(found.evaluate(X, 2)).max() < 1e-3
+    assert found.evaluate(X, 1) == pytest.approx(np.full(300, 3.0), abs=1e-3)
 
 
 def test_without_noise_the_points_are_met():
     values = np.sin(40 * X)
-    assert smoothed(X, values, 0.0).at(X) == pytest.approx(values, abs=1e-12)
+    assert smoothed(X, values, 0.0).evaluate(X) == pytest.approx(values, abs=1e-12)
 
 
 @pytest.mark.parametrize("places", [[0, 1, 2], [0, 1, 1, 2, 3, 4], [3, 2, 1, 0, -1]])

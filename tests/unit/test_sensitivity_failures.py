@@ -90,7 +90,7 @@ def test_steps_that_fail_far_out_leave_the_gradient_to_the_small_ones():
 def test_failed_samples_are_bad_parts():
     met = np.array([True] * 80 + [False] * 10 + [True] * 10)
     failed = np.array([False] * 90 + [True] * 10)
-    found = Share.of(met, failed)
+    found = Share.from_outcomes(met, failed)
     assert (found.value, found.failed) == (0.8, 10)
     assert found.wilson[0] < 0.8 < found.wilson[1]
     both = np.array([[True, True, True]] * 50 + [[False, True, False]] * 50)

@@ -171,7 +171,7 @@ def made(tolerances, matrix, count=40_000, seed=0, groups=()):
 def test_the_yield_of_a_normal_tolerance_is_that_of_the_normal_distribution():
     points = made([normal(0.1, 5.0)], np.eye(1))[:, 0, 0]
     met = np.abs(points - 5.0) <= 0.15
-    found = Share.of(met, np.zeros(len(met), bool))
+    found = Share.from_outcomes(met, np.zeros(len(met), bool))
     exact = 2 * NormalDist().cdf(1.5) - 1
     assert found.wilson[0] < exact < found.wilson[1]
     assert found.value == pytest.approx(exact, abs=0.005)
@@ -200,7 +200,7 @@ def test_correlations_that_cannot_be_are_refused():
 
 def test_a_truncated_normal_distribution_keeps_its_ends_and_its_shape():
     spread = normal(1.0, 0.0, -1.0, 1.0)
-    points = spread.at(np.linspace(1e-9, 1 - 1e-9, 200_001))
+    points = spread.evaluate_quantiles(np.linspace(1e-9, 1 - 1e-9, 200_001))
     assert points.min() >= -1
     assert points.max() <= 1
     phi, density = NormalDist().cdf(1) - NormalDist().cdf(-1), NormalDist().pdf(1)
@@ -212,7 +212,9 @@ def test_a_truncated_normal_distribution_keeps_its_ends_and_its_shape():
 )
 def test_a_tightened_tolerance_is_the_same_about_the_nominal_value(spread):
     unit = np.linspace(0.01, 0.99, 99)
-    np.testing.assert_allclose(spread.tightened(0.5).at(unit) - 2.0, 0.5 * (spread.at(unit) - 2.0), atol=1e-12)
+    np.testing.assert_allclose(
+        spread.tighten(0.5).evaluate_quantiles(unit) - 2.0, 0.5 * (spread.evaluate_quantiles(unit) - 2.0), atol=1e-12
+    )
 
 
 def test_the_tolerance_that_matters_is_the_one_to_tighten():
@@ -235,7 +237,7 @@ def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
     points = made([normal(1.0), normal(0.1)], np.eye(2), 1000, groups=((1,),))
     met = np.abs(points.sum(axis=2)) < 1
     gain = monte_carlo_yield.yield_gains(met, np.zeros(met.shape, bool))
-    alone = Share.of(met[:, 0], np.zeros(len(met), bool)).wilson
+    alone = Share.from_outcomes(met[:, 0], np.zeros(len(met), bool)).wilson
     assert gain.high[0] - gain.low[0] < 0.5 * (alone[1] - alone[0])
 
 

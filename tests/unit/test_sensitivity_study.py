@@ -135,7 +135,7 @@ def test_a_study_of_which_nothing_was_solved_ends_with_the_code_of_what_all_have
 def test_failed_parts_count_as_bad_in_a_yield_and_are_counted(good, met):
     found = study("tolerance", samples=4, min_yield="95 %")
     parts = np.arange(100)
-    share = Share.of(parts < good, (parts >= good) & (parts < good + 5))
+    share = Share.from_outcomes(parts < good, (parts >= good) & (parts < good + 5))
     found = dataclasses.replace(found, all_met=share)
     assert (yield_ok(found), by_interval(found)) == (met, False)
     sentence = as_json(found)["requirements"][-1]["sentence"]

@@ -145,7 +145,7 @@ def test_springs_that_make_up_for_their_own_friction_hold_the_force_better_than_
     deviations = {}
     for branch in (None, way):
         made = found(given.replace({"design.branch": branch}), Run())
-        force = analyze(made.spec).curve.on(way)
+        force = analyze(made.spec).curve.select_branch(way)
         inside = (force.displacement >= 0.003) & (force.displacement <= 0.035)
         deviations[branch] = np.abs(force.force[inside] / 3.0 - 1.0).max()
     assert deviations[way] < 0.8 * deviations[None]

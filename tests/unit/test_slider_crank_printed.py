@@ -449,7 +449,7 @@ def test_flexures_designed_for_springs_have_their_force_and_the_stress_allowed()
     springs = api.analyze(wanted.replace({"analysis.fidelity": "prb"})).curve
     both = [np.interp(np.linspace(0.4, 4, 40) * MM, c.motion, c.effort).mean() for c in (result.curve, springs)]
     assert both[0] == pytest.approx(both[1], rel=1e-3)
-    widths = {found.spec.at(f"mechanism.flexures.{name}.width") for name in ("pivot", "crank_pin", "slider_pin")}
+    widths = {found.spec.get_value(f"mechanism.flexures.{name}.width") for name in ("pivot", "crank_pin", "slider_pin")}
     assert len(widths) == 1
 
 

@@ -102,7 +102,7 @@ def test_flexures_are_solved_with_their_own_widths():
     part = part_of(spec("lumped", "analysis.fidelity=solid"))
     assert part.width == pytest.approx(2.621e-3)
     assert [width for _, width in part.regions] == pytest.approx([2.478e-3])
-    elements = part.meshed(0.5e-3).problem.elements
+    elements = part.create_mesh(0.5e-3).problem.elements
     assert set(np.round(elements.width, 9)) == {2.621e-3, 2.478e-3}
 
 

@@ -55,7 +55,7 @@ def test_effort_stiffness_and_bend_are_derivatives_of_the_energy(link, start, pl
 @pytest.mark.parametrize(("link", "start", "place"), list(mechanisms(40)))
 def test_a_linkage_and_its_mirror_image_have_the_same_springs(link, start, place):
     one = curves_along_crank(link, start, np.array([place]))
-    other = curves_along_crank(link.mirrored(), math.pi - start, np.array([math.pi - place]))
+    other = curves_along_crank(link.mirror(), math.pi - start, np.array([math.pi - place]))
     np.testing.assert_allclose(other.effort, -one.effort, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(other.stiffness, one.stiffness, rtol=1e-8, atol=1e-8)
 
@@ -332,7 +332,7 @@ def test_no_rates_do_better_than_the_linear_programme():
     touching = np.flatnonzero(np.abs(residual) > worst * (1 - 1e-6))
     turns = sum(residual[a] * residual[b] < 0 for a, b in pairwise(touching))
     assert turns >= (best > 0).sum()
-    spans = ranges(goal.at(range(0, 301, 5)), 1.1 * worst)
+    spans = ranges(goal.select_rows(range(0, 301, 5)), 1.1 * worst)
     assert (spans[:, 0] <= best + 1e-9).all()
     assert (spans[:, 1] >= best - 1e-9).all()
     assert goal.deviation(choose_preferred(goal, 1.2 * worst, "even-rates")) <= 1.2 * worst * (1 + 1e-9)
@@ -370,7 +370,7 @@ def test_gradients_are_those_of_differences(name):
     found = cfmkit.api.family("slider-crank").gradient(spec, [*paths, "mechanism.offset"])
     assert len(found) > 6
     for path in paths:
-        rate = spec.at(path)
+        rate = spec.get_value(path)
         step = 1e-4 * (rate or (1.0 if path.endswith("slider") else 1e-3))
         low = max(rate - step, 0.0)
         ends = [

@@ -34,7 +34,7 @@ def test_derivatives_of_extremes_are_those_at_their_places(name):
             assert few[metric][path] == pytest.approx(many[metric][path], rel=1e-9), (metric, path)
     spec = config(name, "analysis.points=11")
     for path in RATES:
-        rate = spec.at(path)
+        rate = spec.get_value(path)
         ends = [cfmkit.analyze(spec.replace({path: rate * (1 + step)})).metrics for step in (-1e-4, 1e-4)]
         for metric in ("force_max", "force_ripple"):
             difference = (ends[1][metric].value - ends[0][metric].value) / (2e-4 * rate)
@@ -45,10 +45,10 @@ def test_a_point_that_is_the_end_of_a_window_but_for_rounding_counts_once_in_swe
     spec = config("bilancia2019_optimum", "analysis.points=301")
     single = cfmkit.analyze(spec)
     assert np.abs(single.curve.motion - 0.35e-3).min() < 1e-18  # it is there, and not equal
-    swept = cfmkit.sweep(spec, vary={RATES[0]: spec.at(RATES[0]) * np.array([1.0, 1.1])})
+    swept = cfmkit.sweep(spec, vary={RATES[0]: spec.get_value(RATES[0]) * np.array([1.0, 1.1])})
     for metric in ("force_mean", "force_max", "force_min"):
         assert swept.table[metric][0] == pytest.approx(single.metrics[metric].value, rel=1e-13), metric
     slopes = cfmkit.api.family("slider-crank").gradient(spec, RATES)["force_mean"]
-    assert sum(slopes[path] * spec.at(path) for path in RATES) == pytest.approx(
+    assert sum(slopes[path] * spec.get_value(path) for path in RATES) == pytest.approx(
         single.metrics["force_mean"].value, rel=1e-12
     )

@@ -39,7 +39,7 @@ def circle(radius: float, count: int = 400) -> np.ndarray:
 
 @cache
 def bar(length: float, height: float, size: float) -> TriangleMesh:
-    return mesh((Ring.of(box(0, 0, length, height), False),), size)
+    return mesh((Ring.from_points(box(0, 0, length, height), False),), size)
 
 
 def at(grid: TriangleMesh, axis: int, place: float) -> np.ndarray:
@@ -56,7 +56,7 @@ def problem(grid: TriangleMesh, groups: list[Group], law=HOOKE, width: float = 1
 
 @pytest.mark.parametrize("size", [0.4e-3, 1e-3])
 def test_a_mesh_has_the_area_of_its_part_and_no_bad_triangle(size):
-    plate = mesh((Ring.of(box(-5e-3, -4e-3, 5e-3, 4e-3), False), Ring.of(circle(2e-3), True)), size)
+    plate = mesh((Ring.from_points(box(-5e-3, -4e-3, 5e-3, 4e-3), False), Ring.from_points(circle(2e-3), True)), size)
     assert plate.area == pytest.approx(80e-6 - np.pi * 4e-6, rel=2e-4)
     a, b, c = plate.nodes[plate.triangles[:, :3]].swapaxes(0, 1)
     sides = np.array([np.hypot(*(q - p).T) for p, q in ((b, c), (c, a), (a, b))])
@@ -70,14 +70,14 @@ def test_a_mesh_has_the_area_of_its_part_and_no_bad_triangle(size):
 
 def test_a_part_has_two_elements_across_its_thin_places():
     arms = np.array([[0, 0], [10, 0], [10, 5], [9.8, 5], [9.8, 0.2], [0, 0.2]]) * 1e-3
-    grid = mesh((Ring.of(arms, False),), 1e-3)
+    grid = mesh((Ring.from_points(arms, False),), 1e-3)
     a, b = grid.nodes[grid.edges[:, 0]], grid.nodes[grid.edges[:, 1]]
     assert np.hypot(*(b - a).T).max() < 1.6 * 0.1e-3  # where the arms meet the part is thicker
 
 
 def test_the_boundary_of_a_refined_mesh_is_drawn_from_edge_to_edge():
     """Before, halved edges stood behind all others, and stress maps had grey areas between places far apart."""
-    ring = Ring.of(box(0, 0, 10e-3, 2e-3), False)
+    ring = Ring.from_points(box(0, 0, 10e-3, 2e-3), False)
     coarse = mesh((ring,), 1e-3)
     fine = refine(coarse, (ring,), np.arange(len(coarse.triangles)) < 5).mesh
     assert len(fine.edges) > len(coarse.edges)
@@ -88,7 +88,7 @@ def test_the_boundary_of_a_refined_mesh_is_drawn_from_edge_to_edge():
 
 def test_elements_meet_along_a_seam():
     seam = np.array([[3e-3, -1e-3], [3e-3, 3e-3]])
-    grid = mesh((Ring.of(box(0, 0, 10e-3, 2e-3), False),), 0.5e-3, seams=[seam])
+    grid = mesh((Ring.from_points(box(0, 0, 10e-3, 2e-3), False),), 0.5e-3, seams=[seam])
     x = grid.nodes[grid.triangles[:, :3], 0] - 3e-3
     assert (((x > -1e-9).all(1)) | ((x < 1e-9).all(1))).mean() == 1.0
 
@@ -96,7 +96,7 @@ def test_elements_meet_along_a_seam():
 def test_an_outline_that_crosses_itself_is_refused():
     bow = np.array([[0, 0], [1, 1], [1, 0], [0, 1]]) * 1e-2
     with pytest.raises(GeometryError, match="crosses itself"):
-        mesh((Ring.of(bow, False),), 1e-3)
+        mesh((Ring.from_points(bow, False),), 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -124,16 +124,16 @@ def test_an_outline_that_crosses_itself_is_refused():
 def test_a_part_that_is_thinner_than_elements_can_resolve_is_named_with_the_place(outline):
     """Half a minute passed before, and the message asked for larger elements, which nothing would have changed."""
     with pytest.raises(GeometryError, match=r"too thin, .* at \(.* mm, .* mm\): elements of 1 mm cannot resolve it"):
-        mesh((Ring.of(1e-3 * np.array(outline), False),), 1e-3)
+        mesh((Ring.from_points(1e-3 * np.array(outline), False),), 1e-3)
 
 
 @pytest.mark.parametrize("rise", [0.6e-6, -0.6e-6])
 def test_a_step_of_less_than_a_thousandth_of_the_thickness_is_no_place_to_be_resolved(rise):
     """Between beams of almost one thickness: it had been the thinnest place of the part."""
     step = np.array([[0, 0], [9e-3, 0], [9e-3, 1e-3], [4e-3, 1e-3], [4e-3, 1e-3 + rise], [0, 1e-3 + rise]])
-    plain, stepped = (mesh((Ring.of(one, False, 1e-6),), 0.6e-3) for one in (box(0, 0, 9e-3, 1e-3), step))
+    plain, stepped = (mesh((Ring.from_points(one, False, 1e-6),), 0.6e-3) for one in (box(0, 0, 9e-3, 1e-3), step))
     assert len(stepped.triangles) < 2 * len(plain.triangles)
-    ring = Ring.of(step, False, 1e-6)
+    ring = Ring.from_points(step, False, 1e-6)
     assert len(ring.points) == 5
     assert ring.area == pytest.approx(9e-6 + 4e-3 * rise, rel=1e-4)
 
@@ -141,7 +141,10 @@ def test_a_step_of_less_than_a_thousandth_of_the_thickness_is_no_place_to_be_res
 @pytest.mark.parametrize(("height", "said"), [(2e-3, "2"), (-3e-19, "0")])
 def test_a_hole_that_is_cut_beside_the_part_is_named(height, said):
     """A height that is rounding is none: it had been -3e-16 mm."""
-    rings = (Ring.of(box(0, -4e-3, 10e-3, 4e-3), False), Ring.of(circle(1e-3) + np.array([20e-3, height]), True))
+    rings = (
+        Ring.from_points(box(0, -4e-3, 10e-3, 4e-3), False),
+        Ring.from_points(circle(1e-3) + np.array([20e-3, height]), True),
+    )
     with pytest.raises(GeometryError, match=rf"the hole round \(20 mm, {said} mm\) is not inside the outline"):
         mesh(rings, 1e-3)
 
@@ -150,20 +153,20 @@ def test_triangles_that_never_meet_the_outline_end_in_a_sentence(monkeypatch):
     """Whatever the reason: halving pieces of the boundary ends, and what is reported is no mesh."""
     monkeypatch.setattr("cfmkit.solid.mesh._missing", lambda _, laid: [np.zeros(1, int) for _ in laid])
     with pytest.raises(GeometryError, match=r"the outline cannot be meshed at \(0 mm, 0 mm\): it touches itself"):
-        mesh((Ring.of(box(0, 0, 10e-3, 2e-3), False),), 1e-3)
+        mesh((Ring.from_points(box(0, 0, 10e-3, 2e-3), False),), 1e-3)
 
 
 def test_outlines_that_cross_each_other_are_refused():
-    rings = tuple(Ring.of(box(x, 0, x + 10e-3, 2e-3), False) for x in (0.0, 5e-3))
+    rings = tuple(Ring.from_points(box(x, 0, x + 10e-3, 2e-3), False) for x in (0.0, 5e-3))
     with pytest.raises(GeometryError, match="crosses itself"):
         mesh(rings, 1e-3)
 
 
 def test_a_held_place_beside_the_part_has_no_nodes_and_is_named():
     away = HeldOrDriven("root", (box(1.0, 1.0, 2.0, 2.0),), np.zeros(2))
-    part = Part((Ring.of(box(0, 0, 10e-3, 1e-3), False),), 1e-3, 1e-3, HOOKE, (away,))
+    part = Part((Ring.from_points(box(0, 0, 10e-3, 1e-3), False),), 1e-3, 1e-3, HOOKE, (away,))
     with pytest.raises(GeometryError, match="no node of the mesh lies where root is held"):
-        part.meshed(0.5e-3)
+        part.create_mesh(0.5e-3)
 
 
 def test_no_pose_is_kept_beyond_where_the_solver_stops(monkeypatch):
@@ -183,7 +186,7 @@ def test_no_pose_is_kept_beyond_where_the_solver_stops(monkeypatch):
 
 
 def test_meshes_are_equal_byte_for_byte():
-    ring = Ring.of(circle(3e-3), False)
+    ring = Ring.from_points(circle(3e-3), False)
     one, two = (mesh((ring,), 0.5e-3) for _ in range(2))
     assert one.nodes.tobytes() == two.nodes.tobytes()
     assert one.triangles.tobytes() == two.triangles.tobytes()
@@ -274,8 +277,8 @@ def test_a_cantilever_bends_as_timoshenko_says():
 def greatest_along(held: SolidProblem, end: float, near) -> tuple[float, float]:
     """Return the largest stress along free edges where `near` says so, and the effort there, at a small travel."""
     course = follow(held, [0.0, end])
-    moved = held.supports.displaced(course.poses[-1].unknowns, end)
-    stress, nodes = held.elements.along_edges(moved, np.zeros(len(held.elements.mesh.nodes), bool))
+    moved = held.supports.evaluate_displacements(course.poses[-1].unknowns, end)
+    stress, nodes = held.elements.evaluate_edge_stress(moved, np.zeros(len(held.elements.mesh.nodes), bool))
     return float(np.abs(stress[near(nodes)]).max()), course.poses[-1].effort
 
 
@@ -290,7 +293,10 @@ def test_stress_beside_a_hole_is_kirschs_in_a_wide_plate_and_howlands_in_a_narro
     radius, thickness = 1e-3, 1e-3
     width = 2 * radius / share
     tall = 4 * width
-    rings = (Ring.of(box(-width / 2, -tall / 2, width / 2, tall / 2), False), Ring.of(circle(radius, 2000), True))
+    rings = (
+        Ring.from_points(box(-width / 2, -tall / 2, width / 2, tall / 2), False),
+        Ring.from_points(circle(radius, 2000), True),
+    )
     grid = mesh(rings, width / 10, share=0.08)
     low = Group("low", at(grid, 1, -tall / 2), np.array([0.0, -tall / 2]))
     high = Group("high", at(grid, 1, tall / 2), np.array([0.0, tall / 2]), np.array([0.0, 1.0, 0.0]))
@@ -304,7 +310,7 @@ def shoulder(narrow: float, wide: float, radius: float) -> TriangleMesh:
     turn = np.linspace(0, np.pi / 2, 40)
     fillet = np.column_stack([radius * (1 - np.sin(turn)), 0.5 * narrow + radius * (1 - np.cos(turn))])
     upper = np.vstack([[[3 * wide, 0.5 * narrow]], fillet, [[0, 0.5 * wide], [-3 * wide, 0.5 * wide]]])
-    return mesh((Ring.of(np.vstack([upper, (upper * [1, -1])[::-1]]), False),), 0.12 * narrow, share=0.1)
+    return mesh((Ring.from_points(np.vstack([upper, (upper * [1, -1])[::-1]]), False),), 0.12 * narrow, share=0.1)
 
 
 @pytest.mark.parametrize("load", ["tension", "bending"])
@@ -349,7 +355,7 @@ def test_a_pressed_strip_leaves_for_its_buckled_branch():
     # Euler's load less what the shortening of the strip and its shear take
     assert max(pose.effort for pose in course.poses) == pytest.approx(euler, rel=0.02)
     assert course.poses[-1].effort == pytest.approx(euler, rel=0.03)
-    sideways = held.supports.displaced(course.poses[-1].unknowns, course.poses[-1].travel)[:, 1]
+    sideways = held.supports.evaluate_displacements(course.poses[-1].unknowns, course.poses[-1].travel)[:, 1]
     assert np.abs(sideways).max() > 1e-3
 
 
@@ -400,7 +406,7 @@ def test_an_end_that_is_free_to_turn_is_a_pin():
 
 def test_a_seam_across_an_edge_begins_at_a_node_of_it():
     seam = np.array([[3.03e-3, -1e-3], [3.03e-3, 3e-3]])
-    grid = mesh((Ring.of(box(0, 0, 10e-3, 2e-3), False),), 0.5e-3, seams=[seam])
+    grid = mesh((Ring.from_points(box(0, 0, 10e-3, 2e-3), False),), 0.5e-3, seams=[seam])
     for height in (0.0, 2e-3):
         assert np.hypot(*(grid.nodes - [3.03e-3, height]).T).min() < 1e-9
 
@@ -437,7 +443,7 @@ def test_a_side_of_an_element_is_not_held_in_its_middle_alone_where_a_fillet_lea
     turn = np.linspace(np.pi, 1.5 * np.pi, 91)
     fillet = 1e-3 * np.column_stack([2.0 + np.cos(turn), 1.0 + np.sin(turn)])  # down a web, out on the face y = 0
     ends = 1e-3 * np.array([[0, 0], [0, 3], [1, 3]]), 1e-3 * np.array([[4, 0], [4, -1], [0, -1]])
-    ring = Ring.of(np.concatenate([ends[0], fillet, ends[1]]), False)
+    ring = Ring.from_points(np.concatenate([ends[0], fillet, ends[1]]), False)
     grid = mesh((ring,), size, share=0.15, seams=[np.array([[0.0, 0.0], [4e-3, 0.0]])], near=5e-6)
     held = grid.nodes[:, 1] <= 5e-6
     first, last, middle = held[grid.edges].T

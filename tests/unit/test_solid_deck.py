@@ -52,7 +52,7 @@ def test_a_deck_read_back_is_the_mesh_that_is_solved(made):
         "vcfm-spring-as-beams.inp",
         "vcfm-spring.inp",
     ]
-    problem = part_of(spec, solved_leaf(spec)).meshed().refined()[0].problem
+    problem = part_of(spec, solved_leaf(spec)).create_mesh().refine()[0].problem
     read = blocks(files["vcfm-leaf.inp"])
     nodes = np.array(numbers(next(lines for head, lines in read if head.startswith("*NODE, NSET=ALL"))))
     rows = np.array(numbers(next(lines for head, lines in read if head.startswith("*ELEMENT")))).astype(int)
@@ -93,7 +93,11 @@ def test_calculix_finds_the_same_force(made, tmp_path):
         reported = (tmp_path / f"{name}.dat").read_text()
         share = float(re.search(rb"widths are (\S+) times", data)[1])
         force = re.findall(r"for set SHUTTLE-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+(\S+)", reported)
-        own = part_of(spec, piece).meshed(1e-3).followed([0.0, 0.4e-3 * share_of_travel, 0.8e-3 * share_of_travel])
+        own = (
+            part_of(spec, piece)
+            .create_mesh(1e-3)
+            .follow_stops([0.0, 0.4e-3 * share_of_travel, 0.8e-3 * share_of_travel])
+        )
         assert -float(force[0][1]) / share == pytest.approx(own.course.poses[-1].effort, rel=1e-3)
 
 
@@ -299,7 +303,7 @@ def test_calculix_runs_the_deck_of_a_strip_whose_driven_end_is_free(tmp_path, la
     reported, share = run_by_ccx(tmp_path, data)
     x, y = map(float, re.findall(r"for set ROOT-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)", reported)[0])
     (one,) = family("beam").driven_parts(spec)
-    pose = one.part.meshed().refined()[0].followed([0.0, 2.5e-3, 5e-3]).course.poses[-1]
+    pose = one.part.create_mesh().refine()[0].follow_stops([0.0, 2.5e-3, 5e-3]).course.poses[-1]
     assert -(0.5 * x - np.sqrt(0.75) * y) / share == pytest.approx(pose.effort, rel=1e-3)
 
 
@@ -311,6 +315,6 @@ def test_calculix_finds_the_torque_on_an_end_that_is_turned_and_moves_freely(tmp
     fx, fy = map(float, re.findall(r"-ARM and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", reported)[0])
     c, s = np.cos(angle), np.sin(angle)
     (one,) = family("beam").driven_parts(spec)
-    pose = one.part.meshed().refined()[0].followed(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]
+    pose = one.part.create_mesh().refine()[0].follow_stops(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]
     torque = (x * c - y * s) * fy - (x * s + y * c) * fx
     assert 1e-3 * torque / share == pytest.approx(pose.effort, rel=1e-3)

@@ -36,7 +36,7 @@ def strip(length, height, law=HOOKE, direction=(0.0, -1.0), fillet=0.0):
         HeldOrDriven("root", (blocks[0],), np.zeros(2), seams=(blocks[0][:2],)),
         HeldOrDriven("tip", (blocks[1],), np.array([length, 0.0]), np.array([*direction, 0.0]), seams=(blocks[1][:2],)),
     )
-    return Part((Ring.of(ring, False),), height, 4e-3, law, places)
+    return Part((Ring.from_points(ring, False),), height, 4e-3, law, places)
 
 
 CLOSELY = 7e-5
@@ -44,7 +44,7 @@ CLOSELY = 7e-5
 
 
 def forces(part, error, travel, poses=3):
-    solved = DrivenPart("strip", part, error, tuple(np.linspace(0.0, travel, poses).tolist())).solved()
+    solved = DrivenPart("strip", part, error, tuple(np.linspace(0.0, travel, poses).tolist())).solve()
     wanted = np.linspace(0.0, travel, poses)
     return solved, solved.solution.course.effort(wanted)
 
@@ -83,7 +83,7 @@ def test_a_slender_strip_has_the_force_of_beam_theory_with_shear():
 def test_nearly_incompressible_material_does_not_lock():
     """In plane stress a strip's bending stiffness is E I, whatever Poisson's ratio: on the first mesh, too."""
     slender = [strip(20e-3, 1e-3, SaintVenantKirchhoff(3e9, nu)) for nu in (0.3, 0.4999)]
-    one, other = (part.meshed().followed([0.0, 1e-6]).course.poses[0].stiffness for part in slender)
+    one, other = (part.create_mesh().follow_stops([0.0, 1e-6]).course.poses[0].stiffness for part in slender)
     assert other == pytest.approx(one, rel=0.01)
 
 
@@ -126,9 +126,9 @@ def test_a_bifurcation_is_a_corner_of_the_curve_at_eulers_load():
     shortening = load * length / (3e9 * 4e-3 * height)
     course = (
         strip(length, height, direction=(-1.0, 0.0))
-        .meshed()
-        .refined()[0]
-        .followed(np.linspace(0.0, 8 * shortening, 5).tolist())
+        .create_mesh()
+        .refine()[0]
+        .follow_stops(np.linspace(0.0, 8 * shortening, 5).tolist())
         .course
     )
     (place,) = course.bifurcations
@@ -144,7 +144,7 @@ def test_a_bifurcation_is_a_corner_of_the_curve_at_eulers_load():
 def test_poses_that_are_not_solved_on_the_last_mesh_are_those_that_would_be():
     """They are those of the first mesh and what the meshes differ by, which changes slowly along the path."""
     part = DrivenPart("strip", PARTS["fillets"][0], 5e-4, tuple(np.linspace(0.0, 3e-3, 21).tolist()))
-    few, every = (replace(part, every_pose=one).solved() for one in (False, True))
+    few, every = (replace(part, every_pose=one).solve() for one in (False, True))
     course, other = few.solution.course, every.solution.course
     assert course.travel == pytest.approx(other.travel)
     assert len(course.solved_travel) <= 10 < 20 < len(other.solved_travel) == len(other.poses)
@@ -157,10 +157,10 @@ def test_poses_that_are_not_solved_on_the_last_mesh_are_those_that_would_be():
 
 def test_poses_are_solved_until_the_cubics_predict_them_as_closely_as_allowed():
     part = PARTS["fillets"][0]
-    meshed = part.meshed()
+    meshed = part.create_mesh()
     stops = np.linspace(0.0, 3e-3, 13).tolist()
-    coarse = meshed.followed(stops)
-    finer, refinement = meshed.refined()
+    coarse = meshed.follow_stops(stops)
+    finer, refinement = meshed.refine()
     guide = PoseGuide(coarse, finer, (refinement,))
     count = len(coarse.course.poses)
     ends = solve_some(guide, coarse.course.travel[[0, count // 2, -1]].tolist())

@@ -29,7 +29,7 @@ ELL = np.vstack([[(0.0, 0.0), (5.0, 0.0), (5.0, 1.0)], circle(1.5 * math.pi, mat
 
 
 def test_an_arc_that_turns_towards_the_waste_is_a_fillet_with_its_middle():
-    (arc,) = arcs(Ring.of(ELL, hole=False), 0, 1.0)
+    (arc,) = arcs(Ring.from_points(ELL, hole=False), 0, 1.0)
     assert arc.turn == pytest.approx(0.5 * math.pi)
     assert arc.center == pytest.approx([2.0, 2.0])
     assert arc.middle == pytest.approx([2.0 - math.sqrt(0.5)] * 2)
@@ -40,10 +40,10 @@ def test_an_arc_that_turns_towards_the_waste_is_a_fillet_with_its_middle():
 def test_outside_corners_holes_and_arcs_of_other_radii_are_no_fillets():
     rounded = np.vstack([[(0.0, 0.0), (5.0, 0.0)], circle(0.0, 0.5 * math.pi) + 4.0, [(0.0, 5.0)]])
     round_hole = circle(0.0, 2 * math.pi)[:-1]
-    assert not list(arcs(Ring.of(rounded, hole=False), 0, 1.0))
-    assert not list(arcs(Ring.of(round_hole, hole=True), 0, 1.0))
-    assert not list(arcs(Ring.of(ELL, hole=False), 0, 0.9))
-    assert not list(arcs(Ring.of(ELL, hole=False), 0, 0.0))
+    assert not list(arcs(Ring.from_points(rounded, hole=False), 0, 1.0))
+    assert not list(arcs(Ring.from_points(round_hole, hole=True), 0, 1.0))
+    assert not list(arcs(Ring.from_points(ELL, hole=False), 0, 0.9))
+    assert not list(arcs(Ring.from_points(ELL, hole=False), 0, 0.0))
 
 
 def test_each_fillet_of_a_leaf_has_a_row_and_the_largest_is_the_peak_of_the_window():
@@ -59,7 +59,7 @@ def test_each_fillet_of_a_leaf_has_a_row_and_the_largest_is_the_peak_of_the_wind
 
 
 def test_the_largest_stress_of_a_window_counts_its_ends_where_they_are_no_poses():
-    (arc,) = arcs(Ring.of(ELL, hole=False), 0, 1.0)
+    (arc,) = arcs(Ring.from_points(ELL, hole=False), 0, 1.0)
     one = FilletStress(arc, np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 2.0, 0.0]))
     assert one.largest(0.0, 3.0) == (4.0, 1.0)
     value, place = one.largest(1.5, 3.0)

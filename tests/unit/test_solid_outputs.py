@@ -96,14 +96,14 @@ def test_halves_of_a_part_bear_alike_however_they_are_described(vee):
 
 def test_the_material_around_a_point_tells_its_motion_and_its_turn():
     """A square that is turned by 2 rad about its corner, and moved: every point does the same."""
-    grid = mesh((Ring.of(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), False),), 0.3)
+    grid = mesh((Ring.from_points(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), False),), 0.3)
     elements = Elements(grid, SaintVenantKirchhoff(1.0, 0.3), np.ones(len(grid.triangles)))
     turn = np.array([[np.cos(2.0), -np.sin(2.0)], [np.sin(2.0), np.cos(2.0)]])
     moved = grid.nodes @ (turn - np.eye(2)).T + [0.1, 0.2]
     for place in ((0.37, 0.81), (0.0, 0.5), (1.0, 1.0)):
-        point = MaterialPoint.at(elements, np.array(place))
+        point = MaterialPoint.from_place(elements, np.array(place))
         assert point.motion(moved) == pytest.approx([*((turn - np.eye(2)) @ place + [0.1, 0.2]), 2.0], abs=1e-12)
-    assert MaterialPoint.at(elements, np.array([1.1, 0.5])) is None
+    assert MaterialPoint.from_place(elements, np.array([1.1, 0.5])) is None
 
 
 def test_a_stiffness_across_is_refused_of_a_solid():

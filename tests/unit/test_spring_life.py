@@ -119,7 +119,7 @@ def test_rates_at_joints_follow_from_the_wires_and_each_spring_bears_its_own_cou
     path.write_text(CRANK)
     found = cfmkit.analyze(cfmkit.load(path))
     one, other = Wound("torsion", 0.8e-3, 4.8e-3, 5.0), Wound("torsion", 1e-3, 10e-3, 8.0)
-    springs = found.spec.at("mechanism.springs")
+    springs = found.spec.get_value("mechanism.springs")
     assert springs.pivot == pytest.approx(2 * one.rate, rel=1e-12)
     turned = [found.values[f"{name}_rotation_max"].value for name in ("pivot", "slider_pin")]
     stresses = [wound.stress(wound.rate * turn) for wound, turn in zip((one, other), turned, strict=True)]

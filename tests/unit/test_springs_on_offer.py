@@ -29,7 +29,7 @@ WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}
 
 @pytest.mark.parametrize("kind", ["extension", "compression", "torsion"])
 def test_the_generic_series_written_as_a_list_is_the_same_series(kind):
-    assert offers(tuple(map(CatalogueSpring.of, generic(kind))), kind) == generic(kind)
+    assert offers(tuple(map(CatalogueSpring.from_offer, generic(kind))), kind) == generic(kind)
 
 
 def chosen(catalogue, **changes):

@@ -123,15 +123,15 @@ def cantilever() -> SolvedBeams:
 
 def test_the_upper_edge_of_a_cantilever_that_is_pushed_down_is_stretched(cantilever):
     root = 3 * 2e9 * 0.5e-3 * 1e-5 / 20e-3**2  # 3 E c u / L^2
-    assert cantilever.beside(np.array([[1e-9, 0.5e-3]]), 1e-5) == pytest.approx(root, rel=1e-3)
-    assert cantilever.beside(np.array([[5e-3, -0.5e-3]]), 1e-5) == pytest.approx(-0.75 * root, rel=1e-3)
+    assert cantilever.evaluate_stress(np.array([[1e-9, 0.5e-3]]), 1e-5) == pytest.approx(root, rel=1e-3)
+    assert cantilever.evaluate_stress(np.array([[5e-3, -0.5e-3]]), 1e-5) == pytest.approx(-0.75 * root, rel=1e-3)
     both = np.array([[5e-3, -0.5e-3], [4e-3, -0.5e-3]])  # ends on two sections: the more stressed one counts
-    assert cantilever.beside(both, 1e-5) == pytest.approx(-0.8 * root, rel=1e-3)
+    assert cantilever.evaluate_stress(both, 1e-5) == pytest.approx(-0.8 * root, rel=1e-3)
 
 
 def test_below_a_tenth_of_the_largest_stress_there_is_no_nominal_one(cantilever):
-    assert cantilever.beside(np.array([[17.9e-3, 0.5e-3]]), 1e-5) > 0.0
-    assert math.isnan(cantilever.beside(np.array([[18.1e-3, 0.5e-3]]), 1e-5))
+    assert cantilever.evaluate_stress(np.array([[17.9e-3, 0.5e-3]]), 1e-5) > 0.0
+    assert math.isnan(cantilever.evaluate_stress(np.array([[18.1e-3, 0.5e-3]]), 1e-5))
 
 
 def test_of_two_mirror_images_that_counts_whose_stresses_have_the_signs_of_the_solid(buckled):

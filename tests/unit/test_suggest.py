@@ -514,12 +514,12 @@ def test_designs_in_a_wide_band_aim_at_the_middle_of_its_logarithm():
 
 def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
     began = time.time()
-    times = _Times.of(60.0, RESERVE)
+    times = _Times.from_budget(60.0, RESERVE)
     assert times.with_proposals - began == pytest.approx(60.0 - RESERVE, abs=1.0)
     assert times.without - began == pytest.approx(60.0 - RESERVE_OF_FEW, abs=1.0)
-    short = _Times.of(4.0, RESERVE)
+    short = _Times.from_budget(4.0, RESERVE)
     assert short.without - began == pytest.approx(2.0, abs=1.0)
-    bare = _Times.of(60.0, 0.0)
+    bare = _Times.from_budget(60.0, 0.0)
     assert bare.without - began == pytest.approx(57.0, abs=1.0)
 
 

@@ -122,10 +122,10 @@ def test_of_each_family_as_many_go_to_the_finest_model_as_it_lacks(beams):
     settled = replace(one, pending="", model="solid")
     for proposal in (one, settled, one):
         making._take(job, proposal)
-    assert [again.near for again in making.for_finest(2)] == [one]
-    making._take(making.for_finest(2)[0], replace(one, missed=("force mean 12 N",), pending=""))
-    assert [again.near for again in making.for_finest(2)] == [one]
-    assert making.for_finest(1) == []
+    assert [again.near for again in making.select_for_finest(2)] == [one]
+    making._take(making.select_for_finest(2)[0], replace(one, missed=("force mean 12 N",), pending=""))
+    assert [again.near for again in making.select_for_finest(2)] == [one]
+    assert making.select_for_finest(1) == []
 
 
 def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(beams, monkeypatch):
@@ -169,7 +169,7 @@ def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
     plain = cfmkit.design(candidate.spec).spec
     spec = function_named(candidate.finish)(plain, asked)
     wire = spec.mechanism.springs.wound
-    assert wire.wound("extension").rate == pytest.approx(spec.mechanism.springs.stiffness, rel=1e-9)
+    assert wire.to_wound("extension").rate == pytest.approx(spec.mechanism.springs.stiffness, rel=1e-9)
     assert spec.mechanism.springs.name.startswith("custom, wire")
     result = cfmkit.analyze(spec)
     strength = tensile_strength(wire.wire)
@@ -290,10 +290,10 @@ def test_the_rates_of_springs_scatter_by_five_per_cent(config, paths):
     found = assume_errors(spec)
     assert set(found.rates) <= paths
     assert found.rates
-    for one in Parts.assumed(spec, 0).parameters:
+    for one in Parts.from_assumed_errors(spec, 0).parameters:
         path, (low, high) = one.path, one.spread.ends
         if path in found.rates:
-            assert (low, high) == pytest.approx((0.95 * spec.at(path), 1.05 * spec.at(path)))
+            assert (low, high) == pytest.approx((0.95 * spec.get_value(path), 1.05 * spec.get_value(path)))
 
 
 def test_the_force_of_a_cam_follows_the_scatter_of_its_springs():
@@ -319,7 +319,7 @@ def test_drawn_parts_need_not_have_the_rate_of_their_wire():
     path = "mechanism.springs.stiffness"
     with pytest.raises(SpecError, match="times the rate"):
         stated.replace({path: 1.04 * 1.08 * rate})
-    assert stated.replace({path: 1.04 * 1.08 * rate}, as_made=True).at(path) == pytest.approx(1.04 * 1.08 * rate)
+    assert stated.replace({path: 1.04 * 1.08 * rate}, as_made=True).get_value(path) == pytest.approx(1.04 * 1.08 * rate)
     stated = stated.replace({"requirements": ({"metric": "force_ripple", "max": "50 %", "over": ["20 mm", "200 mm"]},)})
     found = cfmkit.sensitivity(stated, method="tolerance", samples=40, parameters={path: {"uniform": "5 %"}})
     assert found.summary["yield"]["value"] == 1.0

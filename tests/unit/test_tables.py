@@ -53,7 +53,7 @@ def test_a_curve_of_one_branch_that_is_stable_needs_no_columns_of_them():
     short, long = Curve(steps, steps), Curve(steps, steps, np.full(3, "load"), np.ones(3, dtype=bool))
     assert to_csv(curve_table([short])) == to_csv(curve_table([long]))
     assert short.branches == ("load",)
-    assert Curve(steps, steps, "unload", False).on("unload").stable.tolist() == [False] * 3
+    assert Curve(steps, steps, "unload", False).select_branch("unload").stable.tolist() == [False] * 3
 
 
 def test_a_torque_curve_has_angle_and_torque():

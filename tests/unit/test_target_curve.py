@@ -58,15 +58,17 @@ def test_integral_and_slope_are_those_of_the_function(smooth):
     x = np.linspace(-0.5, 4.5, 301)
     x = x[np.abs(x[:, None] - np.array(curve.places)).min(axis=1) > 2e-5]
     h = 1e-5
-    assert np.allclose((curve.integral(x + h) - curve.integral(x - h)) / (2 * h), curve.at(x), atol=1e-9)
+    assert np.allclose((curve.integral(x + h) - curve.integral(x - h)) / (2 * h), curve.evaluate(x), atol=1e-9)
     inside = x[(x > 0) & (x < 4)]
-    assert np.allclose((curve.at(inside + h) - curve.at(inside - h)) / (2 * h), curve.slope(inside), atol=1e-6)
-    assert curve.at(np.array(curve.places)) == pytest.approx(curve.values)
+    assert np.allclose(
+        (curve.evaluate(inside + h) - curve.evaluate(inside - h)) / (2 * h), curve.slope(inside), atol=1e-6
+    )
+    assert curve.evaluate(np.array(curve.places)) == pytest.approx(curve.values)
 
 
 def test_a_smooth_curve_rounds_steps_and_does_not_overshoot():
     curve = ThroughPoints((0.0, 1.0, 1.2, 3.0), (1.0, 1.0, 2.0, 2.0))
-    values = curve.at(np.linspace(0.0, 3.0, 1001))
+    values = curve.evaluate(np.linspace(0.0, 3.0, 1001))
     assert values.min() == 1.0
     assert values.max() == 2.0
     assert (np.diff(values) >= 0).all()
@@ -137,7 +139,7 @@ def test_a_file_says_the_same_as_its_points_and_the_design_no_longer_needs_it(tm
 def test_a_cam_follows_its_curve_to_1e_9(target):
     spec = designed(target)
     result = cfmkit.analyze(spec)
-    wanted = spec.target_curve.at(result.curve.motion)
+    wanted = spec.target_curve.evaluate(result.curve.motion)
     assert np.abs(result.curve.effort - wanted).max() < 1e-9 * wanted.max()
     found = evaluate(result)
     assert found["deviation_from_curve"].value < 1e-9
@@ -168,15 +170,15 @@ def test_a_level_curve_is_the_cam_of_a_constant_force():
 @pytest.mark.parametrize("target", [RISING, STEP_DOWN])
 def test_a_profile_cut_for_friction_is_exact_on_the_way_up(target):
     result = cfmkit.analyze(designed(target, friction=0.002, design="friction: 0.002"))
-    up = result.curve.on("load")
-    wanted = result.spec.target_curve.at(up.motion)
+    up = result.curve.select_branch("load")
+    wanted = result.spec.target_curve.evaluate(up.motion)
     assert np.abs(up.effort / wanted - 1.0)[2:].max() < 1e-9
 
 
 @pytest.mark.parametrize("target", ["{points: [[0 mm, 60 N], [120 mm, 20 N]]}", "{stiffness: 0.2 N/mm, start: 30 N}"])
 def test_a_profile_carries_weights_beside_its_curve(target):
     result = cfmkit.analyze(designed(target, mechanism=MASSES, design="gravity: true"))
-    wanted = result.spec.target_curve.at(result.curve.motion)
+    wanted = result.spec.target_curve.evaluate(result.curve.motion)
     assert np.abs(result.curve.effort - wanted)[2:-2].max() < 1e-9 * wanted.max()
 
 
@@ -297,7 +299,7 @@ def test_a_torque_follows_a_line_over_the_angle():
     said = evaluate(result)["deviation_from_curve"].value
     assert said == pytest.approx(off, rel=0.02)
     for path in ("pivot", "crank_pin", "slider_pin", "slider"):  # no rate beside those of the design comes nearer
-        rate = found.spec.at(f"mechanism.springs.{path}")
+        rate = found.spec.get_value(f"mechanism.springs.{path}")
         for factor in (0.97, 1.03):
             other = cfmkit.analyze(found.spec.replace({f"mechanism.springs.{path}": rate * factor + 1e-9}))
             assert evaluate(other)["deviation_from_curve"].value > said * (1 - 1e-6)

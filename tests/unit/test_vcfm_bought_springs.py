@@ -63,7 +63,7 @@ def test_the_wire_bears_travel_and_preload_together(spec):
     found, springs = cfmkit.analyze(spec), spec.mechanism.springs
     most = 4.888e-3 + 2.0103e-3
     assert found.values["spring_deflection_max"].value == pytest.approx(most, rel=1e-12)
-    wound = springs.wound.wound("compression")
+    wound = springs.wound.to_wound("compression")
     assert found.values["wire_stress_max"].value == pytest.approx(wound.stress(springs.rate * most), rel=1e-12)
     columns = {column.name: column.cells() for column in found.tables["parts"]().columns}
     assert list(zip(columns["source"], columns["count"], strict=True)) == [("make", 1), ("buy", 1)]
@@ -80,7 +80,7 @@ def test_slack_and_overstretched_springs_are_told(spec):
 
 def test_a_compression_spring_gets_no_shorter_than_its_turns_on_each_other(spec):
     springs = spec.mechanism.springs
-    room = springs.free_length - springs.wound.wound("compression").body_length
+    room = springs.free_length - springs.wound.to_wound("compression").body_length
     pressed = cfmkit.analyze(spec.replace({"analysis.preloads": (0.0, 12e-3)}))
     assert pressed.status is Status.PARTIAL
     assert "its turns touch" in pressed.message

@@ -110,7 +110,9 @@ def test_rise_and_preload_say_the_same():
         designed("design={force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: 1.9125560538116592 mm}"),
     )
     sizes = "mechanism.bistable.thickness", "mechanism.bistable.width", "mechanism.positive.width"
-    assert [one.spec.at(path) for path in sizes] == pytest.approx([other.spec.at(path) for path in sizes], rel=1e-9)
+    assert [one.spec.get_value(path) for path in sizes] == pytest.approx(
+        [other.spec.get_value(path) for path in sizes], rel=1e-9
+    )
 
 
 def test_the_sizes_of_a_design_follow_its_targets_without_jumps():
@@ -120,7 +122,7 @@ def test_the_sizes_of_a_design_follow_its_targets_without_jumps():
     for change in range(6):
         preload = 1.9125560538116592 * (1 + 1e-9 * change)
         spec = designed(f"design={{force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: {preload!r} mm}}").spec
-        found.append([spec.at(path) for path in paths])
+        found.append([spec.get_value(path) for path in paths])
     assert np.abs(np.diff(np.log(found), 2, axis=0)).max() < 1e-10
 
 

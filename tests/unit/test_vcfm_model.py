@@ -457,7 +457,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     places = np.sort(np.concatenate([draw.uniform(0, onset, 20), draw.uniform(0, top * rise, 60)]))
     path = trace(leaf_network(spec), Displacement("shuttle", DOWN, places), Control(tolerance=1e-8))
     here = path.at_requested
-    force, stress, _, buckled = found.at(path.drive[here])
+    force, stress, _, buckled = found.evaluate(path.drive[here])
     peak = np.abs(path.effort[path.drive < rise]).max()
     assert force == pytest.approx(path.effort[here], abs=1e-6 * peak)
     assert stress == pytest.approx(beam_stress(path, "leaf")[0][here], rel=1e-3, abs=2e-4 * stress.max())
@@ -530,10 +530,10 @@ def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
     assert leaf.first_stiffness == pytest.approx(bar.first_stiffness, rel=2e-3)
     assert leaf.negative_stiffness == pytest.approx(bar.negative_stiffness, rel=1e-4)
     assert leaf.balance == bar.balance
-    assert not leaf.buckled(travel).any()
+    assert not leaf.is_buckled(travel).any()
     two = stack_laws([leaf, ForceAndStress(replace(LEAF, thickness=2e-3))])
     assert two.force(travel)[1] == pytest.approx(2.0 * leaf.force(travel)[0], rel=1e-12)
-    assert two.state(travel)[1].shape == two.buckled(travel).shape == (2, 9)
+    assert two.state(travel)[1].shape == two.is_buckled(travel).shape == (2, 9)
     assert two.balance[:, 0].tolist() == [bar.balance] * 2
 
 
@@ -661,10 +661,10 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.points": points})
     solution = cfmkit.analyze(spec).state
     low, high = 0.61e-3, 3.33e-3
-    inside = solution.branches["load"].within((np.array([low]), np.array([high]))).inside.values[0]
+    inside = solution.branches["load"].restrict_to_window((np.array([low]), np.array([high]))).inside.values[0]
     wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
     assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
-    assert np.isnan(solution.nominal.reached(np.array([[-1e-3, 1.0]]))).all()
+    assert np.isnan(solution.nominal.evaluate_within_ends(np.array([[-1e-3, 1.0]]))).all()
 
 
 def test_a_bend_that_is_tighter_than_its_leaf_is_thick_is_not_drawn():
@@ -694,7 +694,7 @@ def test_rows_take_windows_that_are_shares_of_the_travel():
     variants = [spec.replace({"mechanism.bistable.width": width}) for width in (6e-3, 7e-3)]
     ((_, found),) = solve_rows(variants)
     low, high = np.array([window_places(spec.analysis.window, (0.0, spec.travel)) for spec in variants]).T
-    mean = metric_of_branches("force_mean", {"load": found.branches["load"].within((low, high))})["load"]
+    mean = metric_of_branches("force_mean", {"load": found.branches["load"].restrict_to_window((low, high))})["load"]
     expected = [evaluate(cfmkit.analyze(one), ["force_mean"])["force_mean"].value for one in variants]
     assert mean.tolist() == pytest.approx(expected, rel=1e-12)
 

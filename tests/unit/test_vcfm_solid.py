@@ -151,7 +151,7 @@ def test_corners_that_no_fillet_fits_are_told_where_the_stress_is_read():
 def test_leaves_with_fillets_of_ten_micrometres_are_meshed():
     """A seam along the face of the shuttle had a point on the edge itself, and the part was refused."""
     leaf = family("vcfm").driven_parts(spec("ding2022", "analysis.fidelity=solid", "mechanism.part.fillet=0.01 mm"))[0]
-    grid = leaf.part.meshed().refined()[0].problem.elements.mesh
+    grid = leaf.part.create_mesh().refine()[0].problem.elements.mesh
     assert grid.area == pytest.approx(sum(ring.area for ring in leaf.part.rings), rel=1e-9)
 
 

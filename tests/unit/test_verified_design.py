@@ -44,7 +44,7 @@ def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
     mean = found.search["verified_solid_before"].quantity.value
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(11.15 / mean)
     for path in ("mechanism.bistable.width", "mechanism.positive.width"):
-        assert found.spec.at(path) == pytest.approx(spec.at(path) * 11.15 / mean, rel=1e-6)
+        assert found.spec.get_value(path) == pytest.approx(spec.get_value(path) * 11.15 / mean, rel=1e-6)
     assert mean / found.search["verified_before"].quantity.value == pytest.approx(1.04, rel=1e-3)  # by its samples
 
 
@@ -89,7 +89,7 @@ def test_under_a_load_the_widths_make_the_solid_as_stiff_as_the_beams_over_the_t
     monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", stiffer)
     found = verify_by_solid(spec, Design(spec, Status.COMPLETE), Run())
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(1 / 1.1, rel=1e-4)
-    assert found.spec.at("mechanism.width") == pytest.approx(0.006 / 1.1, rel=1e-4)
+    assert found.spec.get_value("mechanism.width") == pytest.approx(0.006 / 1.1, rel=1e-4)
     (reported,) = (text for word, text in found.notes if word == "verify")
     assert "which both reach" in reported
 

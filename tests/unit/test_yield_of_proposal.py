@@ -47,7 +47,7 @@ def test_after_a_trim_no_error_of_the_modulus_is_left():
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     mean = cfmkit.analyze(spec).metrics["force_mean"].value
     spec = spec.replace({"mechanism.beam.width": spec.mechanism.beam.width * 1.5 / mean, "requirements": asked})
-    shares = expected_shares(cfmkit.analyze(spec), Parts.assumed(spec, 0), Run())
+    shares = expected_shares(cfmkit.analyze(spec), Parts.from_assumed_errors(spec, 0), Run())
     assert shares.proportional
     assert shares.good.value < shares.measured.value < shares.trimmed.value
     assert shares.trimmed.value > 0.99

@@ -92,7 +92,7 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
         return found
     comparison = compare(found.result, source)
     causes = comparison.causes(found.result)
-    return found.beside(
+    return found.extend(
         comparison.metrics() | comparison.loss() | dict(causes),
         Supplement(
             comparison_data(comparison, source),
@@ -114,7 +114,7 @@ def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> R
     found = work(spec, run)
     compared = compare(found.result, choices, run)
     drawn = {"fidelity": partial(_picture, compared)} if compared.curves else {}
-    return found.beside(
+    return found.extend(
         compared.metrics(),
         Supplement(
             data_of(compared), {}, lines_of(compared), compared.warnings, compared.curves, compared.shortfall, drawn

@@ -45,7 +45,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Document:
         raise UsageError("explore needs a file: it saves new files beside it")
     if options.port > 65535:
         raise UsageError(f"--port: {options.port} is not allowed: must be <= 65535")
-    explorer = Explorer.of(options.spec, options.changes)
+    explorer = Explorer.from_file(options.spec, options.changes)
     try:
         server = ExplorerServer(explorer, options.port, lambda error: report_failure(error, terminal))
     except OSError as error:

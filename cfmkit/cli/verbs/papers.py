@@ -59,7 +59,7 @@ def run(options: PapersOptions, terminal: Terminal) -> Document:
         for done in check(asked, options.everything):
             outcome = {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
             records.append(asdict(done.row) | {"command": done.row.command} | outcome)
-            progress.done(1, 0, False)
+            progress.add_finished(1, 0, False)
     counts = {verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict) for verdict in VERDICTS}
     wrong = [one for one in records if one["trouble"]]
     reported = f"{sum(counts.values())} printed numbers; " + (

@@ -119,7 +119,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
                 place.folder.write(name, content)
         if options.report:
             command = shlex.join(["cfmkit", *terminal.arguments])
-            shown = form.for_page(makers, drawn)
+            shown = form.select_page_figures(makers, drawn)
             study = found.setup.study
             point = run_study_in_folder.command_of_a_point(options, study.design)
             page = html_of_study.page(document_of(found), study.spec, found.setup.paths, kept, command, shown, point)

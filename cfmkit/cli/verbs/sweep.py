@@ -104,7 +104,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
 
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
-            shown = form.for_page(makers, drawn)
+            shown = form.select_page_figures(makers, drawn)
             point = run_study_in_folder.command_of_a_point(options, work.study.design)
             page = html_of_study.page(found, spec, varied, kept, command, shown, point)
             place.folder.write(html_of_study.NAME, page)

@@ -379,7 +379,7 @@ class StepBetween:
         """True if every contact is open and its gap is more than the step can close."""
         if self.part.closed:
             return False
-        mesh, ends = self.part.whole.mesh, self.part.values(*self.at(np.array([[0.0], [1.0]])))
+        mesh, ends = self.part.whole.mesh, self.part.values(*self.interpolate(np.array([[0.0], [1.0]])))
         arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
         reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
         return bool((ends > FAR * self.moved * reach[:, None]).all())
@@ -387,7 +387,7 @@ class StepBetween:
     @cached_property
     def values(self) -> FloatArray:
         """Forces of closed and gaps of open contacts there, (contacts, shares)."""
-        part, values = self.part, self.part.values(*self.at(self.shares[:, None]))
+        part, values = self.part, self.part.values(*self.interpolate(self.shares[:, None]))
         for row in part.slipping_rows:
             values[row] = np.diff(values[row], prepend=values[row, :1])
             grown = abs(self.last.drive - self.first.drive) * part.row_value(self.last, row, self.travel)
@@ -399,7 +399,7 @@ class StepBetween:
         """Sense in which the drive goes."""
         return 1.0 if self.last.drive >= self.first.drive else -1.0
 
-    def at(self, share: Any) -> tuple[FloatArray, Any]:
+    def interpolate(self, share: Any) -> tuple[FloatArray, Any]:
         """Return the unknowns (n,) and the drive at a share of the step, or (m, n) and (m,) at m of them, (m, 1)."""
         drive = self.first.drive + share * (self.last.drive - self.first.drive)
         if self._is_smooth:
@@ -411,7 +411,7 @@ class StepBetween:
 
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
-        x, drive = self.at(share)
+        x, drive = self.interpolate(share)
         at = correct(self.part.own, x[self.part.own_mask], float(drive))
         if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
             return None

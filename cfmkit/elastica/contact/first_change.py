@@ -105,7 +105,7 @@ def _locate(piece: PieceOfPath, step: StepBetween, row: int) -> ContactChange | 
     share = step.crossing(row)
     if share is None:
         return None
-    guess, drive = step.at(share)
+    guess, drive = step.interpolate(share)
     kind: Literal["begins", "ends"] = "ends" if row in piece.closed else "begins"
     both = piece.with_closed(piece.closed | {row})
     x = guess[both.own_mask]

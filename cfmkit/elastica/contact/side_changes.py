@@ -94,7 +94,7 @@ def _locate_touch(
     share = step.crossing(row)
     if share is None:
         return None
-    x, drive = step.at(share)
+    x, drive = step.interpolate(share)
     guess = step.first._replace(x=x, drive=float(drive))
     if _is_parallel(piece, condition, guess):
         return PathStop(WhyStopped.LOST, guess.drive, MEETS_WHOLE.format(names=describe(condition.item)))

@@ -115,7 +115,11 @@ class SideConditions:
         beam, fitted = network.beams[item.beam], mesh.fits[item.beam]
         name, joint = (beam.end, beam.end_joint) if last else (beam.start, beam.start_joint)
         support = network.nodes[name].support
-        if network.moved(name) or joint != "rigid" or not (support.along and support.across and support.rotation):
+        if (
+            network.is_moved_by_link(name)
+            or joint != "rigid"
+            or not (support.along and support.across and support.rotation)
+        ):
             return False
         marks = smooth_marks(beam, fitted)
         inside = 0.5 * (marks[-2] + marks[-1] if last else marks[0] + marks[1])

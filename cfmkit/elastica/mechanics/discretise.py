@@ -210,7 +210,7 @@ class _ArrayBuilder:
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
         self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
-        self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
+        self.bodies = {name: self._body() for name in network.nodes if not network.is_moved_by_link(name)}
         self.driven = find_driven_node(network, drive)
         along = self.driven is not None and self.driven[1] == FRAME_OF_DRIVE
         self.turned = {drive.node: drive.direction} if along else {}  # type: ignore[union-attr]
@@ -227,7 +227,7 @@ class _ArrayBuilder:
             touched.setdefault(self.network.contacts[flank.number].beam, []).append(flank.parameter)  # type: ignore[union-attr]
         laws = {name: find_moving_cuts(beams[name], self.fits[name], places) for name, places in touched.items()}
         cuts = given_cuts or {
-            name: laws[name].at(touched[name]) if name in laws else self._cuts(name, beam)
+            name: laws[name].evaluate(touched[name]) if name in laws else self._cuts(name, beam)
             for name, beam in beams.items()
         }
         tables = element_tables(self.fits, self.scales, self.degree, cuts)

@@ -47,7 +47,7 @@ class CutLaw(NamedTuple):
     fixed: FloatArray  # (cuts,)
     shares: FloatArray  # (cuts, places)
 
-    def at(self, places: Sequence[float]) -> list[float]:
+    def evaluate(self, places: Sequence[float]) -> list[float]:
         """Return the cuts with the contacts at some places."""
         return (self.fixed + self.shares @ np.array(places)).tolist()  # type: ignore[no-any-return]
 

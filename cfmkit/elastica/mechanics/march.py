@@ -232,9 +232,9 @@ class CompiledEquations(NumpyEquations):
         given_states = zip(rows[:, :n], way, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True)
         states = tuple(itertools.starmap(MarchState, given_states))
         march = NaturalMarch(states, MarchCode(code), float(given[0]))
-        return self._counted(march, start.unstable) if self.follows else march
+        return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
-    def _counted(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
+    def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
         """Return a march with its unstable directions counted, as far as their number stays the same."""
         states: list[MarchState] = []
         for state in march.states:

@@ -196,7 +196,7 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
         return fitted
     breaks = np.real(fitted.course.breaks)
     if np.iscomplexobj(fitted.course.breaks):
-        fitted = replace(fitted, course=fitted.course.over(breaks, fitted.course.breaks))
+        fitted = replace(fitted, course=fitted.course.reparametrize(breaks, fitted.course.breaks))
     stations = beam.section.stations[1:-1]
     if not len(stations) or (fitted.course.uniform and not np.iscomplexobj(thickness.stations)):  # type: ignore[union-attr]
         return fitted
@@ -215,7 +215,7 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
                 f"a corner of the beam {beam.start}-{beam.end} and a step of its thickness move past each other: "
                 "no derivative there"
             )
-    return replace(fitted, course=fitted.course.over(marks, marks + 1j * steps))
+    return replace(fitted, course=fitted.course.reparametrize(marks, marks + 1j * steps))
 
 
 def _has_corner(course: FittedShape, t: float) -> bool:

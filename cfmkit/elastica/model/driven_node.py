@@ -28,8 +28,8 @@ def find_driven_node(network: Network, drive: Drive) -> tuple[str, int, float] |
     """
     if isinstance(drive, Loading):
         return None
-    if drive.node not in network.nodes or network.moved(drive.node):
-        known = ", ".join(name for name in network.nodes if not network.moved(name))
+    if drive.node not in network.nodes or network.is_moved_by_link(drive.node):
+        known = ", ".join(name for name in network.nodes if not network.is_moved_by_link(name))
         raise InputError(f"{drive.node!r} cannot be driven: nodes that are not moved by a link are {known}")
     support = network.nodes[drive.node].support
     if isinstance(drive, Rotation):

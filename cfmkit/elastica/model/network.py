@@ -183,11 +183,11 @@ class Network(ShortRepr):
             raise InputError("a network needs at least one beam")
         for name, beam in beams.items():
             if beam.start not in nodes or beam.end not in nodes:
-                self._known(beam.start, f"beam {name!r}")
-                self._known(beam.end, f"beam {name!r}")
+                self._require_node(beam.start, f"beam {name!r}")
+                self._require_node(beam.end, f"beam {name!r}")
         for spring in self.springs:
             for end in _ends(spring):
-                self._known(end, "a spring")
+                self._require_node(end, "a spring")
         for load in self.loads:
             self.check_load(load)
         for contact in self.contacts:
@@ -195,7 +195,7 @@ class Network(ShortRepr):
                 if contact.beam not in beams:
                     raise InputError(f"contact {contact.name!r} is of the beam {contact.beam!r}, which is not there")
                 continue
-            self._known(contact.node, f"contact {contact.name!r}")
+            self._require_node(contact.node, f"contact {contact.name!r}")
         if self.links:
             self._check_links()
 
@@ -206,7 +206,7 @@ class Network(ShortRepr):
     def check_load(self, load: LoadOn) -> None:
         """Raise an error if what the load acts on is not there."""
         if isinstance(load, PointLoad):
-            self._known(load.node, "a load")
+            self._require_node(load.node, "a load")
         elif load.beam not in self.beams:
             raise InputError(f"a line load acts on {load.beam!r}, which is not a beam; beams: {', '.join(self.beams)}")
 
@@ -217,7 +217,7 @@ class Network(ShortRepr):
                 return self.master_of(link.master)
         return node
 
-    def moved(self, node: str) -> bool:
+    def is_moved_by_link(self, node: str) -> bool:
         """Return True if a link moves a node."""
         return any(link.node == node for link in self.links)
 
@@ -228,15 +228,15 @@ class Network(ShortRepr):
                 return self.body_of(link.master)
         return node
 
-    def _known(self, node: str, what: str) -> None:
+    def _require_node(self, node: str, what: str) -> None:
         if node not in self.nodes:
             raise InputError(f"{what} refers to {node!r}, which is not a node; nodes: {', '.join(self.nodes)}")
 
     def _check_links(self) -> None:
         moved = [link.node for link in self.links]
         for link in self.links:
-            self._known(link.master, "a link")
-            self._known(link.node, "a link")
+            self._require_node(link.master, "a link")
+            self._require_node(link.node, "a link")
             seen = {link.node}
             at = link.master
             while at in moved:

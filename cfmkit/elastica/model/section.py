@@ -50,7 +50,7 @@ class Taper:
         if not (self.values.real > 0).all():
             raise InputError("every thickness of a taper must be positive")
 
-    def at(self, place: Any, inside: float) -> Any:
+    def interpolate(self, place: Any, inside: float) -> Any:
         """Return the thickness at places of the linear piece that holds the place `inside`."""
         i = int(np.clip(np.searchsorted(self.stations.real, inside, side="right") - 1, 0, len(self.stations) - 2))
         left, right = self.stations[i], self.stations[i + 1]
@@ -109,7 +109,7 @@ class Section:
     def thickness_at(self, place: Any, inside: float) -> Any:
         """Return the thickness [m] at places on the piece that holds `inside` (fractions of the arc length)."""
         if isinstance(self.thickness, Taper):
-            return self.thickness.at(place, inside)
+            return self.thickness.interpolate(place, inside)
         return self.thickness + 0.0 * place
 
     def rigidities(self, place: Any, inside: float) -> tuple[Any, Any, Any]:

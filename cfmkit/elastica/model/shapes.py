@@ -36,7 +36,7 @@ class FittedShape:
     breaks: Any
     uniform: bool  # whether t is the fraction of the arc length
 
-    def over(self, marks: FloatArray, moved: Any) -> FittedShape:
+    def reparametrize(self, marks: FloatArray, moved: Any) -> FittedShape:
         """Return the course over another parameter, of which this one is a piecewise-linear function.
 
         Parameters

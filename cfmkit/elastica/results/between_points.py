@@ -182,7 +182,7 @@ class BetweenPoints(ShortRepr):
         at_points = self.path.beam_stresses(self.axial)[0][:, self._order]
         at_corners = np.empty((0, len(at_points)))
         if corners:
-            there = self.at(self.corners)
+            there = self.solve_at(self.corners)
             at_corners = there.beam_stresses(self.axial)[0].T
         found = []
         for number in range(len(corners) + 1):
@@ -196,7 +196,7 @@ class BetweenPoints(ShortRepr):
 
     def _solved_stress(self, stretch: SmoothStretch, t: FloatArray) -> tuple[FloatArray, Any]:
         """Return the stress of each beam where the smooth variable has some values, and where it was solved."""
-        there = self.at(self._scale * stretch.drive(t))
+        there = self.solve_at(self._scale * stretch.drive(t))
         return there.beam_stresses(self.axial)[0], there.accurate
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
@@ -204,7 +204,7 @@ class BetweenPoints(ShortRepr):
         flat = np.ravel(places)
         solved = self._solved.get(flat.tobytes())
         if solved is None:
-            there = self.at(flat)
+            there = self.solve_at(flat)
             effort = self._effort_on(there)
             solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self.own_points, self.point_efforts))
             self._solved[flat.tobytes()] = solved
@@ -241,7 +241,7 @@ class BetweenPoints(ShortRepr):
         if len(self.corners):
             return None
         ends = np.array([low, high])
-        there = self.at(ends)
+        there = self.solve_at(ends)
         solved = there.beam_stresses(self.axial)[0].max(axis=0)
         if not there.accurate.all():
             solved = np.where(there.accurate, solved, self.stress(branch, ends))
@@ -259,7 +259,7 @@ class BetweenPoints(ShortRepr):
         """Return the stress of each beam at dimensionless places of a path without corners, and where it was solved."""
         return self._solved_stress(SmoothStretch(None, None), drive)
 
-    def at(self, places: FloatArray) -> EquilibriumPath:
+    def solve_at(self, places: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
         drive = self.own_drive
         wanted = np.clip(places / self._scale, drive[0], drive[-1])

@@ -94,7 +94,7 @@ class AlongTheWay:
         flat = np.ravel(ways)
         known = self._known.get(flat.tobytes())
         if known is None:
-            there = self.at(flat)
+            there = self.solve_at(flat)
             seen, points = self.observe(there), np.arange(float(len(self.path)))
             rows = zip((seen.motion, seen.effort), self._states_at_points, strict=True)
             known = [np.where(there.accurate, new, np.interp(flat, points, own)) for new, own in rows]
@@ -112,11 +112,11 @@ class AlongTheWay:
         flat, own = np.ravel(ways), self._seen.stress
         stress = np.interp(flat, np.arange(float(len(self.path))), own)
         between = np.flatnonzero(flat % 1.0)
-        there = self.at(flat[between])
+        there = self.solve_at(flat[between])
         stress[between] = np.where(there.accurate, self.observe(there).stress, stress[between])
         return np.asarray(stress.reshape(np.shape(ways)))
 
-    def at(self, ways: FloatArray) -> EquilibriumPath:
+    def solve_at(self, ways: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places of the way (n,); `accurate` is False where none was found."""
         path, known_y, known_drive = self.path, self.path.free, self.path.at.drive
         own = equations(path.mesh)

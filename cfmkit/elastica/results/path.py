@@ -138,7 +138,7 @@ class EquilibriumPath(ShortRepr):
             at_contact=self.changes_contact[points],
         )
 
-    def joined(self, other: EquilibriumPath) -> EquilibriumPath:
+    def append(self, other: EquilibriumPath) -> EquilibriumPath:
         """Return the points of this path, then those of another of the same network, as one."""
         return replace(
             self,
@@ -283,7 +283,7 @@ class EquilibriumPath(ShortRepr):
         """
         if node not in self.network.nodes:
             raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.network.nodes)}")
-        if self.network.moved(node):
+        if self.network.is_moved_by_link(node):
             master = self.network.master_of(node)
             raise InputError(f"node {node!r} is moved by a link: what is held is its master, {master!r}")
         return read_only(node_reaction(self.at, node, self.residual))

@@ -67,22 +67,22 @@ class PathsOfDesigns:
         """Points of each path, (d,)."""
         return np.array([len(law.path) for law in self.laws])
 
-    def _padded(self, columns: Sequence[FloatArray]) -> FloatArray:
+    def _pad(self, columns: Sequence[FloatArray]) -> FloatArray:
         """Return the points of every path in the order of increasing drives, (d, n, ...); the last is repeated."""
         most = int(self._counts.max())
         return np.array([column[np.minimum(np.arange(most), len(column) - 1)] for column in columns])
 
     @cached_property
     def _drive(self) -> FloatArray:
-        return self._padded([law.own_drive for law in self.laws])
+        return self._pad([law.own_drive for law in self.laws])
 
     @cached_property
     def _unknowns(self) -> FloatArray:
-        return self._padded([law.own_unknowns for law in self.laws])
+        return self._pad([law.own_unknowns for law in self.laws])
 
     @cached_property
     def _efforts(self) -> FloatArray:
-        return self._padded([law.point_efforts for law in self.laws])
+        return self._pad([law.point_efforts for law in self.laws])
 
     @cached_property
     def _scale(self) -> FloatArray:
@@ -96,9 +96,9 @@ class PathsOfDesigns:
     def effort(self, places: FloatArray, rows: Rows | None = None) -> FloatArray:
         """Return the efforts of some designs at places of each, (k, m) [N or N m]."""
         chosen = np.arange(len(self.laws)) if rows is None else np.asarray(rows)
-        return self._solved(chosen, places / self._scale[chosen, None])[2]
+        return self._solve(chosen, places / self._scale[chosen, None])[2]
 
-    def _solved(self, rows: Rows, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+    def _solve(self, rows: Rows, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
         """Return unknowns (k, m, n), whether they are equilibria, and efforts, at dimensionless places (k, m)."""
         drive, every = self._drive[rows], rows[:, None]
         wanted = np.clip(wanted, drive[:, :1], drive[:, -1:])
@@ -152,12 +152,12 @@ class PathsOfDesigns:
         """Return the largest stress of each design between two places, (d,) each [Pa]."""
         ends = np.stack([low, high], axis=1) / self._scale[:, None]
         every = range(len(self.laws))
-        free, found, _ = self._solved(np.arange(len(self.laws)), ends)
+        free, found, _ = self._solve(np.arange(len(self.laws)), ends)
         chosen = [few_points(self._own(k), *ends[k]) for k in every]
-        known = self._at_points(chosen)
+        known = self._evaluate_stresses(chosen)
         more = [near_largest(self._own(k), few, known[k], *ends[k]) for k, few in enumerate(chosen)]
-        dense = self._at_points(more)
-        both = [self._joined(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
+        dense = self._evaluate_stresses(more)
+        both = [self._merge_points(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
         at_ends = self._stresses(np.repeat(every, 2), free.reshape(2 * len(every), -1), ends.ravel())
         stress_at_ends = at_ends.max(axis=0).reshape(-1, 2)
         for k, m in np.argwhere(~found).tolist():
@@ -178,7 +178,7 @@ class PathsOfDesigns:
         padded = np.zeros(here.shape)
         padded[here] = np.concatenate(places)
         padded = np.where(here, padded, self._drive[list(rows), :1])  # which is known
-        free, found, _ = self._solved(np.array(rows), padded)
+        free, found, _ = self._solve(np.array(rows), padded)
         stresses = self._stresses(np.repeat(rows, count), free[here], padded[here])
         ends = np.cumsum(count)[:-1]
         return list(zip(np.split(stresses, ends, axis=1), np.split(found[here], ends), strict=True))
@@ -186,7 +186,7 @@ class PathsOfDesigns:
     def _own(self, number: int) -> FloatArray:
         return np.asarray(self._drive[number, : self._counts[number]])
 
-    def _at_points(self, points: Sequence[Rows]) -> list[FloatArray]:
+    def _evaluate_stresses(self, points: Sequence[Rows]) -> list[FloatArray]:
         """Return the stress of each beam at points of every path, (b, m) each [Pa]."""
         rows, chosen = np.repeat(np.arange(len(points)), [len(own) for own in points]), np.concatenate(points)
         if not len(chosen):
@@ -195,7 +195,7 @@ class PathsOfDesigns:
         return np.split(found, np.cumsum([len(own) for own in points])[:-1], axis=1)
 
     @staticmethod
-    def _joined(few: Rows, known: FloatArray, more: Rows, dense: FloatArray) -> tuple[Rows, FloatArray]:
+    def _merge_points(few: Rows, known: FloatArray, more: Rows, dense: FloatArray) -> tuple[Rows, FloatArray]:
         points = np.concatenate([few, more])
         order = np.argsort(points, kind="stable")
         return points[order], np.concatenate([known, dense] if len(more) else [known], axis=1)[:, order]

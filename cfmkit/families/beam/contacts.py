@@ -227,7 +227,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
     shares = 0.5 * (1 - np.cos(np.pi * np.arange(N_MEAN) / (N_MEAN - 1)))
     total = 0.0
     for begin, end in itertools.pairwise(marks):
-        force = named_force(law.at(begin + (end - begin) * shares), name)
+        force = named_force(law.solve_at(begin + (end - begin) * shares), name)
         total += (end - begin) * float(weights @ force)
     return total / (high - low)
 

@@ -158,7 +158,7 @@ class AlongMotion:
         """Displacement at which the force first reaches 0.95 of that at the end [m]."""
         if not abs(self.nominal) > (self.solution.effort_error or 0.0):  # else 95 % of it are rounding
             return np.nan
-        place = self._settled(lambda x, force: crossing(x, force / self.nominal, 1 - BAND))
+        place = self._refine(lambda x, force: crossing(x, force / self.nominal, 1 - BAND))
         return place if place is not None and place <= self.end and self.end > 0 else np.nan
 
     @cached_property
@@ -166,7 +166,7 @@ class AlongMotion:
         """Smallest place from which on the force stays within 5 % of its maximum [m]."""
         if np.isnan(self.start) or self.nominal <= 0:  # no band lies around the force there
             return np.nan
-        return self._settled(lambda x, force: find_strict_start(x, force, self.end)) or 0.0
+        return self._refine(lambda x, force: find_strict_start(x, force, self.end)) or 0.0
 
     def fraction(self, start: float) -> float:
         """Return the range that begins at a place, as a share of the travel."""
@@ -193,7 +193,7 @@ class AlongMotion:
         reached = [crossing(self.motion, value, allowable) for value, _ in self.solution.stresses.values()]
         return min((place for place in reached if place is not None), default=np.nan)
 
-    def _settled(self, find: Callable[[FloatArray, FloatArray], float | None]) -> float | None:
+    def _refine(self, find: Callable[[FloatArray, FloatArray], float | None]) -> float | None:
         """Return a place that cubics tell, put right by the equilibrium solved there, if the model can do so."""
         x, force = self.knots
         place = find(x, force)

@@ -77,7 +77,7 @@ def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
     wanted : Rescale
         What is to change.
     """
-    wanted = wanted.model_copy(update={"free": wanted.adapted(sheet_of(spec.mechanism.part))})
+    wanted = wanted.model_copy(update={"free": wanted.choose_dimension(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
     found = _validity(spec, wanted)
     for _ in range(ROUNDS):

@@ -100,7 +100,7 @@ def both_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[s
     """Return beams by name, those of a mirrored half with a prime."""
     if (axis := mirror_axis(assembly)) is None:
         return beams
-    return {**beams, **{f"{name}'": [strip.mirrored(*axis) for strip in found] for name, found in beams.items()}}
+    return {**beams, **{f"{name}'": [strip.mirror(*axis) for strip in found] for name, found in beams.items()}}
 
 
 def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float) -> DrawnParts:
@@ -163,7 +163,7 @@ def _close_ends(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
     away = [float(np.hypot(*(end.at - ends[0].at))) for end in ends]
     if max(away) > STANDS * ends[0].thickness:
         near = [end.cap for end, apart in zip(ends, away, strict=True) if apart < end.thickness]
-        yield from OutlinePiece.around(np.concatenate(near)) if len(near) > 1 else ()
+        yield from OutlinePiece.from_convex_hull(np.concatenate(near)) if len(near) > 1 else ()
         return
     ordered = sorted(ends, key=lambda end: end.angle % math.tau)
     for one, other in zip(ordered, [*ordered[1:], ordered[0]], strict=True):

@@ -35,7 +35,7 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
     beams, nodes = _name_polygons(assembly)
     rows = []
     for one in stressed_fillets(solved, spec.mechanism.fillet):
-        joined = one.arc.touched(beams)
+        joined = one.arc.find_touched(beams)
         node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
         if (found := one.largest(*window)) is not None:
             rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))

@@ -65,10 +65,10 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a result of the beam family, by file stem; empty if nothing was solved."""
     if result.state is None or not result.curves:
         return {}
-    if result.spec.at("analysis.fidelity") == "solid":
+    if result.spec.get_value("analysis.fidelity") == "solid":
         return {maker.__name__: partial(maker, result) for maker in (curve, stress_map)}
     makers = [curve, shapes, reactions, stress]
-    if result.spec.at("analysis.surface") is not None and len(result.curves) > 1:
+    if result.spec.get_value("analysis.surface") is not None and len(result.curves) > 1:
         makers.append(surface)
     if any(name.startswith("frequency_") for name in result.curve.extra):
         makers.append(frequencies)
@@ -117,7 +117,7 @@ def shapes(result: Result) -> Figure:
     box = _box([*made, *shown, *(PosedBody.line("spring", "free", line, 0.0) for line in springs)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
-    heading = Heading.of(result, "shapes to scale, as cut and during the travel")
+    heading = Heading.from_result(result, "shapes to scale, as cut and during the travel")
     figure = new_figure(160.0, height * scale + 16.0 + KEY_MM + heading.height_mm)
     write_heading(figure, heading)
     room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)
@@ -284,7 +284,7 @@ def reactions(result: Result) -> Figure:
     size = max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
     along, across = ({name: vanishing(row, size) for name, row in rows.items()} for rows in (along, across))
     one = ", one copy" if solution.assembly.parallel > 1 else ""
-    heading = Heading.of(result, f"force of each beam on its last node{one}{_left_out(forces)}")
+    heading = Heading.from_result(result, f"force of each beam on its last node{one}{_left_out(forces)}")
     diagrams = [
         Diagram(solution.motion, _motion(result), Scale(names[0], "force"), _series(along)),
         Diagram(solution.motion, _motion(result), Scale(names[1], "force"), _series(across)),
@@ -329,7 +329,7 @@ def stress(result: Result) -> Figure:
     part = "bending and axial" if solution.spec.stress == "total" else "bending"
     diagram = Diagram(solution.motion, _motion(result), Scale("largest stress", "stress"), series, limits)
     return diagram_figure(
-        Heading.of(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}"), [diagram]
+        Heading.from_result(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}"), [diagram]
     )
 
 
@@ -344,7 +344,7 @@ def frequencies(result: Result) -> Figure:
                 prefer = (0.3 if dashed else 0.7) - 0.1 * (number % 2)
                 series.append(Series(values, f"{number + 1} {name}", LINES[number % len(LINES)], dashed, prefer))
     most = f"; the lowest {MOST_MODES}" if solution.spec.analysis.modes > MOST_MODES else ""
-    heading = Heading.of(result, f"natural frequencies about each pose, drive held and free{most}")
+    heading = Heading.from_result(result, f"natural frequencies about each pose, drive held and free{most}")
     values = np.concatenate([one.values[np.isfinite(one.values)] for one in series] or [np.ones(1)])
     wide = bool(values.min() > 0 and values.max() > WIDE * values.min())
     scale = Scale("frequency", "frequency", zero=not wide, log=wide)
@@ -365,12 +365,12 @@ def surface(result: Result) -> Figure:
         Diagram(found.place, way, Scale("height", "length"), [Series(found.height, "surface", GREY)]),
         Diagram(found.place, way, Scale("tip force", "force", zero=False), [Series(found.force, "", LINES[0])], limits),
     ]
-    return diagram_figure(Heading.of(result, "contact force along the surface"), diagrams)
+    return diagram_figure(Heading.from_result(result, "contact force along the surface"), diagrams)
 
 
 def moving(result: Result) -> Moving | None:
     """Return the mechanism as it bends, above a shade of it as cut, for a film; None of a part solved as a solid."""
-    if result.spec.at("analysis.fidelity") == "solid":
+    if result.spec.get_value("analysis.fidelity") == "solid":
         return None
     solution: Solution = result.state
     points = choose_poses(len(solution.keep))

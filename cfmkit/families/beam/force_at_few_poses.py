@@ -75,7 +75,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     copies = spec.mechanism.copies
     if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
         return None
-    known = [path for path in paths if _SMOOTH.fullmatch(path) and isinstance(spec.at(path), float)]
+    known = [path for path in paths if _SMOOTH.fullmatch(path) and isinstance(spec.get_value(path), float)]
     found = _follow_path(spec, places)
     if found is None or not known:
         return None
@@ -85,7 +85,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
         return assemble(_replace_values(spec, dict(zip(known, x, strict=True)))).network
 
     try:
-        slopes = gradient(path, build, np.array([spec.at(one) for one in known]), at)
+        slopes = gradient(path, build, np.array([spec.get_value(one) for one in known]), at)
         axial = spec.stress == "total"
         stress, by_stress = [], []
         for name in path.network.beams:

@@ -59,7 +59,7 @@ def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: t
     if law is not None:
         order = np.argsort(reached)
         x, rows = reached[order], rows[:, order]
-        wanted, ask = np.array([*np.clip(window, x[0], x[-1]), *law.corners]), law.at
+        wanted, ask = np.array([*np.clip(window, x[0], x[-1]), *law.corners]), law.solve_at
     elif winding is not None:
         x, wanted, ask = winding.arc, _arcs(winding, places_inside(winding, *window)), partial(_solve_lengths, winding)
     else:
@@ -97,7 +97,7 @@ def _ways(winding: AlongTheWay, arcs: FloatArray) -> FloatArray:
 
 def _solve_lengths(winding: AlongTheWay, arcs: FloatArray) -> Path:
     """Return the equilibria after some lengths of the way."""
-    return winding.at(_ways(winding, arcs))
+    return winding.solve_at(_ways(winding, arcs))
 
 
 def _find_in_window(motion: FloatArray, window: tuple[float, float]) -> FloatArray:

@@ -54,9 +54,9 @@ class SolidNodes:
         if any(is_on_axis(self.assembly, other) for other in others):
             return lambda travel: np.full((len(travel), 3), np.nan)
         load = constant_load(self.assembly, name)
-        return lambda travel: -np.sum([self._about(name, other, travel) for other in others], axis=0) - load
+        return lambda travel: -np.sum([self._transfer_reaction(name, other, travel) for other in others], axis=0) - load
 
-    def _about(self, name: str, other: str, travel: FloatArray) -> FloatArray:
+    def _transfer_reaction(self, name: str, other: str, travel: FloatArray) -> FloatArray:
         """Return the reaction at another node with its moment about this one, (n, 3)."""
         found = self.reaction(other)(travel) + constant_load(self.assembly, other)
         here, there = ((self._place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, other))

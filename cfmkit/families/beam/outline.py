@@ -52,7 +52,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     part, fillet = spec.mechanism.cut_part, drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
     contours = merge_pieces(pieces, fine / FINE, fillet, solid.holes)
-    thinnest, holes = fine / FINE, [area for hole in solid.holes for area in hole.covered(fine / FINE)]
+    thinnest, holes = fine / FINE, [area for hole in solid.holes for area in hole.to_polygons(fine / FINE)]
     sections = check_outline(contours, tuple(_specified_pieces(beams, pieces, thinnest)), thinnest, fillet, holes)
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
@@ -85,7 +85,7 @@ def _specified_pieces(
     strips_of = [(name, strip) for name, found in beams.items() for strip in found]
     for number, piece in enumerate(pieces):
         own = (strips_of[number][1].section(strips_of[number][0]),) if number < len(strips_of) else ()
-        yield SpecifiedPiece(piece.covered(size), own)
+        yield SpecifiedPiece(piece.to_polygons(size), own)
 
 
 def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:

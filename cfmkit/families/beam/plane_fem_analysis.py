@@ -233,7 +233,7 @@ def _solve_part(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
     if driven_by_load(spec):
         spec = moved_far_enough(spec, part_of, run.progress)
     assembly = assemble(spec)
-    return assembly, driven_part(spec, assembly).solved(run.progress)
+    return assembly, driven_part(spec, assembly).solve(run.progress)
 
 
 def _solve_moved_part(assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:

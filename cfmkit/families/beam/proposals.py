@@ -102,7 +102,7 @@ def _follow_shape(name: str) -> Kept:
     part = part_over_motion(result)
     assert part is not None
     curve = result.curve
-    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, BoundingBox.around(part))
+    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, BoundingBox.from_part(part))
 
 
 def _in_two_layers(kept: Kept) -> Kept:

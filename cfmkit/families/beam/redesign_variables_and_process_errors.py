@@ -33,10 +33,10 @@ def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
         return {}
     if design.optimise is not None:
         return dict(_of_shapes(design.optimise, designed))
-    name = None if design.rescale is None else design.rescale.adapted(sheet_of(designed.mechanism.part))
+    name = None if design.rescale is None else design.rescale.choose_dimension(sheet_of(designed.mechanism.part))
     if name is None or name == "size":
         return {}
-    values = {path: designed.at(path) for path in _stated_paths(designed.mechanism, name)}
+    values = {path: designed.get_value(path) for path in _stated_paths(designed.mechanism, name)}
     return {path: range_about(value) for path, value in values.items() if isinstance(value, float)}
 
 
@@ -69,7 +69,9 @@ def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tupl
 def errors(spec: BeamSpec) -> dict[str, str]:
     """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
     found = {
-        path: "thickness" for path in _stated_paths(spec.mechanism, "thickness") if isinstance(spec.at(path), float)
+        path: "thickness"
+        for path in _stated_paths(spec.mechanism, "thickness")
+        if isinstance(spec.get_value(path), float)
     }
     for name, node in spec.mechanism.nodes.items():
         if node.support == "free":

@@ -182,7 +182,9 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
         return False
     for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
         if window[0] <= place <= window[1]:
-            far, near, later, farther = np.abs(observe(law.at(place + BESIDE * float(np.ptp(solution.motion))))[0])
+            far, near, later, farther = np.abs(
+                observe(law.solve_at(place + BESIDE * float(np.ptp(solution.motion))))[0]
+            )
             if near > 5.0 * far or later > 5.0 * farther:
                 return True
     return False

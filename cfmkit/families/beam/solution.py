@@ -142,7 +142,7 @@ class Solution(ShortRepr):
 
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
         assert self.everywhere is not None
-        there = self.everywhere.at(places)
+        there = self.everywhere.solve_at(places)
         alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
         return np.where(there.accurate, alone.largest_member_efforts, np.nan)
 

@@ -38,7 +38,7 @@ class FileProfile(Model):
 
     @field_validator("file", mode="wrap")
     @classmethod
-    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
+    def _resolve_file(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
         folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
         return DataSource(handler(value), folder)
 
@@ -104,7 +104,7 @@ class Rescale(Model):
             raise ValueError(f"{self.free!r} is given and cannot follow from the force: change 'free'")
         return self
 
-    def adapted(self, sheet: float | None) -> Literal["width", "thickness", "size"]:
+    def choose_dimension(self, sheet: float | None) -> Literal["width", "thickness", "size"]:
         """Return the value that is adapted: the width of what is cut from a sheet [m] stays."""
         return "thickness" if sheet is not None and self.free == "width" else self.free
 

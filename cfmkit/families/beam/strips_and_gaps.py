@@ -89,7 +89,7 @@ class BeamStrip:
             return OutlinePiece.polygon(np.array([right[0], right[-1], left[-1], left[0]]))
         return OutlinePiece(self.edges, tuple(self.polygons))
 
-    def mirrored(self, at: complex, direction: float) -> BeamStrip:
+    def mirror(self, at: complex, direction: float) -> BeamStrip:
         """Return its mirror image about the line through a point [m] along a direction [rad]."""
         points, angle = mirror_points(self.points, at, direction), 2.0 * direction - self.angle
         return replace(self, points=points, angle=angle, curvature=-self.curvature)

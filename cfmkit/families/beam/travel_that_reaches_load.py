@@ -71,7 +71,7 @@ def moved_far_enough(
     moved = moved_by(spec, guess)
     found = part(moved, assemble(moved))
     travel = travel_for(
-        found.meshed(),
+        found.create_mesh(),
         load_of_one(spec),
         guess,
         max(spec.analysis.solid.poses, 5),

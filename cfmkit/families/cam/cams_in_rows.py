@@ -234,7 +234,7 @@ def _columns(cams: tuple[Assembly, ...], variants: Variants, chosen: Rows) -> As
     varied = {path: values[chosen] for path, values in variants.values.items() if values.dtype != object}
     numbers = [path for path, values in varied.items() if (values != values[0]).any()]
     columns = {path: variants.values[path][chosen].astype(np.float64)[:, None] for path in numbers}
-    columns |= {path: stack([one.spec.at(path) for one in cams]) for path in _WRITTEN_OUT}
+    columns |= {path: stack([one.spec.get_value(path) for one in cams]) for path in _WRITTEN_OUT}
     track, profile = TrackRows([one.track for one in cams]), profiles_in_rows([one.profile for one in cams])
     loads = stack([one.loads for one in cams])
     return replace(first, spec=with_values(first.spec, columns), profile=profile, track=track, loads=loads)

@@ -307,7 +307,7 @@ def _with_spring(
             text = f"too long ({mm(item.free_length)} relaxed between axes {mm(room)} apart at the start)"
             return Miss(label, item.free_length / room - 1.0, text)
         preload = room - item.free_length + opened
-    springs = Springs.of(item, count)
+    springs = Springs.from_offer(item, count)
     constant = pull / (4.0 * springs.total)
     law = _law(spec, target, constant, factor, preload)
     if smallest is not None and _undercuts(spec, law, smallest):
@@ -321,7 +321,7 @@ def _with_spring(
         return Miss(label, target.stroke / max(reached, 1e-9) - 1.0, text)
     if target.spring_life is not None:
         most = 2.0 * (reach(law, target.stroke)[1] - law.rest_half_width) + preload
-        if missed := SpringInUse.of(item, preload - opened, most - opened).misses_life(target.spring_life):
+        if missed := SpringInUse.from_offer(item, preload - opened, most - opened).misses_life(target.spring_life):
             return Miss(label, *missed)
     rest = spec.mechanism.rest_half_width - 0.5 * preload
     gap = two_way_gap(law, target, loads_of(spec, springs.total, rest), spec.mechanism.rolling_friction)
@@ -393,7 +393,7 @@ def two_way_gap(law: SlopeLaw, target: CamDesign, loads: Loads, friction: float)
     if not np.isfinite(ways).all():
         return float("inf")
     carried = loads.slider_weight if target.gravity else 0.0
-    wanted = law.shape.at(path.travel(x)) if isinstance(law, CurveSlopeLaw) else 1.0
+    wanted = law.shape.evaluate(path.travel(x)) if isinstance(law, CurveSlopeLaw) else 1.0
     return float(np.abs((ways - carried) / (4.0 * loads.stiffness * law.force_constant) - wanted).max())
 
 

@@ -61,11 +61,11 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     solution = result.state
     if solution is None or not result.curves:
         return {}
-    if result.spec.at("analysis.fidelity") == "dynamic":
+    if result.spec.get_value("analysis.fidelity") == "dynamic":
         from cfmkit.families.cam.dynamics import figures as draw_dynamics
 
         return draw_dynamics.figures(result)
-    if result.spec.at("mechanism.profile.file"):
+    if result.spec.get_value("mechanism.profile.file"):
         return built_figures(result)
     makers = [loop, mechanism, curvature, contact, springs, assembly]
     if solution.corner_travel > 0:
@@ -94,14 +94,14 @@ def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None 
     radius, height = solution.assembly.spec.mechanism.roller_radius, view.box[3] - view.box[1]
     parts.plate(ax, view.plate)
     parts.axis_of_symmetry(ax, view.box[1], view.box[3])
-    for side, name, at in ((1.0, "right", here), (-1.0, "left", here.mirrored())):
+    for side, name, at in ((1.0, "right", here), (-1.0, "left", here.mirror())):
         mirror = np.array([side, 1.0])
         parts.edge(ax, view.flank * mirror, f"flank-{name}")
         parts.edge(ax, view.path * mirror, f"path-{name}", color=BLUE, linewidth=0.7, dashes=(1, 2), zorder=2.4)
         parts.roller(ax, at.roller, radius, f"roller-{name}")
         parts.link(ax, at.slider, at.roller, f"brace-{name}")
         parts.contact(ax, at.contact, f"contact-{name}")
-    parts.spring(ax, here.mirrored().roller, here.roller, 0.9 * radius)
+    parts.spring(ax, here.mirror().roller, here.roller, 0.9 * radius)
     x, y = here.slider
     parts.slider(ax, (x, y), 0.035 * height)
     parts.force_arrow(ax, (x, y + 0.02 * height), (x, y + 0.11 * height))
@@ -146,7 +146,7 @@ def regions(solution: Solution) -> list[MarkedRange]:
 @apply_style
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale at the start, in the middle and at the end of the travel."""
-    solution, heading = result.state, Heading.of(result, "mechanism to scale")
+    solution, heading = result.state, Heading.from_result(result, "mechanism to scale")
     view = scene(solution)
     slender = (view.box[3] - view.box[1]) / (view.box[2] - view.box[0])
     stacked = slender < STACK_BELOW
@@ -219,7 +219,7 @@ def curvature(result: Result) -> Figure:
         found.append(MarkedRange(float(x[0]), profile.corner.first_contact, text))
     scales = Scale("x of the roller's axis", "length"), Scale("radius of curvature", "length", log=True)
     series = [Series(radius, "roller path", BLUE, prefer=0.5), Series(flank, "cam", GREY, dashed=True, prefer=0.15)]
-    heading = Heading.of(result, "Radius of curvature")
+    heading = Heading.from_result(result, "Radius of curvature")
     figure = diagram_figure(heading, [Diagram(x, *scales, series, limits, found)], top_mm=9.0)
     travel = profile.path.travel(x) + solution.origin
     top_axis(figure.axes[0], parts.mm(x), parts.mm(travel), TRAVEL.label)
@@ -246,7 +246,7 @@ def contact(result: Result) -> Figure:
         Diagram(over, TRAVEL, Scale("force", "force"), series, limits_on(result, "contact_force_max"), found),
         Diagram(over, TRAVEL, Scale("pressure angle", "angle"), angle, limits, unnamed),
     ]
-    return diagram_figure(Heading.of(result, "forces on the parts, and the pressure angle"), diagrams)
+    return diagram_figure(Heading.from_result(result, "forces on the parts, and the pressure angle"), diagrams)
 
 
 def springs(result: Result) -> Figure:
@@ -261,7 +261,7 @@ def springs(result: Result) -> Figure:
         limits.append(Limit(limit, f"limit {value_text(limit, 'length')}", trouble=beyond))
     line, over = [Series(solution.elongation, "", BLUE)], solution.travel + solution.origin
     diagram = Diagram(over, TRAVEL, Scale("elongation", "length"), line, limits, regions(solution))
-    figure = diagram_figure(Heading.of(result, "elongation of the springs"), [diagram], right_mm=17.0)
+    figure = diagram_figure(Heading.from_result(result, "elongation of the springs"), [diagram], right_mm=17.0)
     stiffness, count = (
         float(to_border(solution.assembly.loads.stiffness, "stiffness")),
         count_of(solution.assembly.spec.mechanism.springs),
@@ -287,14 +287,14 @@ def clearance(result: Result) -> Figure:
     text = f"wanted {value_text(wanted, 'length')}" if wanted else "touching"
     limits = [*limits_on(result, "clearance_min"), Limit(wanted, text, trouble=passed)]
     diagram = Diagram(solution.travel + solution.origin, TRAVEL, Scale("distance", "length"), series, limits)
-    return diagram_figure(Heading.of(result, "clearances of the moving parts"), [diagram])
+    return diagram_figure(Heading.from_result(result, "clearances of the moving parts"), [diagram])
 
 
 @apply_style
 def undercut(result: Result) -> Figure:
     """Return what undercut does: the roller on the corner, what is cut away, and the force there."""
     solution: Solution = result.state
-    heading, force = Heading.of(result, "undercut at the start"), constant_force(solution.assembly)
+    heading, force = Heading.from_result(result, "undercut at the start"), constant_force(solution.assembly)
     figure = new_figure(160.0, 12.0 + 50.0 + 6.0 + heading.height_mm)
     write_heading(figure, heading)
     titles = "the roller pivots on the corner", "the corner, enlarged", "force on the slider [N]"
@@ -380,7 +380,7 @@ def profile(result: Result) -> Figure:
         right, left = (_values_over_height(built, side, values, heights) for side, values in enumerate(errors))
         series = [Series(right, "right", BLUE, prefer=0.3), Series(left, "left", VERMILLION, prefer=0.7)]
         diagrams.append(Diagram(heights, Scale("height on the cam", "length"), Scale(name, "length"), series))
-    return diagram_figure(Heading.of(result, "measured profile less design, positive outside"), diagrams)
+    return diagram_figure(Heading.from_result(result, "measured profile less design, positive outside"), diagrams)
 
 
 def _values_over_height(built: Built, side: int, values: FloatArray, heights: FloatArray) -> FloatArray:
@@ -406,7 +406,7 @@ def shares(result: Result) -> Figure:
         series.append(Series(parts["rest"], "rest length", OCHRE, prefer=0.8))
     over = built.travel + built.origin
     diagram = Diagram(over, Scale("displacement", "length"), Scale("force added to the design's", "force"), series)
-    return diagram_figure(Heading.of(result, "where the force comes from"), [diagram])
+    return diagram_figure(Heading.from_result(result, "where the force comes from"), [diagram])
 
 
 def band_figures(result: Result) -> dict[str, Callable[[], Figure]]:
@@ -427,7 +427,7 @@ def manufacturing(result: Result) -> Figure:
     diagram = Diagram(over[shown], *scales, [*series, one])
     median = 100 * float(np.median(band.deviations()))
     subject = f"cams cut with errors, {median:.2g} % SD along the travel"
-    return diagram_figure(Heading.of(result, subject), [diagram])
+    return diagram_figure(Heading.from_result(result, subject), [diagram])
 
 
 def moving(result: Result) -> Moving | None:

@@ -54,7 +54,7 @@ class DrawnError:
         """Last arc length [m]."""
         return float(self.arc[-1])
 
-    def at(self, places: FloatArray, derivative: int = 0) -> FloatArray:
+    def evaluate(self, places: FloatArray, derivative: int = 0) -> FloatArray:
         """Return the error [m] or one of its first two derivatives at the arc lengths of the design."""
         power = self.number**derivative
         turn = power * np.cos(np.multiply.outer(places, self.number) + self.phase + 0.5 * np.pi * derivative)

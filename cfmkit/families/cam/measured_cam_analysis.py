@@ -244,7 +244,7 @@ def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[
         message = f"the requested travel is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
         short = finding("outside_profile", message)
     travel = np.linspace(low, min(asked or high, high), assembly.spec.analysis.points)
-    x = tracks[0].at(start + travel)[0], tracks[1].at(start + travel)[0]
+    x = tracks[0].interpolate(start + travel)[0], tracks[1].interpolate(start + travel)[0]
     count, overlap = count_before_overlap(travel, start + travel, x, assembly.spec.mechanism)
     return travel[:count], overlap or short
 
@@ -272,7 +272,7 @@ def _solve_cam(
 
 def sides_at(tracks: tuple[BuiltTrack, BuiltTrack], slider: FloatArray) -> Sides:
     """Return where both rollers are at slider positions, (n,)."""
-    (right_x, right), (left_x, left) = (track.at(slider) for track in tracks)
+    (right_x, right), (left_x, left) = (track.interpolate(slider) for track in tracks)
     return Sides((right_x, left_x), (right, left))
 
 
@@ -298,13 +298,13 @@ class LoopAsBuilt(ShortRepr):
 
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""
-        return np.asarray(self._at(places).forces(_way(branch))[0].reshape(np.shape(places)))
+        return np.asarray(self._move_to(places).forces(_way(branch))[0].reshape(np.shape(places)))
 
     def stress(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
-        return np.asarray(stress(pressure_of(self._at(places), _way(branch))).reshape(np.shape(places)))
+        return np.asarray(stress(pressure_of(self._move_to(places), _way(branch))).reshape(np.shape(places)))
 
-    def _at(self, places: FloatArray) -> Built:
+    def _move_to(self, places: FloatArray) -> Built:
         """Return the mechanism at other displacements."""
         built = self.built
         travel = np.clip(np.ravel(places) - built.origin, built.travel[0], built.travel[-1])
@@ -403,7 +403,7 @@ class BuiltTrack:
     # slider positions between which the contact is where nothing was measured [m]
     holes: tuple[tuple[float, float], ...] = ()
 
-    def at(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def interpolate(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return x [m] and slope of the track at slider positions; no slope is known in a hole."""
         slope = np.interp(slider, self.slider, self.slope)
         for low, high in self.holes:

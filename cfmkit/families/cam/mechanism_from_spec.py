@@ -143,7 +143,7 @@ def weights_of(mechanism: Mechanism) -> Weights:
 
 def losses_of(mechanism: Mechanism) -> Losses | None:
     """Return the friction of bearings, pins and guide; None if nothing rubs but the rollers."""
-    bearings, pins, guide = mechanism.bearings, mechanism.pins, GuideFriction.of(mechanism.guide)
+    bearings, pins, guide = mechanism.bearings, mechanism.pins, GuideFriction.from_guide(mechanism.guide)
     bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
     pin = 0.5 * pins.diameter * pins.friction if pins else 0.0
     if not bearing and not pin and not guide.there:
@@ -414,7 +414,7 @@ def flanks_crossing(profile: CamProfile, offset: float = 0.0) -> Finding | None:
     offset : float
         Material left on it beyond the profile [m].
     """
-    x = float(profile.shifted(profile.start, offset - profile.roller_radius)[0])
+    x = float(profile.offset_points(profile.start, offset - profile.roller_radius)[0])
     return None if x > 0 else flanks_cross(x)
 
 

@@ -57,7 +57,7 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
     for profile in dict.fromkeys(profiles):
         if crossing := flanks_crossing(profile):
             raise CannotBuild(crossing)
-    paths = Contour((path_edge(profiles[0]),), "path"), Contour((path_edge(profiles[1]).mirrored(),), "path")
+    paths = Contour((path_edge(profiles[0]),), "path"), Contour((path_edge(profiles[1]).mirror(),), "path")
     plate = sides[0].spec.mechanism.plate
     contours = (*plate_contours(profiles, plate), *paths)
     contact = sides[0].spec.mechanism.contact
@@ -170,7 +170,7 @@ def plate_contour(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profile
             Arc((half + r, float(right) - r), r, np.pi, 0.5 * np.pi),
             *_lines([(half + r, right), (low[0], right)]),
         ]
-    edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirrored().reversed(), *bottom]
+    edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirror().reverse(), *bottom]
     return Contour(tuple(edges), "cut", closed=True)
 
 

@@ -36,7 +36,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     solution = result.state
     if not hasattr(solution, "states"):
         return None
-    mechanism = result.spec.at("mechanism")
+    mechanism = result.spec.get_value("mechanism")
     thick = PLATE_THICKNESS if mechanism.contact is None else mechanism.contact.width
     depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
     wound = (
@@ -57,7 +57,7 @@ def bodies(solution: Solution) -> tuple[PosedBody, ...]:
     radius = solution.assembly.spec.mechanism.roller_radius
     plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in _plate(solution)]
     right = PosedBody.line("roller", "contact", roller_path(solution)[:, None], radius)
-    return (*plate, right, right.mirrored(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
+    return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
 
 
 def _plate(solution: Solution) -> tuple[Contour, ...]:
@@ -79,7 +79,7 @@ class PartsPose:
     contact: Point
     on_corner: bool  # whether the roller pivots on the cam's corner
 
-    def mirrored(self) -> PartsPose:
+    def mirror(self) -> PartsPose:
         """Return the positions of the left parts."""
         (x, y), (a, b) = self.roller, self.contact
         return PartsPose((-x, y), self.slider, (-a, b), self.on_corner)
@@ -109,7 +109,7 @@ def surface(solution: Solution, points: int = 400) -> FloatArray:
     offset = max(solution.assembly.spec.mechanism.profile.offset, 0.0) - profile.roller_radius
     share = np.linspace(0.0, 1.0, points)
     u = profile.start + (profile.end - profile.start) * share**2
-    return np.column_stack(profile.shifted(u, offset))
+    return np.column_stack(profile.offset_points(u, offset))
 
 
 @dataclass(frozen=True)

@@ -233,7 +233,7 @@ def _bearing_life(solution: Solution) -> FloatArray:
     middles = 0.5 * (travel[..., 1:] + travel[..., :-1])
     used = 0.0
     for way in (1.0, -1.0):
-        load = np.nan_to_num(np.maximum(solution.at_travel(middles, way)[1].contact, 0.0)) * _of_contact(solution)
+        load = np.nan_to_num(np.maximum(solution.evaluate_travel(middles, way)[1].contact, 0.0)) * _of_contact(solution)
         used = used + (turns * (load / bearings.dynamic_rating) ** exponent).sum(axis=-1, keepdims=True)
     return np.where(used > 0, 1e6 / used, np.nan)
 
@@ -279,7 +279,7 @@ def _corner_peak(solution: Solution) -> FloatArray:
         return np.full((1, 1), np.nan)
 
     def force(travel: FloatArray) -> FloatArray:
-        return solution.at_travel(travel, 1.0)[1].slider
+        return solution.evaluate_travel(travel, 1.0)[1].slider
 
     travel = corner * np.concatenate([[0.0], ON_CORNER])
     return np.where(free, extreme_next_to(force, travel, force(travel), len(solution))[0], np.nan)
@@ -299,7 +299,7 @@ def _springs_in_use(solution: Solution) -> list[SpringInUse]:
 
 def _in_use(springs: Springs, least: float, largest: float) -> SpringInUse:
     wire = springs.wound
-    wound = None if wire is None else wire.wound("extension")
+    wound = None if wire is None else wire.to_wound("extension")
     fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
     return SpringInUse(wound, least, largest, fatigue, springs.life)
 

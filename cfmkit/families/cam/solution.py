@@ -138,11 +138,11 @@ class Solution(ShortRepr):
     @cached_property
     def flank(self) -> FlankSamples:
         """Contacts on the flank."""
-        return FlankSamples.of(self)
+        return FlankSamples.from_solution(self)
 
     # --- at any travel ----------------------------------------------------------------------------------------------
 
-    def at_travel(
+    def evaluate_travel(
         self, travel: FloatArray, way: float, rows: Any = None, flank: bool = False
     ) -> tuple[TrackStates, Forces]:
         """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m].
@@ -165,14 +165,14 @@ class Solution(ShortRepr):
         states = track.states(np.maximum(slider, track.corner_end) if flank else slider)
         return states, forces(states, loads, way * friction, way)
 
-    def at_places(self, places: FloatArray, way: float, rows: Any = None) -> tuple[TrackStates, Forces]:
+    def evaluate_places(self, places: FloatArray, way: float, rows: Any = None) -> tuple[TrackStates, Forces]:
         """Return the same at displacements, which end with the travel [m]; what is alike for all is computed once."""
         shared = rows is None and places.ndim == 2 and not isinstance(self.assembly.track, TrackRows)
         places = places[:1] if shared and places.strides[0] == 0 else places
         origin, last = self.origin, self.travel[..., -1:]
         if rows is not None:
             origin, last = rows_of((origin, last), rows)
-        return self.at_travel(np.clip(places - origin, 0.0, last), way, rows)
+        return self.evaluate_travel(np.clip(places - origin, 0.0, last), way, rows)
 
     # --- jams -------------------------------------------------------------------------------------------------------
 
@@ -258,11 +258,11 @@ class Solution(ShortRepr):
 
     def effort(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the force on the way up or down at displacements of each mechanism, or of some, (k, n) [N]."""
-        return self.at_places(places, WAYS[branch], rows)[1].slider
+        return self.evaluate_places(places, WAYS[branch], rows)[1].slider
 
     def stress(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the stress below the contact at displacements, likewise [Pa]; NaN on the corner."""
-        states, found = self.at_places(places, WAYS[branch], rows)
+        states, found = self.evaluate_places(places, WAYS[branch], rows)
         return stress(flank_pressure(self.assembly, states, found.contact, rows))
 
     def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
@@ -340,14 +340,14 @@ class FlankSamples(ShortRepr):
     down: Forces
 
     @classmethod
-    def of(cls, solution: Solution) -> FlankSamples:
+    def from_solution(cls, solution: Solution) -> FlankSamples:
         """Return those of solved mechanisms."""
         corner, travel, states = np.atleast_1d(solution.corner_travel), solution.travel, solution.states
         leaves = (corner > 0) & (corner <= travel[..., -1:])
         there = ~states.on_corner & (~leaves | (travel > corner))
         if not leaves.any():
             return cls(solution, travel, there, states, solution.up, solution.down)
-        (first, up), (_, down) = (solution.at_travel(corner, way, flank=True) for way in (1.0, -1.0))
+        (first, up), (_, down) = (solution.evaluate_travel(corner, way, flank=True) for way in (1.0, -1.0))
         return cls(
             solution,
             _append_column(corner, travel),
@@ -365,7 +365,7 @@ class FlankSamples(ShortRepr):
 
     def pressure(self, travel: FloatArray) -> FloatArray:
         """Return the pressure of the contact on the way up at travels [Pa]; NaN where there is none."""
-        states, found = self.solution.at_travel(travel, 1.0, flank=True)
+        states, found = self.solution.evaluate_travel(travel, 1.0, flank=True)
         return flank_pressure(self.solution.assembly, states, found.contact)
 
     @cached_property

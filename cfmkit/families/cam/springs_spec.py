@@ -60,7 +60,7 @@ class Springs(Model):
         return self
 
     @classmethod
-    def of(cls, offer: Offer, count: int) -> Self:
+    def from_offer(cls, offer: Offer, count: int) -> Self:
         """Return some springs of one that is on offer."""
         about = {
             "stiffness": offer.rate,

@@ -46,16 +46,16 @@ def check_target(target: CamDesign) -> None:
             ),
             {"design.stroke": format_at_most(last)} if last > 0 >= first else None,
         )
-    shape = curve.between(0.0, target.stroke)
+    shape = curve.to_points(0.0, target.stroke)
     places = np.linspace(0.0, max(target.stroke, shape.places[-1]), 2001)
-    force = np.asarray(curve.at(places))
+    force = np.asarray(curve.evaluate(places))
     lowest = int(np.argmin(force[1:])) + 1
     if force[lowest] <= 0 or force[0] < 0:
         at = places[0 if force[0] < min(force[lowest], 0.0) else lowest]
         raise Infeasible(
             finding(
                 "target_curve",
-                f"the target curve is {newton(float(curve.at(at)))} at {mm(float(at))}: a cam holds up a force, which "
+                f"the target curve is {newton(float(curve.evaluate(at)))} at {mm(float(at))}: a cam holds up a force, which "
                 "must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
                 "do not have ('design.target')",
             )
@@ -75,7 +75,7 @@ def target_shape(target: CamDesign, slider: float) -> ThroughPoints | None:
     curve = wanted_curve(target)
     if curve is None:
         return None
-    wanted, most = curve.between(0.0, target.stroke), largest_force(target) - slider
+    wanted, most = curve.to_points(0.0, target.stroke), largest_force(target) - slider
     return replace(wanted, values=tuple((value - slider) / most for value in wanted.values))
 
 

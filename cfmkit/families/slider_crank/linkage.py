@@ -115,7 +115,7 @@ class Linkage:
         """Return whether the linkage can be assembled at a crank angle [rad]."""
         return abs(self.crank * math.sin(angle) - self.offset) <= self.coupler
 
-    def mirrored(self) -> Linkage:
+    def mirror(self) -> Linkage:
         """Return the mirror image about a line across the slider's path: the other branch, with angles pi - t."""
         return Linkage(self.crank, self.coupler, self.offset, -self.branch)
 

@@ -55,4 +55,4 @@ def _mirror_contour(contour: Contour, axis: float) -> Contour:
         flip = np.array([1.0, -1.0])
         return Smooth(one.points * flip + np.array([0.0, 2.0 * axis]), one.tangents * flip)
 
-    return replace(contour, edges=tuple(edge(one).reversed() for one in reversed(contour.edges)))
+    return replace(contour, edges=tuple(edge(one).reverse() for one in reversed(contour.edges)))

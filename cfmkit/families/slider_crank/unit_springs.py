@@ -196,10 +196,10 @@ class SliderPath:
     shares: tuple[float, float]  # `_shares` in the unloaded position [rad]
 
     @classmethod
-    def of(cls, linkage: Linkage, unloaded: float, side: int) -> SliderPath:
+    def from_linkage(cls, linkage: Linkage, unloaded: float, side: int) -> SliderPath:
         """Return the way of the slider of one linkage."""
         if linkage.branch < 0:
-            return replace(cls.of(linkage.mirrored(), math.pi - unloaded, -side), is_mirrored=True)
+            return replace(cls.from_linkage(linkage.mirror(), math.pi - unloaded, -side), is_mirrored=True)
         knee = linkage.knee(unloaded)
         start = side * math.pi if knee == math.pi else knee  # folded is on either side
         xs, place = linkage.stretched_position, float(linkage.slider_position(np.asarray(unloaded)))
@@ -214,7 +214,7 @@ class SliderPath:
     def units(self, travel: FloatArray) -> UnitCurves:
         """Return the unit curves at some travels."""
         travel = np.asarray(travel, dtype=np.float64)
-        state, beyond = self.at(travel), self.beyond(travel)
+        state, beyond = self.evaluate(travel), self.is_unreachable(travel)
         effort, stiffness = (np.where(beyond, np.nan, item) for item in self.efforts(state))
         angle = self.unloaded + state.turn[0]
         if self.is_mirrored:
@@ -225,11 +225,11 @@ class SliderPath:
     def unit_forces(self, travel: FloatArray) -> FloatArray:
         """Return the force of a unit spring at each joint: that of `units` without anything else, and faster."""
         travel = np.asarray(travel, dtype=np.float64)
-        found = self.forces(self.at(travel))
-        found[:, self.beyond(travel)] = np.nan
+        found = self.forces(self.evaluate(travel))
+        found[:, self.is_unreachable(travel)] = np.nan
         return found
 
-    def beyond(self, travel: FloatArray) -> NDArray[np.bool_]:
+    def is_unreachable(self, travel: FloatArray) -> NDArray[np.bool_]:
         """Return whether the slider cannot get there."""
         slack = 1e-12 * np.abs(self.x0)
         found: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
@@ -245,7 +245,7 @@ class SliderPath:
         far = xs + np.where(outside, self.x0 - travel, travel - self.x0)
         return np.where(outside, near, far), np.where(outside, far, near)
 
-    def at(self, travel: FloatArray) -> _SliderState:
+    def evaluate(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
         link = self.linkage
         position = self.x0 - travel
@@ -310,7 +310,7 @@ class SliderPath:
 @lru_cache(maxsize=8)
 def path_of(linkage: Linkage, unloaded: float, side: int) -> SliderPath:
     """Return the way of the slider: places are solved for on one and the same again and again."""
-    return SliderPath.of(linkage, unloaded, side)
+    return SliderPath.from_linkage(linkage, unloaded, side)
 
 
 def _shares(linkage: Linkage, sine: FloatArray, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:

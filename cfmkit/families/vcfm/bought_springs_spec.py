@@ -52,7 +52,7 @@ class BoughtSprings(SpringSupport):
     @property
     def coil(self) -> Wound | None:
         """Its wire, coil and turns; None if they are not stated."""
-        return None if self.wound is None else self.wound.wound(self.kind)
+        return None if self.wound is None else self.wound.to_wound(self.kind)
 
     @property
     def is_guided(self) -> bool:

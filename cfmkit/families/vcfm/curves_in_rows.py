@@ -96,7 +96,7 @@ class PartSampler(Protocol):
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
 
-    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return at which travels [m] leaves and spring were solved for, not interpolated; None if all are known."""
 
     def of_rows(self, rows: Any) -> Self:
@@ -184,7 +184,7 @@ class Rows(ShortRepr):
         total = np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
         return total + self.stops.force(places) if self.stops else total
 
-    def reached(self, places: FloatArray) -> FloatArray:
+    def evaluate_within_ends(self, places: FloatArray) -> FloatArray:
         """Return the same, NaN beyond the ends of a row [N]."""
         first, last = (end[:, None] for end in self.ends)
         inside = (places >= first) & (places <= last)
@@ -197,7 +197,7 @@ class Rows(ShortRepr):
         """
         low, high = (end[:, None] for end in window)
         own = np.where((self.travel > low) & (self.travel < high), self.force, np.nan)
-        force = np.hstack([own, self.reached(np.hstack([low, high]))])
+        force = np.hstack([own, self.evaluate_within_ends(np.hstack([low, high]))])
         known = np.isfinite(force)
         return np.where(known, force, -np.inf).max(axis=1), np.where(known, force, np.inf).min(axis=1)
 

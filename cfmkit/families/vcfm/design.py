@@ -349,7 +349,7 @@ def _follow_curve(curve: TargetCurve, places: FloatArray) -> FloatArray:
                 "('design.target')",
             )
         )
-    return np.asarray(curve.at(places))
+    return np.asarray(curve.evaluate(places))
 
 
 def _rest(sampler: ExactSampler, preload: float, factors: tuple[float, float]) -> float:

@@ -147,7 +147,7 @@ class ExactSampler:
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
         place = np.ravel(travel)
-        ahead, behind = self.pushed.at(np.maximum(place, 0.0)), self.pulled.at(np.minimum(place, 0.0))
+        ahead, behind = self.pushed.evaluate(np.maximum(place, 0.0)), self.pulled.evaluate(np.minimum(place, 0.0))
         force, stress, stable, buckled = (
             np.where(place < 0, one, other).reshape(np.shape(travel)) for one, other in zip(behind, ahead, strict=True)
         )
@@ -170,11 +170,14 @@ class ExactSampler:
         if self.coils is not None:
             return self.coils.force(compression), self.coils.stress(compression)
         place = self.chain.travel * np.ravel(compression)
-        pressed, stretched = self.sides[0].at(np.maximum(place, 0.0)), self.sides[1].at(np.minimum(place, 0.0))
+        pressed, stretched = (
+            self.sides[0].evaluate(np.maximum(place, 0.0)),
+            self.sides[1].evaluate(np.minimum(place, 0.0)),
+        )
         force, stress = (np.where(place < 0, stretched[k], pressed[k]).reshape(np.shape(compression)) for k in (0, 1))
         return self.chain.count * force, stress
 
-    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return None: between its nodes a traced path is known to its tolerance."""
 
     @cached_property
@@ -186,12 +189,14 @@ class ExactSampler:
         first, last = push.buckled_range
         places = np.linspace(first + 0.1 * (last - first), last - 0.1 * (last - first), 41)
         if np.isfinite(first):
-            steepest = -float(np.polyfit(places, push.at(places)[0], 1)[0])
+            steepest = -float(np.polyfit(places, push.evaluate(places)[0], 1)[0])
         else:
             places = np.linspace(0.0, push.edges[-1], 801)
-            steepest = max(0.0, -float(np.gradient(push.at(places)[0], places).min()))
+            steepest = max(0.0, -float(np.gradient(push.evaluate(places)[0], places).min()))
         tiny = 1e-4 * push.edges[-1]
-        first_stiffness = float((push.at(np.array([tiny]))[0] - self.pulled.at(np.array([-tiny]))[0])[0] / (2.0 * tiny))
+        first_stiffness = float(
+            (push.evaluate(np.array([tiny]))[0] - self.pulled.evaluate(np.array([-tiny]))[0])[0] / (2.0 * tiny)
+        )
         if self.coils is None:
             forces = self.spring(np.array([-tiny, tiny]))[0]
             stiffness = float((forces[1] - forces[0]) / (2.0 * tiny))

@@ -48,7 +48,7 @@ def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> tu
     pushed, pulled = (way.solved for way in ways)
     rows = []
     for one in _both_ways(pushed, pulled, radius):
-        joined = one.arc.touched(_rigid(pushed, moved))
+        joined = one.arc.find_touched(_rigid(pushed, moved))
         row = _largest(solution, one, f"{piece} at {joined[0] if joined else 'corner'}", piece == "spring")
         rows += [] if row is None else [row]
     return tuple(rows)

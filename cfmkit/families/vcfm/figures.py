@@ -66,7 +66,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     makers = [force, split, stress, mechanism]
     if len(result.curves) > 1:
         makers += [preloads, from_rest, adjustability]
-    if result.spec.at("analysis.fidelity") == "solid":
+    if result.spec.get_value("analysis.fidelity") == "solid":
         makers.append(stress_map)
     return {maker.__name__: partial(maker, result) for maker in makers}
 
@@ -105,7 +105,7 @@ def split(result: Result) -> Figure:
         found.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
     diagram = Diagram(push.travel, TRAVEL, Scale("force", "force"), series, (), found)
     subject = f"leaves and spring, preload {value_text(push.preload, 'length')}"
-    return diagram_figure(Heading.of(result, subject), [diagram])
+    return diagram_figure(Heading.from_result(result, subject), [diagram])
 
 
 def stress(result: Result) -> Figure:
@@ -127,7 +127,7 @@ def stress(result: Result) -> Figure:
     passed = allowed is not None and bool(max(np.nanmax(item.values) for item in series) > allowed * 1.005)
     limits = [Limit(allowed, f"allowed {value_text(allowed, 'stress')}", trouble=passed)] if allowed else []
     diagram = Diagram(over, TRAVEL, Scale("largest stress", "stress"), series, limits, _range_beyond(solution))
-    return diagram_figure(Heading.of(result, "largest stress"), [diagram])
+    return diagram_figure(Heading.from_result(result, "largest stress"), [diagram])
 
 
 @apply_style
@@ -144,7 +144,7 @@ def from_rest(result: Result) -> Figure:
 
 def _curves(result: Result, subject: str, shifted: bool) -> Figure:
     solution: Solution = result.state
-    heading, figure = Heading.of(result, subject), new_figure()
+    heading, figure = Heading.from_result(result, subject), new_figure()
     write_heading(figure, heading)
     ax = axes_mm(figure, (15.0, 12.0, 140.0, 100.0 - heading.height_mm - 14.0))
     curves = []
@@ -198,7 +198,7 @@ def adjustability(result: Result) -> Figure:
     diagrams = [Diagram(over, x, first, forces), Diagram(over, x, Scale("shift", "length"), shifts)]
     if np.isfinite(starts + rests).any():
         diagrams.append(Diagram(over, x, Scale("start", "length"), begins))
-    return diagram_figure(Heading.of(result, "what the preload adjusts"), diagrams)
+    return diagram_figure(Heading.from_result(result, "what the preload adjusts"), diagrams)
 
 
 def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
@@ -239,7 +239,7 @@ def mechanism(result: Result) -> Figure:
     (left, bottom), (right, top) = box(shown).tolist()
     room, aside = 0.12 * (top - bottom), 0.02 * (right - left)
     view = (left - aside, bottom - room, right + aside, top + room)
-    heading = Heading.of(result, "mechanism to scale")
+    heading = Heading.from_result(result, "mechanism to scale")
     across = 68.0
     up = across * (view[3] - view[1]) / (view[2] - view[0])
     figure = new_figure(160.0, heading.height_mm + 12.0 + 2.0 * (up + 8.0))

@@ -278,7 +278,9 @@ def _reversal(solution: Solution) -> Sentence:
 def _forces_beyond_linear(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """Return the force where the leaves straighten again, NaN beyond the curve, and at the end, (m,) each [N]."""
     curves = solution.nominal
-    return curves.reached(solution.linear[1][:, None])[:, 0], curves.force[np.arange(len(solution)), curves.count - 1]
+    return curves.evaluate_within_ends(solution.linear[1][:, None])[:, 0], curves.force[
+        np.arange(len(solution)), curves.count - 1
+    ]
 
 
 def _is_overloaded(solution: Solution) -> Any:

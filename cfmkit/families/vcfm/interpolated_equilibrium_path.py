@@ -74,7 +74,7 @@ class PathPoints:
     stable: Any
     buckled: Any
 
-    def joined(self, other: PathPoints) -> PathPoints:
+    def merge(self, other: PathPoints) -> PathPoints:
         """Return these points and others, each place once."""
         pairs = zip(self.columns, other.columns, strict=True)
         places, *columns = (np.concatenate(pair) for pair in pairs)
@@ -117,12 +117,12 @@ class Traced:
             found.append(_stress_law(own[here], self.points.stress[here], float(low), float(high)))
         return found
 
-    def at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
+    def evaluate(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
         """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""
         x, pieces = self.sense * np.asarray(travel, dtype=float), self.piece(travel)
         force, stress = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
         if self.panels is not None:
-            force = self.panels.at(x)
+            force = self.panels.evaluate(x)
             unknown = np.isnan(force)
             force[unknown] = np.interp(x[unknown], self.sense * self.points.places, self.points.force)
             for number, law in enumerate(self._stresses):
@@ -217,7 +217,7 @@ class Route:
     tolerances: tuple[float, ...] = TOLERANCES
     rounding: float = 0.0  # error that rounding leaves, relative to the largest force
 
-    def through(self, places: FloatArray) -> tuple[Path, FloatArray]:
+    def trace_places(self, places: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path through some places, by the strictest tolerance that it reaches, and the places."""
         from cfmkit.elastica import Control, Displacement, PathStatus, trace
         from cfmkit.elastica.results.member_efforts import effort_error
@@ -246,7 +246,7 @@ def _begin_path(route: Route, end: float, count: int) -> First:
     from cfmkit.elastica import PathStatus
 
     places = end * np.arange(1, count + 1) / count
-    path, _ = route.through(places)
+    path, _ = route.trace_places(places)
     sense, points = np.sign(end), _points(path, places)
     reached = float(points.places[-1]) if len(points.places) else 0.0
     whole = abs(reached - end) <= 1e-9 * abs(end)
@@ -257,7 +257,7 @@ def _begin_path(route: Route, end: float, count: int) -> First:
             inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
     zero = PathPoints(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the unloaded position
-    return First(zero.joined(points), (0.0, *inner, reached), places, problem)
+    return First(zero.merge(points), (0.0, *inner, reached), places, problem)
 
 
 def _points(path: Path, places: FloatArray) -> PathPoints:
@@ -308,8 +308,8 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
     kept = True  # no path has left its branch
     for left in range(HALVINGS, -1, -1):
         places = np.unique(np.concatenate([*guards, *(nodes_of(inside(panel)) for panel in wanted)]))
-        more = _points(*route.through(sense * places))
-        kept, points = kept and _alike(first, more), points.joined(more)
+        more = _points(*route.trace_places(sense * places))
+        kept, points = kept and _alike(first, more), points.merge(more)
         size = sense * points.places
         largest = np.maximum.accumulate(np.abs(points.force))
         halves: list[tuple[float, float]] = []

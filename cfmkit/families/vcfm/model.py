@@ -365,7 +365,7 @@ class LawSampler:
         """Return the laws of some rows."""
         return type(self)(rows_of(self.parts, rows))
 
-    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return None: closed forms know every travel."""
 
     def leaves(self, travel: FloatArray) -> LeafSamples:
@@ -373,7 +373,7 @@ class LawSampler:
         leaf = self.parts.leaf
         force, stress = leaf.state(travel)
         force = self.parts.half_beams * np.asarray(force, dtype=float)
-        buckled = np.asarray(leaf.buckled(travel))
+        buckled = np.asarray(leaf.is_buckled(travel))
         return LeafSamples(force, np.asarray(stress, dtype=float), np.ones(travel.shape, dtype=bool), buckled)
 
     def leaf_force(self, travel: FloatArray) -> FloatArray:

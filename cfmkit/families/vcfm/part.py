@@ -90,12 +90,12 @@ def _pose(
 ) -> Iterator[PosedBody]:
     """Yield everything in one pose."""
     for body in sizes.bodies():
-        yield body.moved(0.0, -travel) if body.role == "driven" else body
+        yield body.move(0.0, -travel) if body.role == "driven" else body
     line = leaf.bent_line(travel)[::-1] * MIRROR + np.array([sizes.wall, -float(leaf.strip.rise)])
     half, spacing = 0.5 * leaf_thickness(leaf, len(line)), spec.mechanism.frame.spacing
     for number in range(spec.mechanism.bistable.half_beams):
         one = PosedBody.polygon("leaf", "free", band(line + np.array([0.0, number // 2 * spacing]), half))
-        yield one.mirrored() if number % 2 else one
+        yield one.mirror() if number % 2 else one
     if spec.mechanism.springs is None:
         yield from _leaf_spring(spec, sizes.bottom - travel, travel + preload)
     else:
@@ -118,7 +118,7 @@ def _leaf_spring(spec: VcfmSpec, top: float, compression: float) -> Iterator[Pos
         yield body
         in_the_middle = body.name in ("block", "base") and body.core[..., 0].min() < 0.0
         if spec.mechanism.flexures.loaded == "whole" and not in_the_middle:
-            yield body.mirrored()
+            yield body.mirror()
 
 
 def _strip(line: FloatArray, thickness: float) -> PosedBody:
@@ -361,12 +361,12 @@ def _ends(item: Item) -> tuple[Point, Point]:
 
 def _back(items: Sequence[Item]) -> list[Item]:
     """Return a chain run the other way."""
-    return [item if isinstance(item, tuple) else item.reversed() for item in reversed(items)]
+    return [item if isinstance(item, tuple) else item.reverse() for item in reversed(items)]
 
 
 def _mirror_chain(items: Sequence[Item]) -> list[Item]:
     """Return the mirror image of a chain, run the other way, so that it closes the first."""
-    return [(-item[0], item[1]) if isinstance(item, tuple) else item.mirrored() for item in _back(items)]
+    return [(-item[0], item[1]) if isinstance(item, tuple) else item.mirror() for item in _back(items)]
 
 
 def _contour(items: Sequence[Item], hole: bool = False) -> Contour:

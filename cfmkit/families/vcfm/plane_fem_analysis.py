@@ -84,7 +84,7 @@ class SolidPath:
 
         return PchipInterpolator(np.abs(self.solved.course.travel), self.solved.peaks[0])
 
-    def at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
+    def evaluate(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
         """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""
         x, reached = np.asarray(travel, dtype=float), self.edges[-1]
         beyond = np.abs(x) > abs(reached) * (1 + 1e-9) + 1e-15
@@ -119,20 +119,20 @@ class SolidSampler(ExactSampler):
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
         self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
         leaf, *spring = elastic_parts(spec)
-        leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
+        leaves = leaf.solve(lambda part, _: run.progress(0.6 * part, "leaf"))
         self.pushed, self.mesh_error = _path(leaves.solution), leaves.error
         self.pulled = _pull_back(spec, leaves, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
         self.sides, self.problem = [], problem_of("bistable", (self.pushed, self.pulled), 1.0)
         for one in spring:
             self.chain = spring_chain(spec)
             back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
-            springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
+            springs = one.solve(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
             pull = _pull_back(spec, springs, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
             self.sides, self.mesh_error = [_path(springs.solution), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
         self.accuracy = self.mesh_error.force
 
-    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+    def find_solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return at which travels [m] leaves and, unless it is bought, spring have a pose."""
         found = _poses_at(travel, (self.pushed, self.pulled))
         if self.coils is None:

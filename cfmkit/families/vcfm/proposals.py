@@ -292,7 +292,7 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
         most = request.envelope[0] / (APART * wide)
         counts = tuple(n for n in one.counts if softest <= n * one.rate <= softest / SOFTEST and n <= most)
         if counts:
-            yield CatalogueSpring.of(replace(one, counts=counts))
+            yield CatalogueSpring.from_offer(replace(one, counts=counts))
 
 
 def _explain_no_offer(request: Request, excess: float, over: dict[str, float]) -> FamilyOffer:

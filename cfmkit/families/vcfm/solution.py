@@ -137,7 +137,7 @@ class Solution(ShortRepr):
         travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
         known = None if np.isnan(rest) else rest
         stopped = curves.stops.force(travel) if curves.stops else None
-        return Push(preload, travel, leaves, force, stress, known, stopped, curves.sampler.solved(travel, preload))
+        return Push(preload, travel, leaves, force, stress, known, stopped, curves.sampler.find_solved(travel, preload))
 
     # --- what characterises each mechanism, (m,) --------------------------------------------------------------------
 

@@ -182,7 +182,7 @@ class VcfmDesign(DesignBlock):
     def level(self) -> float:
         """The force, of a curve that in the middle of the leaves' linear region, two thirds of their rise [N]."""
         if self.curve is not None:
-            return float(self.curve.at(2.0 / 3.0 * (self.rise or 0.0)))
+            return float(self.curve.evaluate(2.0 / 3.0 * (self.rise or 0.0)))
         return self.force or 0.0
 
     @property

@@ -64,7 +64,7 @@ class FrameSizes:
             yield PosedBody.polygon("ground", "held", rectangle(-self.out, self.foot, self.out, self.floor))
         if len(self.ledge) > 1:
             seat = PosedBody.polygon("seat", "held", rectangle(*self.ledge[0], *self.ledge[2]))
-            yield from (seat, seat.mirrored())
+            yield from (seat, seat.mirror())
 
 
 def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None) -> FrameSizes:

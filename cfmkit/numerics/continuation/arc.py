@@ -77,7 +77,7 @@ class ArcMove(NamedTuple):
     tangent: FloatArray
     length: float
 
-    def between(self, goal: float) -> FloatArray:
+    def interpolate(self, goal: float) -> FloatArray:
         """Return the unknowns at a drive between its ends by the cubic in the arc length through them."""
         first, last = _place(self.old), _place(self.new)
         starts, ends = self.length * self.tangent_before, self.length * self.tangent

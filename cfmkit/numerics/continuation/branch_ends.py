@@ -35,10 +35,10 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     """
     problem, here = walk.problem, walk.here
     back = correct(problem, new.x + (here.drive - new.drive) * new.rate, here.drive)
-    moved = walk.moved(new)
+    moved = walk.measure_motion(new)
     if back is None:
         return "unsure" if moved > IN_DOUBT[0] else None
-    if walk.moved(back) < SAME_PLACE + 1e-3 * moved:
+    if walk.measure_motion(back) < SAME_PLACE + 1e-3 * moved:
         return _find_end_at(walk, new)
     if back.unstable <= new.unstable:
         return "unsure" if moved > IN_DOUBT[1] else None

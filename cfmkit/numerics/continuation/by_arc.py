@@ -42,7 +42,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
     if not np.isfinite(begin.rate).all():
         return None
     along = np.append(begin.rate, 1.0) * walk.sense
-    moved = walk.moved(walk.before) if walk.before is not None else FIRST_LENGTH
+    moved = walk.measure_motion(walk.before) if walk.before is not None else FIRST_LENGTH
     length = float(np.clip(fineness * moved, *LENGTHS))
     tangent = unit_tangent(problem, begin, along, options.span)
     steady = 0
@@ -87,7 +87,7 @@ def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | No
     """Yield the requested values within a step; return the walk with the next one, or None if one is not found."""
     for number in walk.targets_up_to(move.new.drive):
         goal = float(walk.targets[number])
-        at = correct(walk.problem, move.between(goal), goal)
+        at = correct(walk.problem, move.interpolate(goal), goal)
         if at is None:
             return None
         yield Point(at, number, walk.branch)

@@ -95,7 +95,7 @@ def _limits(walk: Walk) -> tuple[float, float]:
 def _guess(step: ArcMove, fold: Located | None, side: int, goal: float) -> FloatArray:
     """Return the unknowns at a drive within a step, before (0) or behind (1) a fold, where they go like a root."""
     if fold is None:
-        return step.between(goal)
+        return step.interpolate(goal)
     end = step.new if side else step.old
     share = np.sqrt(abs((goal - fold.drive) / (end.drive - fold.drive)))
     return np.asarray(fold.x + share * (end.x - fold.x))

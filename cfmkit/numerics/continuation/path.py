@@ -163,6 +163,6 @@ class Walk:
             end += 1
         return range(self.number, end)
 
-    def moved(self, new: PathEquilibrium) -> float:
+    def measure_motion(self, new: PathEquilibrium) -> float:
         """Return the largest motion between here and another equilibrium."""
         return largest_motion(self.problem, new.x - self.here.x)

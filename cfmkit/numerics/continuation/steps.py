@@ -61,7 +61,7 @@ def advance(walk: Walk, goal: float) -> Trial:
     new = correct(problem, guess, goal)
     if new is None:
         return Trial(None)
-    moved, missed = walk.moved(new), largest_motion(problem, new.x - guess)
+    moved, missed = walk.measure_motion(new), largest_motion(problem, new.x - guess)
     if moved > options.largest_motion:
         return Trial(None)
     excess = force_change(problem, here.x, new.x, options.largest_force, FORCE_SHARE)

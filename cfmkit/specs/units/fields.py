@@ -113,10 +113,10 @@ class UnitField:
         """
         if all(_BOUNDS[name][1](value, bound) for name, bound in bounds.items()):
             return value
-        reported = given.strip() if isinstance(given, str) else self.reported(value)
-        raise QuantityError(f"{reported} is not allowed: must be {self.allowed(bounds, reported)}")
+        reported = given.strip() if isinstance(given, str) else self.format_value(value)
+        raise QuantityError(f"{reported} is not allowed: must be {self.describe_allowed(bounds, reported)}")
 
-    def allowed(self, bounds: Mapping[str, float], given: str) -> str:
+    def describe_allowed(self, bounds: Mapping[str, float], given: str) -> str:
         """Return bounds in words, with the percentage that was meant by a number above 1, if it keeps them."""
         meant = meant_as_percent(given) if self.dimensions == ("ratio",) else ""
         share = read_one_of(meant, self.dimensions)[0] if meant else 0.0
@@ -125,14 +125,14 @@ class UnitField:
 
     def limits(self, bounds: Mapping[str, float]) -> str:
         """Return bounds in words with units: ``> 0 and <= 500 mm``."""
-        return " and ".join(f"{_BOUNDS[name][0]} {self.reported(bound)}" for name, bound in bounds.items())
+        return " and ".join(f"{_BOUNDS[name][0]} {self.format_value(bound)}" for name, bound in bounds.items())
 
     @property
     def needs_unit(self) -> bool:
         """Whether a number other than zero must carry a unit in a file."""
         return self.dimensions[0] not in UNITLESS
 
-    def reported(self, value: float) -> str:
+    def format_value(self, value: float) -> str:
         """Return an SI value with its unit, for a message."""
         return format_quantity(value, self.dimensions[0]) if value else "0"
 

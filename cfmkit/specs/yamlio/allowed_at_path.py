@@ -81,7 +81,7 @@ class Slot:
         fields = self.model.model_fields.values()
         return self.model.__name__ in tag or any(tag in map(str, get_args(f.annotation)) for f in fields)
 
-    def expected(self) -> str:
+    def describe_expected(self) -> str:
         """Return what to write, with an example: ``a length, e.g. '200 mm'``."""
         if self.quantity:
             return f"{describe_dimensions(self.quantity.dimensions)}, e.g. {example(self.quantity.dimensions)}"
@@ -138,7 +138,9 @@ def required_keys(model: type[BaseModel]) -> list[str]:
 
 def describe_expected(allowed: tuple[Slot, ...], plain: bool = False) -> str:
     """Return what to write where several types are allowed; `plain` leaves the examples out."""
-    words = dict.fromkeys(slot.expected().split(", e.g.")[0] if plain else slot.expected() for slot in allowed)
+    words = dict.fromkeys(
+        slot.describe_expected().split(", e.g.")[0] if plain else slot.describe_expected() for slot in allowed
+    )
     joint = ", or " if any("," in word for word in words) else " or "
     return joint.join(words) or "a value"
 

@@ -247,8 +247,8 @@ def _explain_bounds(line: _Error) -> str:
     slot = next((slot for slot in line.trace.slots if slot.bounds), None)
     given = line.trace.node
     if slot is not None and slot.quantity is not None:
-        reported = given.strip() if isinstance(given, str) else slot.quantity.reported(float(given))
-        return f"{reported} is not allowed: must be {slot.quantity.allowed(slot.bounds, reported)}"
+        reported = given.strip() if isinstance(given, str) else slot.quantity.format_value(float(given))
+        return f"{reported} is not allowed: must be {slot.quantity.describe_allowed(slot.bounds, reported)}"
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
     bounds = slot.bounds if slot else {name: line.context[name] for name in signs if name in line.context}
     limits = " and ".join(f"{signs[name]} {bound}" for name, bound in bounds.items())

@@ -108,14 +108,14 @@ class SpringWire(WireLimits):
         self.check_wire(self.wire, self.coil)
         return self
 
-    def wound(self, kind: Kind) -> Wound:
+    def to_wound(self, kind: Kind) -> Wound:
         """Return the wire, loaded as a kind of spring."""
         return self.wound_of(kind, self.wire, self.coil, self.turns)
 
     def check_rate(self, kind: Kind, stated: float | None) -> None:
         """Raise if a stated rate [N/m or N m/rad] is not that of the wire."""
-        if stated is not None and abs(stated / self.wound(kind).rate - 1.0) > AGREE:
-            raise ValueError(_disagree(self.wound(kind), stated))
+        if stated is not None and abs(stated / self.to_wound(kind).rate - 1.0) > AGREE:
+            raise ValueError(_disagree(self.to_wound(kind), stated))
 
 
 def _disagree(wound: Wound, stated: float) -> str:
@@ -164,18 +164,18 @@ InitialTension = Annotated[
 
 
 def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:
-    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated.
+    """Check the `stiffness` of springs against their wire `to_wound`, or compute it where none is stated.
 
     Their initial tension must be one that such a wire is wound with. The rate of a manufactured spring is not checked:
     its tolerance comes on top of what stated values differ by.
     """
     if springs.wound is not None:
-        check_initial_tension(springs.wound.wound(kind), springs.initial_tension)
+        check_initial_tension(springs.wound.to_wound(kind), springs.initial_tension)
     if springs.stiffness is None:
         if springs.wound is None:
             refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
         # past the frozen model, and not counted as set: another wire then has another rate
-        object.__setattr__(springs, "stiffness", springs.wound.wound(kind).rate)
+        object.__setattr__(springs, "stiffness", springs.wound.to_wound(kind).rate)
     elif springs.wound is not None and not is_made(info):
         for one in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
             springs.wound.check_rate(kind, one)
@@ -268,7 +268,7 @@ class CatalogueSpring(WireLimits, SpringSupport):
             raise ValueError(f"'free_length' is less than the turns on each other: {format_short(least, 'length')}")
 
     @classmethod
-    def of(cls, offer: Offer) -> Self:
+    def from_offer(cls, offer: Offer) -> Self:
         """Return a spring on offer of which wire, coil and turns are known, as a list has it."""
         wire = wire_of(offer)
         angular = offer.kind == "torsion"
@@ -364,7 +364,7 @@ def wire_of(offer: Offer) -> SpringWire | None:
         "shear_modulus": None if wound.shear_modulus == known.shear_modulus else wound.shear_modulus,
         "youngs_modulus": None if wound.youngs_modulus == known.youngs_modulus else wound.youngs_modulus,
         "max_stress": offer.max_stress,
-        "fatigue": None if offer.fatigue is None else Fatigue.of(offer.fatigue),
+        "fatigue": None if offer.fatigue is None else Fatigue.from_law(offer.fatigue),
     }
     return SpringWire.model_validate({key: value for key, value in about.items() if value is not None})
 

@@ -56,7 +56,7 @@ class SpringInUse:
     stated_life: float | None = None  # cycles that its maker states
 
     @classmethod
-    def of(cls, offer: Offer, least: float, largest: float) -> SpringInUse:
+    def from_offer(cls, offer: Offer, least: float, largest: float) -> SpringInUse:
         """Return a spring on offer between two deflections [m or rad]."""
         low, high = (offer.initial_tension + offer.rate * one for one in (least, largest))
         return cls(offer.wound, low, high, offer.fatigue, offer.life)

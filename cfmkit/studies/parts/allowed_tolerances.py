@@ -89,7 +89,7 @@ def limits_along_errors(
         raise SolutionError("the specification cannot be followed at a few poses: no tolerance can be stated")
     found = []
     for one, factor in zip(parts.parameters, factors.tolist(), strict=True):
-        tight = one.spread.tightened(factor)
+        tight = one.spread.tighten(factor)
         offsets = factor * ERRORS_TRIED * one.spread.standard_deviation
         there = one.spread.nominal + offsets
         tried = (offsets != 0.0) & (tight.low <= there) & (there <= tight.high)

@@ -58,7 +58,7 @@ def assume_errors(spec: Spec, process: str | None = None) -> Assumed | None:
         return None
     accuracy, (shared, owned) = accuracy_of(spec, process), _materials(spec)
     band = next((found for one in shared if (found := _band(one))), None)
-    rates = {path: float(spec.at(path)) for path, kind in kinds.items() if kind == "rate"}
+    rates = {path: float(spec.get_value(path)) for path, kind in kinds.items() if kind == "rate"}
     made = {path: kind for path, kind in kinds.items() if kind != "rate"}
     return Assumed(accuracy, made, band, any(map(_band, owned)), rates)
 

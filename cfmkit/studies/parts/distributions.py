@@ -48,12 +48,12 @@ class ParameterSpread:
         reach = COVERED * self.deviation
         return max(self.low, self.nominal - reach), min(self.high, self.nominal + reach)
 
-    def tightened(self, factor: float) -> ParameterSpread:
+    def tighten(self, factor: float) -> ParameterSpread:
         """Return the same distribution narrower about the nominal value."""
         low, high = (self.nominal + factor * (end - self.nominal) for end in (self.low, self.high))
         return replace(self, low=low, high=high, deviation=factor * self.deviation)
 
-    def at(self, unit: FloatArray) -> FloatArray:
+    def evaluate_quantiles(self, unit: FloatArray) -> FloatArray:
         """Return the values below which the shares `unit`, in (0, 1), of all parts lie."""
         if self.kind == "uniform":
             return self.low + unit * (self.high - self.low)
@@ -71,7 +71,7 @@ _EPSILON = float(np.finfo(np.float64).epsneg)
 
 def values_at(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:
     """Return points in the unit cube, (n, d), as values of the parameters."""
-    return np.stack([one.at(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
+    return np.stack([one.evaluate_quantiles(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
 
 
 def values_across(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:

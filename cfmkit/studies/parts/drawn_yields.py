@@ -121,7 +121,7 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     found = analyze_parts(parts, values, design, run.part(0.0, 0.4))
     shared, frozen = common_errors(parts, design, run), None
     if shared:
-        still = parts.without(values, shared)
+        still = parts.remove_errors(values, shared)
         frozen = analyze_parts(parts, still, design, run.part(0.4, 0.7), "parts without common errors").share()
     before, why = _yield_before(given, block, run.part(0.7, 1.0))
     each = tuple(found.share(found.met[:, [k]]) for k in range(found.met.shape[1]))

@@ -38,7 +38,7 @@ def expected_forces(result: Result, run: Run) -> str:
     if not result.curves:
         return ""
     try:
-        parts, whence = Parts.expected(result.spec, run.seed)
+        parts, whence = Parts.from_expected_errors(result.spec, run.seed)
         if parts is None:
             return ""
         places = _places(result)
@@ -80,7 +80,7 @@ def _to_measure(parts: Parts, weight: FloatArray) -> str:
 def _dimension(parts: Parts, k: int) -> str:
     """Return a dimension with its drawn value, as ``bistable.thickness (1.01 mm as drawn)``."""
     parent, _, last = parts.paths[k].rpartition(".")
-    thickness = getattr(parts.spec.at(parent), "thickness", None)
+    thickness = getattr(parts.spec.get_value(parent), "thickness", None)
     if last != "offset" or thickness is None:
         return f"{_name_parameter(parts, k)} as drawn)"
     # an error of all thicknesses is nothing that is drawn

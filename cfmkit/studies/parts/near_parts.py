@@ -161,7 +161,7 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
     errors, still, proportional = values - parts.nominal, values, False
     if MODULUS in parts.paths:
         k = parts.paths.index(MODULUS)
-        still = parts.without(values, (k,))
+        still = parts.remove_errors(values, (k,))
         change = parts.nominal[k] * near.by_error[: rows.efforts, k]
         proportional = bool(np.allclose(change, middle[: rows.efforts], rtol=PROPORTIONAL, atol=0.0))
     made = near.numbers(errors)
@@ -216,7 +216,7 @@ def expected_yield(result: Result, run: Run) -> str:
     name = found.process.name
     again = f"the same command with --set design.process={name}"
     try:
-        shares = expected_shares(result, Parts.assumed(spec, run.seed), run)
+        shares = expected_shares(result, Parts.from_assumed_errors(spec, run.seed), run)
     except Unknown as why:
         return f"not estimated ({name}, assumed tolerances): {why}; {again} draws parts"
     chosen = family(spec.family).free

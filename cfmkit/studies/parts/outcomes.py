@@ -51,7 +51,9 @@ class Outcomes:
 
     def share(self, met: NDArray[np.bool_] | None = None) -> Share:
         """Return the share of parts that meet every requirement."""
-        return Share.of(np.asarray((self.met if met is None else met).all(axis=1)), self.failed, why=self.why)
+        return Share.from_outcomes(
+            np.asarray((self.met if met is None else met).all(axis=1)), self.failed, why=self.why
+        )
 
 
 class _Progress(Silent):
@@ -60,7 +62,7 @@ class _Progress(Silent):
     def __init__(self, run: Run, what: str, count: int) -> None:
         self._run, self._what, self._count, self._done = run, what, count, 0
 
-    def done(self, points: int, failed: int, reused: bool) -> None:
+    def add_finished(self, points: int, failed: int, reused: bool) -> None:
         """Take that more parts are analysed."""
         self._done += points
         self._run.progress(self._done / self._count, f"{self._done} of {self._count} {self._what}")
@@ -146,5 +148,5 @@ def _judge_trimmed(
             values = factor * values
         else:
             continue
-        out[:, k] = np.isfinite(values) & Bounds.of(one, metric.dimension).met_by(values)
+        out[:, k] = np.isfinite(values) & Bounds.from_requirement(one, metric.dimension).met_by(values)
     return out

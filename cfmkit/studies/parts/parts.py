@@ -74,7 +74,7 @@ class Parts:
             raise SpecError([replace(one, path=_rename_fault(one.path)) for one in error.problems]) from None
 
     @classmethod
-    def expected(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
+    def from_expected_errors(cls, spec: Spec, seed: int, process: str | None = None) -> tuple[Parts | None, str]:
         """Return the parts that a shop will make, by stated or else by assumed errors, and in words whose errors."""
         design = getattr(spec, "design", None)
         if not isinstance(design, DesignKeys):
@@ -84,10 +84,10 @@ class Parts:
         found = assume_errors(spec, process)
         if found is None:
             return None, ""
-        return cls.assumed(spec, seed, process), f"made by {found.process.name} (assumed tolerances)"
+        return cls.from_assumed_errors(spec, seed, process), f"made by {found.process.name} (assumed tolerances)"
 
     @classmethod
-    def assumed(cls, spec: Spec, seed: int, process: str | None = None) -> Parts:
+    def from_assumed_errors(cls, spec: Spec, seed: int, process: str | None = None) -> Parts:
         """Return the parts that a process is assumed to make, for a specification some of whose values err by it."""
         design = getattr(spec, "design", None)
         known = _count_and_seed(spec, design, seed) if isinstance(design, DesignKeys) else (0, seed)
@@ -121,7 +121,7 @@ class Parts:
         """Return the specification of one part, of its values (d,)."""
         return self.spec.replace(dict(zip(self.paths, values.tolist(), strict=True)), as_made=True)
 
-    def without(self, values: FloatArray, members: tuple[int, ...]) -> FloatArray:
+    def remove_errors(self, values: FloatArray, members: tuple[int, ...]) -> FloatArray:
         """Return the values of the same parts without the errors of some parameters."""
         still = values.copy()
         still[:, members] = self.nominal[list(members)]

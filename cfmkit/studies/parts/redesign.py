@@ -92,7 +92,7 @@ class PartNumbers:
     @property
     def start(self) -> FloatArray:
         """The values that may move, where the search began, (n,) [SI]."""
-        return np.array([float(self.parts.spec.at(path)) for path in self.free])
+        return np.array([float(self.parts.spec.get_value(path)) for path in self.free])
 
     def variant(self, x: FloatArray, errors: FloatArray) -> Spec:
         """Return the specification of a part."""
@@ -112,7 +112,7 @@ class PartNumbers:
     def are_good(self, x: FloatArray, errors: FloatArray) -> NDArray[np.bool_]:
         """Return which parts with errors (k, d) keep every row, over all of the windows, (k,); each is solved."""
         design = self.variant(x, np.zeros(errors.shape[1]))
-        middle = np.array([float(design.at(path)) for path in self.parts.paths])
+        middle = np.array([float(design.get_value(path)) for path in self.parts.paths])
         values = dict(zip(self.parts.paths, (middle + errors).T, strict=True))
         found = numbers_of_parts(design, values, self.rows, self.run, stated_places(self.parts.spec))
         return np.array([one is not None and (self.rows.limits(one) >= 0).all() for one in found], dtype=bool)
@@ -131,7 +131,7 @@ class PartNumbers:
         by_x, by_error = (np.array([by.get(path, unknown) for path in names]).T for names in (self.free, paths))
         return PartSlopes(by_x, by_error) if by else None
 
-    def checked(self, x: FloatArray) -> int:
+    def count_good_parts(self, x: FloatArray) -> int:
         """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
         return int(self.are_good(x, self._fresh_errors).sum())
 
@@ -175,7 +175,7 @@ class PartNumbers:
             self.slopes,
         )
 
-    def written(self, found: RobustResult, problem: RobustProblem) -> Spec:
+    def build_spec(self, found: RobustResult, problem: RobustProblem) -> Spec:
         """Return the design with its values moved, as few digits of them as matter."""
         steps = 10.0**-DIGITS * problem.reach
         x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
@@ -217,7 +217,7 @@ def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, floa
     if not low < high:
         raise CannotVary(f"[{ends[0]}, {ends[1]}] is not a range: the first must be smaller than the second")
     try:
-        value = spec.at(path)
+        value = spec.get_value(path)
     except KeyError:
         value = None
     if not isinstance(value, int | float):
@@ -245,7 +245,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     run : Run
         Seed, progress, time budget.
     """
-    others, clock = design.next_best[:OTHER_SPRINGS], Clock.of(run.time_budget)
+    others, clock = design.next_best[:OTHER_SPRINGS], Clock.from_budgets(run.time_budget)
     good, found = _move_design(given, design, run, clock, not others)
     if not others or design.spec is None or found.spec is not None:
         return found
@@ -291,7 +291,7 @@ def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: b
         found, good = _with_margins(problem, numbers, numbers.start, largest)
         if block.robust is not None and free:
             again = optimise_on_samples(problem, found, DRAWN, block.robust == "worst")
-            better = numbers.checked(again.x)
+            better = numbers.count_good_parts(again.x)
             found, good = (again, better) if better >= good else (found, good)
     except NoPart:
         return 0, replace(
@@ -309,7 +309,7 @@ def _with_margins(
     for _ in range(ROUNDS):
         found = with_margins(replace(problem, share=asked), x)
         began = found.began if began is None else began
-        good = numbers.checked(found.x)
+        good = numbers.count_good_parts(found.x)
         if best is None or good > best[1]:
             best = replace(found, began=began), good
         short = problem.share - good / CHECKED
@@ -339,7 +339,7 @@ def _largest(
         if problem.late():
             break
         found = with_margins(replace(problem, share=asked), start)
-        good = numbers.checked(found.x)
+        good = numbers.count_good_parts(found.x)
         if good > best[1]:
             best = replace(found, reached=False), good
         low, high = (max(asked, best[1] / CHECKED), high) if good >= CHECKED * asked else (best[1] / CHECKED, asked)
@@ -350,7 +350,7 @@ def _largest(
 
 def _finish_design(design: Design, part: PartNumbers, found: RobustResult, good: int, problem: RobustProblem) -> Design:
     """Return the design with its values moved, or why there is none, and what the search says of it."""
-    x, spec, worst = found.x, part.written(found, problem), part.costliest(found, problem)
+    x, spec, worst = found.x, part.build_spec(found, problem), part.costliest(found, problem)
     if _misses(good, problem):
         return _impossible(design, part, good, worst, problem)
     solved = f"{good} of {CHECKED} solved parts meet them; largest contributor: {worst}"

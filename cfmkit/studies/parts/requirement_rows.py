@@ -79,7 +79,7 @@ class _RowsOfMargins:
         self.metrics: list[Metric] = []
         self.rows: list[tuple[dict[int, float], float, int]] = []
 
-    def at(self, over: Any) -> Any:
+    def select_window(self, over: Any) -> Any:
         """Return the numbers of the places in a window."""
         low, high = _window(self.nominal, over)
         slack = 1e-9 * (self.places[-1] - self.places[0])
@@ -91,7 +91,7 @@ class _RowsOfMargins:
         if name in ENVELOPE:  # tolerances move the box by next to nothing, and it takes a drawing of each part
             return
         (metric,) = metrics_of(self.nominal.spec, [one.metric], self.nominal.curve)
-        limits = Bounds.of(one, metric.dimension)
+        limits = Bounds.from_requirement(one, metric.dimension)
         plain = name.replace("torque_", "force_", 1)
         if plain in _OF_STRESS and self.stresses and self._stress(plain, limits, one.over, number):
             return
@@ -104,7 +104,7 @@ class _RowsOfMargins:
             ]
             if found and all(rows is not None for rows in found):
                 added = [(row, constant, number) for rows in found for row, constant in rows or ()]
-                if not self._contradicted(added, one):
+                if not self._contradicts_analysis(added, one):
                     self.rows += added
                     return
         column = self._numbers + len(self.metrics)
@@ -114,7 +114,7 @@ class _RowsOfMargins:
         if limits.max is not None:
             self.rows.append(({column: -1.0}, limits.max, number))
 
-    def _contradicted(self, rows: list[tuple[dict[int, float], float, int]], one: Requirement) -> bool:
+    def _contradicts_analysis(self, rows: list[tuple[dict[int, float], float, int]], one: Requirement) -> bool:
         """Return True if rows say that a requirement is missed which the analysis finds met: its points are too few."""
         values = np.concatenate([*self.first.effort.values(), *self.first.stress])
         for row, constant, _ in rows:
@@ -137,12 +137,12 @@ class _RowsOfMargins:
             return False
         count, first = len(self.places), len(self.branches) * len(self.places)
         for s in range(self.stresses):
-            self.rows += [({first + s * count + int(k): -1.0}, most, number) for k in self.at(over)]
+            self.rows += [({first + s * count + int(k): -1.0}, most, number) for k in self.select_window(over)]
         return True
 
     def _effort(self, name: str, limits: Bounds, over: Any, k: int) -> list[tuple[dict[int, float], float]] | None:
         """Return rows of the effort on one branch; None if they would not say it."""
-        at, first = self.at(over), k * len(self.places)
+        at, first = self.select_window(over), k * len(self.places)
         values = self.first.effort[self.branches[k]][at]
         if not len(at) or not np.isfinite(values).all():
             return None

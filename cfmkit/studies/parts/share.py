@@ -34,7 +34,7 @@ class Share:
     why: str = ""  # what became of the first failed part
 
     @classmethod
-    def of(cls, met: NDArray[np.bool_], failed: NDArray[np.bool_], why: str = "") -> Share:
+    def from_outcomes(cls, met: NDArray[np.bool_], failed: NDArray[np.bool_], why: str = "") -> Share:
         """Return the share of parts that meet what they should, (n,), of which some failed."""
         return cls(int((met & ~failed).sum()), int(failed.sum()), len(met), why)
 

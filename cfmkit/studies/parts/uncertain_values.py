@@ -139,7 +139,7 @@ def _items(spec: Spec, path: str) -> list[str]:
     if not star:
         return [path]
     try:
-        values = spec.at(before)
+        values = spec.get_value(before)
     except KeyError:
         values = None
     if not isinstance(values, tuple):
@@ -159,7 +159,7 @@ def _parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Pa
 
 def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
     try:
-        value = spec.at(found.path)
+        value = spec.get_value(found.path)
     except KeyError:
         value = None
     if isinstance(value, tuple):

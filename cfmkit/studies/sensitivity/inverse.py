@@ -34,7 +34,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     answer = allowed_tolerances(setup.parts, setup.nominal.result, errors, costs, wanted)
     found = list(_tolerance_lines(setup, answer))
     factors = np.where(np.isfinite(answer.allocated), np.maximum(answer.allocated, LEAST_FACTOR), 1.0)
-    tight = [one.tightened(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
+    tight = [one.tighten(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
 
     points = values_at(tight, setup.parts.unit(setup.samples, setup.seed))[:, None, :]
     outputs = evaluator.outputs(points, [DRAWN])

@@ -45,7 +45,7 @@ def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups)
         Tolerances that are tightened together.
     """
     drawn = values_at(spreads, unit)
-    tight = values_at([one.tightened(TIGHTER) for one in spreads], unit)
+    tight = values_at([one.tighten(TIGHTER) for one in spreads], unit)
     blocks = [drawn]
     for group in groups:
         changed = drawn.copy()

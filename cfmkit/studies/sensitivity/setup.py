@@ -107,7 +107,7 @@ class Setup:
     def limits(self, metric: Metric) -> tuple[Bounds, ...]:
         """Return the requirements on a metric over its window, as bounds."""
         mine = [one for one in self.study.spec.part_requirements if _note_ends(one) == (metric.name, metric.over)]
-        return tuple(Bounds.of(one, metric.dimension) for one in mine)
+        return tuple(Bounds.from_requirement(one, metric.dimension) for one in mine)
 
 
 def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Setup:

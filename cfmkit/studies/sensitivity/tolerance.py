@@ -53,8 +53,8 @@ def judge_samples(setup: Setup, outputs: FloatArray) -> tuple[NDArray[np.bool_],
 
 def with_shares(found: Findings, met: NDArray[np.bool_], failed: NDArray[np.bool_]) -> Findings:
     """Return findings with the shares of parts, as drawn, that meet all requirements and each of them."""
-    each = tuple(Share.of(met[:, 0, k], failed[:, 0]) for k in range(met.shape[-1]))
-    return replace(found, all_met=Share.of(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0]), each_met=each)
+    each = tuple(Share.from_outcomes(met[:, 0, k], failed[:, 0]) for k in range(met.shape[-1]))
+    return replace(found, all_met=Share.from_outcomes(np.asarray(met[:, 0].all(axis=-1)), failed[:, 0]), each_met=each)
 
 
 def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:

@@ -108,7 +108,7 @@ def _apart(one: float, other: float) -> tuple[str, str]:
 
 def too_short(request: Request, result: Result) -> Iterator[str]:
     """Yield whether the window that was judged is shorter than the travel that is required."""
-    window: Any = result.spec.at("analysis.window")
+    window: Any = result.spec.get_value("analysis.window")
     length = 0.0 if window is None else float(window[1]) - float(window[0])
     if length < request.travel * (1.0 - SLACK):
         dimension = "length" if request.kind == "force" else "angle"

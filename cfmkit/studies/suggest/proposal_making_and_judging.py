@@ -252,7 +252,9 @@ def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     def judge(spec: Spec) -> Proposal:
         return judge_proposal(job.family, near.variant, spec, job.request, job.seed, clock)
 
-    found = redesign_for_yield(near, job.candidate, job.request, Run(job.seed, time_budget=clock.left()), judge)
+    found = redesign_for_yield(
+        near, job.candidate, job.request, Run(job.seed, time_budget=clock.get_time_left()), judge
+    )
     return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
 
 
@@ -274,11 +276,11 @@ def redesign_for_yield(
     judge : callable
         Analyses and judges a specification, drawn parts included.
     """
-    clock = Clock.of(run.time_budget)
+    clock = Clock.from_budgets(run.time_budget)
     wanted = asked = float(request.good_parts or 0.0)
     best, spec, last, obstacle = near, near.spec, None, ""
     for _ in range(TRIES):
-        run = replace(run, time_budget=clock.left())
+        run = replace(run, time_budget=clock.get_time_left())
         moved = None if clock.late() else moved_for_yield(candidate, spec, request, asked, run)
         if moved is None:
             break
@@ -312,7 +314,7 @@ def _explain_margins(moved: MovedForYield | None, obstacle: str) -> str:
 
 def _seconds(clock: Clock) -> float:
     """Return how long one design may search [s]."""
-    left = clock.left()
+    left = clock.get_time_left()
     return LONGEST if left is None else min(LONGEST, max(left, 0.1))
 
 
@@ -410,7 +412,7 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
 
     Its inside corners are as round as before, or as round as the process makes them: a smaller radius has more stress.
     """
-    mechanism = spec.at("mechanism")
+    mechanism = spec.get_value("mechanism")
     owners = {"mechanism": mechanism, "mechanism.contact": getattr(mechanism, "contact", None)}
     for path, owner in owners.items():
         if (material := getattr(owner, "material", None)) is not None:
@@ -420,7 +422,7 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
     if request.process is None:
         return spec
     radius = PROCESSES[request.process].least_radius
-    fillet = getattr(spec.at("mechanism"), "fillet", 0.0)
+    fillet = getattr(spec.get_value("mechanism"), "fillet", 0.0)
     changes: tuple[dict[str, Any], ...] = (
         {"mechanism.part.process": request.process, "mechanism.part.fillet": max(radius, fillet)},
         {"mechanism.part.process": request.process},
@@ -481,7 +483,7 @@ def _notes(space: BoundingBox | None, result: Result) -> Iterator[str]:
     """Yield what a reader has to know: what was assumed, what rubs, what the analysis warns of."""
     if space is not None and space.assumed:
         yield space.assumed
-    mechanism = result.spec.at("mechanism")
+    mechanism = result.spec.get_value("mechanism")
     rubs = [f"{name} {value:g}" for name in ("pins", "guide") if (value := _friction(mechanism, name))]
     if rubs:
         yield f"friction assumed: {', '.join(rubs)}"

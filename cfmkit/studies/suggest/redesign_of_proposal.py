@@ -31,7 +31,7 @@ def block_for_redesign(spec: Spec, request: Request) -> Mapping[str, Any] | None
     """
     paths = section_paths(spec)
     if paths:
-        free = {path: _range(path, float(spec.at(path)), request) for path in paths}
+        free = {path: _range(path, float(spec.get_value(path)), request) for path in paths}
         return {"free": free} | ({"verify": "solid"} if spec.fidelity == "solid" else {})
     block = getattr(spec, "design", None)
     if block is not None:
@@ -53,9 +53,9 @@ def _range(path: str, value: float, request: Request) -> tuple[str, str]:
 
 def _of_own_springs(spec: Spec, request: Request) -> Mapping[str, Any] | None:
     """Return the targets of a linkage, whose catalogue are the springs at its pins; None if it has none."""
-    springs = getattr(spec.at("mechanism"), "springs", None)
+    springs = getattr(spec.get_value("mechanism"), "springs", None)
     bought = getattr(springs, "bought", ())
-    window: Any = spec.at("analysis.window")
+    window: Any = spec.get_value("analysis.window")
     if not bought or window is None:
         return None
     motion, dimension = ("angle", "angle") if request.kind == "torque" else ("travel", "length")

@@ -83,7 +83,7 @@ def list_unjudged(request: Request, result: Result) -> Iterator[str]:
         yield "force and stress not judged: the mesh is too coarse"
     if _bends(result) and result.allowable_stress is None:
         yield f"stress not judged: no strength is known of {_material(result)}"
-    contact = getattr(result.spec.at("mechanism"), "contact", None)
+    contact = getattr(result.spec.get_value("mechanism"), "contact", None)
     if contact is not None and contact.material.yield_strength is None:
         yield f"contact pressure not judged: no strength is known of {_material(result)}"
 
@@ -93,7 +93,7 @@ def stressed_motion(request: Request, spec: Spec) -> tuple[str, str]:
 
     A made part begins and ends a little before or after the perfect one: a metric over all that this does has no value.
     """
-    window: Any = spec.at("analysis.window")
+    window: Any = spec.get_value("analysis.window")
     if request.good_parts is None or window is None or request.kind == "torque":
         return "0 %", "100 %"
     return format_short(0.5 * float(window[0]), "length", 12), format_short(float(window[1]), "length", 12)
@@ -174,13 +174,13 @@ def _bends(result: Result) -> bool:
 
 def _has_springs(spec: Spec) -> bool:
     """Return True if a mechanism is driven by bought springs."""
-    springs = getattr(spec.at("mechanism"), "springs", None)
+    springs = getattr(spec.get_value("mechanism"), "springs", None)
     return springs is not None and any(getattr(springs, name, None) for name in ("stiffness", "rates", "wound"))
 
 
 def _block(spec: Spec) -> Any:
     """Return the material of a mechanism, or of its contact."""
-    mechanism = spec.at("mechanism")
+    mechanism = spec.get_value("mechanism")
     return getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
 
 

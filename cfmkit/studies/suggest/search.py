@@ -79,7 +79,7 @@ class _Times:
     without: float | None = None
 
     @classmethod
-    def of(cls, budget: float | None, reserve: float) -> _Times:
+    def from_budget(cls, budget: float | None, reserve: float) -> _Times:
         """Return the times of a budget that begins now, of which a reserve is for what comes afterwards [s]."""
         if budget is None:
             return cls()
@@ -144,7 +144,7 @@ def suggest(
         Of the time budget, kept for what comes after the search [s]; as long as nothing is found there is nothing to
         come, and the search goes on.
     """
-    times, bugs = _Times.of(run.time_budget, reserve), list[str]()
+    times, bugs = _Times.from_budget(run.time_budget, reserve), list[str]()
     answers, unasked = _answers(request, run, times.asking, bugs)
     queues = {one.family: list(one.offer.candidates) for one in answers}
     making = _Making(run, times, sum(map(len, queues.values())), bugs)
@@ -152,7 +152,7 @@ def suggest(
     while not making.late() and (batch := list(_next(queues, making.done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
         turn += 1
         jobs = [ProposalJob(name, candidate, request, run.seed, times.without) for name, candidate in batch]
-        rest = (making.with_margins, making.for_finest)
+        rest = (making.with_margins, making.select_for_finest)
         if not (making.all_of(jobs) and all(making.all_of(again(enough)) for again in rest)):
             cut = True
             break
@@ -252,7 +252,7 @@ class _Making:
             failed = replace(failed, text="", message=f"{job.near.pending} model: {proposal.message}")
         self.done[at] = proposal if proposal.text else failed
 
-    def for_finest(self, enough: int) -> list[ProposalJob]:
+    def select_for_finest(self, enough: int) -> list[ProposalJob]:
         """Return what is to be judged by the finest model, of each family that lacks proposals, by turns."""
         rows = []
         for name in dict.fromkeys(job.family for job in self._jobs):

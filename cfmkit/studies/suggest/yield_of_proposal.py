@@ -217,12 +217,14 @@ def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: f
         return None
     parts = Parts.of_block(spec, block, block.samples or N_DRAWN, run.seed)
     numbers = PartNumbers(parts, tuple(free), rows, run)
-    problem = numbers.problem(free, asked, Clock.of(run.time_budget))
+    problem = numbers.problem(free, asked, Clock.from_budgets(run.time_budget))
     try:
         found = with_margins(problem, numbers.start, STEPS)
     except NoPart:
         return None
-    return MovedForYield(numbers.written(found, problem), found.began, found.share, numbers.costliest(found, problem))
+    return MovedForYield(
+        numbers.build_spec(found, problem), found.began, found.share, numbers.costliest(found, problem)
+    )
 
 
 def _free(candidate: Candidate, spec: Spec, request: Request) -> dict[str, tuple[float, float]]:
@@ -233,13 +235,13 @@ def _free(candidate: Candidate, spec: Spec, request: Request) -> dict[str, tuple
     if candidate.design and choose is not None:
         found |= function_named(choose)(given, spec)
     for path in candidate.free:
-        value: Any = spec.at(path)
+        value: Any = spec.get_value(path)
         if isinstance(value, float):
             thin = path.endswith("thickness")
             found[path] = range_about(
                 value, low=request.thinnest if thin else None, high=None if thin else request.depth
             )
     # a value at the end of its range, as a leaf as thin as can be made, may still move away from it
-    at = {path: float(spec.at(path)) for path in found}
+    at = {path: float(spec.get_value(path)) for path in found}
     inside = {path: (min(low, at[path]), max(high, at[path])) for path, (low, high) in found.items()}
     return {path: ends for path, ends in inside.items() if ends[0] < ends[1]}

@@ -36,7 +36,7 @@ def mechanism(result: Result) -> Figure:
     places = {"relaxed": 0.0, "flat": min(solution.height, end), "end": end}
     box = (-1.3 * span, min(base, solution.height - end) - 0.2 * span, 1.3 * span, solution.height + 0.6 * span)
     titles = [f"{name}: {value_text(place, 'length')}" for name, place in places.items()]
-    figure, panels = parts.poses(Heading.of(result, "mechanism to scale"), box, titles)
+    figure, panels = parts.poses(Heading.from_result(result, "mechanism to scale"), box, titles)
     for ax, place in zip(panels, places.values(), strict=True):
         at = (0.0, solution.height - place)
         for name, anchor in (("left", (-span, 0.0)), ("right", (span, 0.0)), ("base", (0.0, base))):

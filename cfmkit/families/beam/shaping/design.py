@@ -51,7 +51,7 @@ def optimise_shape(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         return Design(None, Status.INVALID, problem)
     spec = with_stretch_and_shear(spec)
     task = task_of(spec, wanted)
-    plan = StartBudget(drawn=wanted.drawn, clock=Clock.of(wanted.time_budget, run.time_budget))
+    plan = StartBudget(drawn=wanted.drawn, clock=Clock.from_budgets(wanted.time_budget, run.time_budget))
     result = explore(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
     tables = {"starts": lambda: starts_table(task, result)}
     best = _best(spec, task, result, plan)
@@ -115,7 +115,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         total_stress=spec.stress == "total",
         safety_factor=mechanism.safety_factor,
         layers=layers,
-        shape=None if curve is None else curve.scaled(1.0 / mean),
+        shape=None if curve is None else curve.scale(1.0 / mean),
         bending_only=None if spec.fidelity == BENDING_ONLY else bends,
     )
 
@@ -123,7 +123,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
 def mean_of(curve: TargetCurve, window: tuple[float, float]) -> float:
     """Return the mean of a curve over a window [N]."""
     places = np.linspace(*window, 2001)
-    return float(np.trapezoid(curve.at(places), places) / (window[1] - window[0]))
+    return float(np.trapezoid(curve.evaluate(places), places) / (window[1] - window[0]))
 
 
 def _coordinates(wanted: Optimise) -> list[Coordinate]:

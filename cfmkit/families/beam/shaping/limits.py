@@ -250,7 +250,7 @@ def _pair(network: Network, first: str, second: str) -> Pair:
 def separations(view: View, couples: list[Pair]) -> PendingRows:
     """Return (gap / required gap - 1) of all pairs at the poses that are shown, (pairs, q)."""
     shown, opening = view.poses.shown, view.response.variables.task.limits.opening
-    lines = {name: _Thinned.of(view, name) for name in view.lengths}
+    lines = {name: _Thinned.from_view(view, name) for name in view.lengths}
     ways = [_way(view, pair, *(lines[name].place for name in pair.beams)) for pair in couples]
     way = np.stack([one.length for one in ways])
     wanted = np.array([_required_gap(view, pair) for pair in couples])[:, None, None]
@@ -299,7 +299,7 @@ class _Thinned:
     y: FloatArray
 
     @classmethod
-    def of(cls, view: View, beam: str) -> _Thinned:
+    def from_view(cls, view: View, beam: str) -> _Thinned:
         """Return a beam of a response."""
         line, row = view.response.state.lines[beam], view.response.rows[beam].index
         kept, shown = _even(len(line.place)), view.poses.shown

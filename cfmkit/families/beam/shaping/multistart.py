@@ -77,20 +77,20 @@ def explore(task: Task, plan: StartBudget, counts: tuple[int, int], identity: st
     """
     starts, wide = counts
     jobs = _Jobs(task, plan, identity, run)
-    begun = jobs.done("starts", partial(searched, task.started, run.seed, plan=plan), range(starts))
+    begun = jobs.run_stage("starts", partial(searched, task.started, run.seed, plan=plan), range(starts))
     found, missing = _found_in(begun), starts - len(begun.records)
     if task.objective == "range":
         best = dict(list(rank(task, found))[:wide])
-        found |= _found_in(jobs.done("widenings", partial(_widen, task.started, best, plan), best))
+        found |= _found_in(jobs.run_stage("widenings", partial(_widen, task.started, best, plan), best))
         distant = partial(searched_far, task.started, run.seed, plan=plan)
-        far = _found_in(jobs.done("starts over a wider window", distant, range(starts)))
+        far = _found_in(jobs.run_stage("starts over a wider window", distant, range(starts)))
         leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_LEADERS])
         work = partial(_nearer, task.started, leaders, plan)
-        led = _found_in(jobs.done("widenings of the flattest of these", work, leaders))
+        led = _found_in(jobs.run_stage("widenings of the flattest of these", work, leaders))
         found |= {index: one for index, one in led.items() if _better(task, one, found.get(index))}
     if task.orders != task.started.orders:
         widest = dict(list(rank(task, found))[:_REFINED])
-        found |= _found_in(jobs.done("refinements", partial(_refine, task, widest, plan), widest))
+        found |= _found_in(jobs.run_stage("refinements", partial(_refine, task, widest, plan), widest))
     audits = {index: audited(Variables(task, one.order), one) for index, one in rank(task, found)}
     return Explored(found, begun.reused, missing, tuple(jobs.lost), audits)
 
@@ -105,7 +105,7 @@ class _Jobs:
     run: Run
     lost: list[str] = field(default_factory=list)
 
-    def done(self, what: str, search: Callable[[int], Found | None], numbers: Iterable[int]) -> Done:
+    def run_stage(self, what: str, search: Callable[[int], Found | None], numbers: Iterable[int]) -> Done:
         """Return what the jobs of a stage led to; it is called by what its jobs are."""
         numbers = tuple(numbers)
         stage = Stage(OneStart(search, self.plan.clock), numbers, f"{self.identity} {what}")

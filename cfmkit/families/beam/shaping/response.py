@@ -305,7 +305,7 @@ class CloseView:
         if self.curve is None:
             return fine, force
         with np.errstate(divide="ignore", invalid="ignore"):  # outside the window the curve may be zero
-            return fine, force / self.curve.at(fine * self.layers)
+            return fine, force / self.curve.evaluate(fine * self.layers)
 
     @cached_property
     def bands(self) -> FloatArray:

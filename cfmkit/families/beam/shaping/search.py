@@ -312,7 +312,7 @@ def satisfy_limits(
     Given up where a round does not bring what is missed below a share of what it was.
     """
     cap = max(_FLAT, 1.1 * found.objective)
-    variables, x = Variables(task, found.order).raised(found.x, max(order, found.order))
+    variables, x = Variables(task, found.order).change_order(found.x, max(order, found.order))
     program = Shaping(variables, found.start, Flattest(), give, cap, _NEAR_ROWS)
     for _ in range(_ROUNDS):
         z = program.begin(x)
@@ -331,7 +331,7 @@ def _minimise_objective(
     task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf
 ) -> Found:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
-    variables, x = Variables(task, found.order).raised(found.x, order)
+    variables, x = Variables(task, found.order).change_order(found.x, order)
     goal = ForceRatio() if task.objective == "paper" else Flattest()
     program = Shaping(variables, found.start, goal, near=_NEAR_ROWS)
     z = program.begin(x)

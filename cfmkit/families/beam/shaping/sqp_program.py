@@ -79,7 +79,7 @@ class Shaping(DesignProgram):
             return z
         return np.append(z, worst(rows for rows in self.limits(view) if rows.name in self.elastic))
 
-    def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
+    def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""
         own = z[self.variables.count :]
         view = self.view(z[: self.variables.count], self.goal.window_start(own, self.start), sloped)
@@ -150,7 +150,7 @@ def window_force(view: View) -> FloatArray:
 def _levelling(view: View) -> FloatArray | float:
     """Return what makes a force level that follows the task's curve, at the poses of the window; 1 without one."""
     task = view.response.variables.task
-    return 1.0 if task.shape is None else 1.0 / task.shape.at(view.poses.at[view.poses.window] * task.layers)
+    return 1.0 if task.shape is None else 1.0 / task.shape.evaluate(view.poses.at[view.poses.window] * task.layers)
 
 
 @cache

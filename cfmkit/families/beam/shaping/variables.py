@@ -85,7 +85,7 @@ class Variables:
         given = list(shape.coefficients[1:]) if isinstance(shape, Polynomial) else []
         return (given + [0.0] * self.order)[: self.order]
 
-    def raised(self, x: FloatArray, order: int) -> tuple[Variables, FloatArray]:
+    def change_order(self, x: FloatArray, order: int) -> tuple[Variables, FloatArray]:
         """Return the variables of another order and the same shapes in them, terms above the order dropped."""
         places = len(self.task.coordinates)
         rows = x[places:].reshape(len(self.task.shaped), self.order)[:, :order]

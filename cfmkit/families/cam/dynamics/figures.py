@@ -59,7 +59,7 @@ def motion(result: Result) -> Figure:
         Diagram(times, TIME, Scale("force", "force"), forces, [level], found),
         Diagram(times, TIME, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(found)),
     ]
-    return diagram_figure(Heading.of(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
+    return diagram_figure(Heading.from_result(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
 
 
 @apply_style
@@ -95,7 +95,7 @@ def motion_contact(result: Result) -> Figure:
             history.times, TIME, Scale("force in a brace", "force"), [*roller_end, *slider_end], (), _drop_names(found)
         ),
     ]
-    return diagram_figure(Heading.of(result, "forces of the cam on the rollers, and in the braces"), diagrams)
+    return diagram_figure(Heading.from_result(result, "forces of the cam on the rollers, and in the braces"), diagrams)
 
 
 def motion_rollers(result: Result) -> Figure:
@@ -108,7 +108,7 @@ def motion_rollers(result: Result) -> Figure:
         Diagram(history.times, TIME, Scale("speed of the slider", "velocity"), speed),
         Diagram(history.times, TIME, Scale("speed of a roller", "angular_velocity"), spin),
     ]
-    return diagram_figure(Heading.of(result, "speed of the slider, and at which the rollers turn"), diagrams)
+    return diagram_figure(Heading.from_result(result, "speed of the slider, and at which the rollers turn"), diagrams)
 
 
 def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]:

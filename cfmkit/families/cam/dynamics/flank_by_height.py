@@ -78,7 +78,7 @@ class FlankLine:
         u = np.linspace(*self.ends, KNOTS)
         return float(np.interp(y, self.place(u)[1], u))
 
-    def at(self, y: Real, guess: Real) -> FlankPoint:
+    def locate(self, y: Real, guess: Real) -> FlankPoint:
         """Return the points of the flank at heights y [m], starting the search at path coordinates `guess` [m]."""
         cos, sin = self._turn
         law, u = self.path.law, guess

@@ -98,7 +98,7 @@ def _keep_inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding
     dynamics, motion = stated_motion(spec), parts.motion
     times = motion.times(dynamics.points)
     low, high = parts.machine.span
-    position, slack = motion.at(times).position, 1e-12 * (high - low)
+    position, slack = motion.evaluate(times).position, 1e-12 * (high - low)
     inside = (position >= low - slack) & (position <= high + slack)
     if inside.all():
         return times, ()
@@ -131,7 +131,7 @@ def _solve_motion(spec: CamSpec, parts: Build, times: FloatArray) -> MotionSolut
 
 def _requested_ends(parts: Build) -> tuple[float, float]:
     """Return where the motion was to start and to end [m]."""
-    start, end = _displacement(parts, parts.motion.at(parts.motion.times(2)).position).tolist()
+    start, end = _displacement(parts, parts.motion.evaluate(parts.motion.times(2)).position).tolist()
     return start, end
 
 
@@ -199,7 +199,7 @@ def _curve(moved: MotionSolution) -> Curve:
 
 def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:
     """Return the history by inverse dynamics."""
-    found = respond(machine, motion.at(times))
+    found = respond(machine, motion.evaluate(times))
     return History(
         times=times,
         moment=found.moment,
@@ -233,7 +233,7 @@ def multibody_history(
     center = np.array([right.center, left.center])
     return History(
         times=found.times,
-        moment=motion.at(found.times),
+        moment=motion.evaluate(found.times),
         force=found.force,
         contact=np.array([right.contact, left.contact]),
         traction=np.array([right.traction, left.traction]),
@@ -279,7 +279,7 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
         If the first pose is impossible already.
     """
     machine, motion = parts.machine, parts.motion
-    known = _margins(machine, motion.at(times))
+    known = _margins(machine, motion.evaluate(times))
     first: tuple[int, str] | None = None
     for name, margin in known.items():
         lost = margin < -_slack(name, margin, machine)
@@ -294,14 +294,14 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
         raise CannotBuild(_describe_ending(name, known, machine, "at the first point of the motion"))
 
     def holds(time: float) -> bool:
-        margin = _margins(machine, motion.at(np.array([time])))[name]
+        margin = _margins(machine, motion.evaluate(np.array([time])))[name]
         return bool(margin[0] > 0)
 
     low, high = float(times[index - 1]), float(times[index])
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
-    place = float(motion.at(np.array([low])).position[0]) + origin
+    place = float(motion.evaluate(np.array([low])).position[0]) + origin
     return MotionEnding(low, _describe_ending(name, known, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
 
 

@@ -86,7 +86,7 @@ class SideChain:
         """Return the angles and the contact of this side."""
         brace, roller, contact, height = np.moveaxis(x[..., self.columns], -1, 0)
         turned = roller + contact
-        flank = self.line.at(height, guess)
+        flank = self.line.locate(height, guess)
         return Posture(np.sin(brace), np.cos(brace), np.sin(turned), np.cos(turned), flank)
 
     def residual(self, x: FloatArray, at: Posture, out: FloatArray) -> None:
@@ -198,7 +198,7 @@ class NineCoordinates:
         coordinates, contacts = self._integrate(motion, times, (start, contacts), scheme)
         postures = self.postures(coordinates, contacts)
         jacobian = self.jacobian(postures, (points,))
-        position, speed, push = motion.at(times)
+        position, speed, push = motion.evaluate(times)
         driven = np.zeros((points, SIZE))
         residual = self.residual(coordinates, postures)
         driven[:, HOLONOMIC] = -scheme.stabilisation / motion.time * residual[:, HOLONOMIC]
@@ -207,7 +207,7 @@ class NineCoordinates:
         needed = -self.quadratic(postures, velocities)
         needed[:, GIVEN] += push
         accelerations = _solve(jacobian, needed)
-        applied = self.applied(coordinates, velocities, postures)
+        applied = self.compute_forces(coordinates, velocities, postures)
         inertia = np.einsum("nij,nj->ni", self.mass(coordinates, postures), accelerations)
         multipliers = _solve(np.swapaxes(jacobian, 1, 2), applied - inertia)
         worst = float(np.abs(residual[:, HOLONOMIC]).max())
@@ -255,7 +255,7 @@ class NineCoordinates:
             out[..., roller, roller] = parts.roller_inertia
         return out
 
-    def applied(self, x: FloatArray, velocity: FloatArray, postures: tuple[Posture, Posture]) -> FloatArray:
+    def compute_forces(self, x: FloatArray, velocity: FloatArray, postures: tuple[Posture, Posture]) -> FloatArray:
         """Return q(x, x'): weight, springs, and what the mass matrix owes to its dependence on the braces' angles."""
         machine, out = self.machine, np.zeros(x.shape)
         out[..., 0] = -machine.gravity * machine.slider_mass
@@ -280,7 +280,7 @@ class NineCoordinates:
 
     def _start(self, motion: Cycloid, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return coordinates that meet the constraints at the beginning [SS, eq. 18], and the path coordinates."""
-        ends = motion.at(times[[0, -1]]).position
+        ends = motion.evaluate(times[[0, -1]]).position
         stances = self.machine.stances(ends)
         if any(stance.on_corner.any() for stance in stances):
             raise CornerContact
@@ -330,7 +330,7 @@ class NineCoordinates:
         def rate(t: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
             postures = self.postures(x, known)
             known[:] = [float(posture.flank.parameter) for posture in postures]
-            position, speed, _ = motion.at(np.float64(t))
+            position, speed, _ = motion.evaluate(np.float64(t))
             right = -beta * self.residual(x, postures)
             right[ROLLING] = 0.0
             right[GIVEN] = speed - beta * (x[0] - position)

@@ -110,12 +110,12 @@ class Cycloid:
         """Return `points` equal steps from beginning to end [s]."""
         return np.linspace(0.0, self.time, points)
 
-    def at(self, times: FloatArray | np.float64) -> Moment:
+    def evaluate(self, times: FloatArray | np.float64) -> Moment:
         """Return position, speed and acceleration at times between 0 and `time` [s].
 
         Examples
         --------
-        >>> middle = Cycloid(0.2, 0.1, 0.5).at(np.array([0.25]))
+        >>> middle = Cycloid(0.2, 0.1, 0.5).evaluate(np.array([0.25]))
         >>> [round(float(values[0]), 12) for values in middle]
         [0.25, 0.4, 0.0]
         """
@@ -152,7 +152,7 @@ class CurvePiece(Protocol):
         """Whether the roller pivots on the cam's corner."""
         ...
 
-    def at(self, parameter: FloatArray) -> CurvePoints:
+    def evaluate(self, parameter: FloatArray) -> CurvePoints:
         """Return the points for values of the parameter."""
         ...
 
@@ -166,7 +166,7 @@ class Flank:
     ends: tuple[float, float]
     on_corner: bool = False
 
-    def at(self, parameter: FloatArray) -> CurvePoints:
+    def evaluate(self, parameter: FloatArray) -> CurvePoints:
         """Return the points for path coordinates [m]."""
         slope, bend = self.profile.path.law.slopes(parameter)
         square = 1.0 + slope * slope
@@ -188,7 +188,7 @@ class CornerArc:
     ends: tuple[float, float]
     on_corner: bool = True
 
-    def at(self, parameter: FloatArray) -> CurvePoints:
+    def evaluate(self, parameter: FloatArray) -> CurvePoints:
         """Return the points for angles of the centre as seen from the corner [rad]."""
         toward = np.exp(1j * parameter)
         size = np.full(parameter.shape, self.radius)
@@ -203,7 +203,7 @@ def pieces_of(track: Track) -> tuple[CurvePiece, ...]:
         return (flank,)
     corner = complex(*profile.corner.point)
     first = profile.path.law.rest_half_width - corner
-    last = flank.at(np.array([profile.start])).point[0] - corner
+    last = flank.evaluate(np.array([profile.start])).point[0] - corner
     return CornerArc(corner, track.radius, (float(np.angle(first)), float(np.angle(last)))), flank
 
 
@@ -261,7 +261,7 @@ class Side:
         """Factor that turns a point."""
         return cmath.exp(1j * self.angle)
 
-    def turned(self, places: CurvePoints) -> CurvePoints:
+    def rotate(self, places: CurvePoints) -> CurvePoints:
         """Return points of the curve about the origin of all positions."""
         point, tangent, curvature, pace = places
         if self.height:
@@ -270,9 +270,9 @@ class Side:
             point, tangent = point * self.turn, tangent * self.turn
         return CurvePoints(point, tangent, curvature, pace)
 
-    def at(self, piece: CurvePiece, parameter: FloatArray) -> tuple[CurvePoints, FloatArray]:
+    def evaluate(self, piece: CurvePiece, parameter: FloatArray) -> tuple[CurvePoints, FloatArray]:
         """Return the turned points of a piece and the positions of the slider that belong to them [m]."""
-        places = self.turned(piece.at(parameter))
+        places = self.rotate(piece.evaluate(parameter))
         return places, places.point.imag + self._drop(places)
 
     def _drop(self, places: CurvePoints) -> FloatArray:
@@ -302,7 +302,7 @@ class Side:
                 continue
             if ends[0] > piece.ends[0]:
                 found = []
-            span = self.at(piece, np.array(ends))[1]
+            span = self.evaluate(piece, np.array(ends))[1]
             found.append(RisingStretch(piece, ends, (float(span[0]), float(span[1]))))
             if ends[1] < piece.ends[1]:
                 break
@@ -315,14 +315,14 @@ class Side:
         low, high = piece.ends
         knots = low + (high - low) * np.linspace(0.0, 1.0, KNOTS) ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
-            rising = self.rate(self.turned(piece.at(knots))) > 0
+            rising = self.rate(self.rotate(piece.evaluate(knots))) > 0
         if not rising.any():
             return None
         first = int(np.argmax(rising))
         stop = first + int(np.argmin(rising[first:])) if not rising[first:].all() else 0
 
         def rate(u: float) -> float:
-            return float(self.rate(self.turned(piece.at(np.array([u]))))[0])
+            return float(self.rate(self.rotate(piece.evaluate(np.array([u]))))[0])
 
         begin = bracketed_root(rate, float(knots[first - 1]), float(knots[first])) if first else low
         return begin, self._end(piece, float(knots[stop - 1]), float(knots[stop])) if stop else high
@@ -331,7 +331,7 @@ class Side:
         """Return where the slider stops rising, or the brace is too short for the curve, whichever is first."""
 
         def steepness(u: float) -> float:
-            places = self.turned(piece.at(np.array([u])))
+            places = self.rotate(piece.evaluate(np.array([u])))
             x, tangent = float(places.point.real[0]), places.tangent[0]
             across = (self.parts.brace_length - x) * (self.parts.brace_length + x)
             return float(tangent.imag) * math.sqrt(max(across, 0.0)) - float(tangent.real) * x
@@ -354,21 +354,21 @@ class Side:
     def stance(self, slider: FloatArray) -> Stance:
         """Return where the roller is for slider positions within `span` [m]."""
         if len(self.stretches) == 1 or slider.min() >= self.stretches[-1].span[0]:
-            return self._on(self.stretches[-1], slider)
+            return self._solve_stance(self.stretches[-1], slider)
         edges = [stretch.span[0] for stretch in self.stretches[1:]]
         which = np.searchsorted(edges, slider, side="right")
         whole = Stance(*(np.empty(slider.shape, dtype=kind) for kind in (complex, complex, float, bool)))
         for index in np.unique(which):
             here = which == index
-            for target, values in zip(whole, self._on(self.stretches[index], slider[here]), strict=True):
+            for target, values in zip(whole, self._solve_stance(self.stretches[index], slider[here]), strict=True):
                 target[here] = values
         return whole
 
-    def _on(self, stretch: RisingStretch, slider: FloatArray) -> Stance:
+    def _solve_stance(self, stretch: RisingStretch, slider: FloatArray) -> Stance:
         piece, (low, high) = stretch.piece, stretch.ends
         u = self._guides[stretch.span].parameter(slider)
         for _ in range(NEWTON_STEPS):
-            places, value = self.at(piece, u)
+            places, value = self.evaluate(piece, u)
             error = value - slider
             if np.abs(error).max() <= 8.0 * EPS * abs(stretch.span[1]):
                 break
@@ -376,11 +376,11 @@ class Side:
                 u = np.minimum(np.maximum(u - error / self.rate(places), low), high)
         else:
             u = invert_increasing(lambda v: self._rise(piece, v), slider, stretch.ends, u)
-            places = self.at(piece, u)[0]
+            places = self.evaluate(piece, u)[0]
         return Stance(places.point, places.tangent, places.curvature, np.full(slider.shape, piece.on_corner))
 
     def _rise(self, piece: CurvePiece, parameter: FloatArray) -> tuple[FloatArray, FloatArray]:
-        places, value = self.at(piece, parameter)
+        places, value = self.evaluate(piece, parameter)
         return value, self.rate(places)
 
     @cached_property
@@ -394,7 +394,7 @@ class Side:
         slider, rate = self._rise(stretch.piece, knots)
         foot = stretch.span[0] - _rise_before(knots[1] - low, slider[:3] - stretch.span[0])
         root = np.sqrt(np.maximum(slider - foot, 0.0))
-        return FirstGuess.through(foot, root, knots, 2.0 * root / np.where(rate > 0, rate, np.inf))
+        return FirstGuess.from_points(foot, root, knots, 2.0 * root / np.where(rate > 0, rate, np.inf))
 
 
 @dataclass(frozen=True)
@@ -410,7 +410,7 @@ class FirstGuess:
     cubics: FloatArray
 
     @classmethod
-    def through(cls, foot: float, roots: FloatArray, parameters: FloatArray, slopes: FloatArray) -> FirstGuess:
+    def from_points(cls, foot: float, roots: FloatArray, parameters: FloatArray, slopes: FloatArray) -> FirstGuess:
         """Return the spline through parameters with given slopes over increasing roots."""
         width = np.diff(roots)
         secant = np.diff(parameters) / np.where(width > 0, width, 1.0)

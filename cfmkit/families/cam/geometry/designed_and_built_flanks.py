@@ -61,7 +61,7 @@ class BuiltFlank:
     def frame(self, parameter: FloatArray) -> CurveFrame:
         """Return the built flank at arc lengths of the design."""
         base = self.design.frame(np.interp(parameter, self.arc[1], self.arc[0]))
-        error, slope, bend = (self.error.at(parameter, order) for order in range(3))
+        error, slope, bend = (self.error.evaluate(parameter, order) for order in range(3))
         along, length = 1.0 + base.curvature * error, np.hypot(1.0 + base.curvature * error, slope)
         tangents = (along[:, None] * base.tangents + slope[:, None] * base.normals) / length[:, None]
         # The change of the design's curvature along the flank is small beside the error's own bend.

@@ -52,14 +52,14 @@ class CamProfile:
         length = (1.0 + f * f) ** 0.5
         return f / length, -1.0 / length
 
-    def shifted(self, x: Real, offset: float) -> tuple[Real, Real]:
+    def offset_points(self, x: Real, offset: float) -> tuple[Real, Real]:
         """Return the points at a distance `offset` [m] from the path along the normal, towards the roller."""
         nx, ny = self.normal(x)
         return x + offset * nx, self.path.height(x) + offset * ny
 
     def flank(self, x: Real) -> tuple[Real, Real]:
         """Return the flank's points for path coordinates x; part of the cam only from `start` on."""
-        return self.shifted(x, -self.roller_radius)
+        return self.offset_points(x, -self.roller_radius)
 
     @property
     def start(self) -> float:

@@ -147,7 +147,7 @@ class Track:
         self.radius = roller_radius + offset
         self.shift = self.radius - profile.roller_radius
         self._corner_point = profile.corner.point if profile.corner else (0.0, 0.0)
-        x_first = float(profile.shifted(profile.start, self.shift)[0])
+        x_first = float(profile.offset_points(profile.start, self.shift)[0])
         self._pivots = self._pivot_range()
         begins = self._corner_point[0] + self.radius * math.sin(self._pivots[0]) if profile.corner else x_first
         if min(x_first, begins) <= 0:
@@ -169,17 +169,17 @@ class Track:
     def _limits(self, x_first: float) -> None:
         """Set the slider positions at which pieces begin and end."""
         pivots = self.profile.corner is not None
-        at_corner, rate = self._on_corner(self._pivots[0]) if pivots else self._on_flank(self.profile.start)
+        at_corner, rate = self._evaluate_corner(self._pivots[0]) if pivots else self._evaluate_flank(self.profile.start)
         self.start = self.dead_point = float(at_corner)
-        if pivots and self._on_corner(self._pivots[1])[1] > 0:
+        if pivots and self._evaluate_corner(self._pivots[1])[1] > 0:
             self.flank_range, self.turns_back = self._rising(skip=False)
-            self.corner_end = float(self._on_flank(self.flank_range[0])[0])
+            self.corner_end = float(self._evaluate_flank(self.flank_range[0])[0])
             self.dead_point = float(at_corner) if rate >= 0 else self._collinear()
         else:
             self.flank_range, self.turns_back = self._rising(skip=True)
-            low = float(self._on_flank(self.flank_range[0])[0])
+            low = float(self._evaluate_flank(self.flank_range[0])[0])
             self.dead_point, self.corner_end = min(low, self.start), self.start
-        self.end = float(self._on_flank(self.flank_range[1])[0])
+        self.end = float(self._evaluate_flank(self.flank_range[1])[0])
         if self.end - self.start <= 1e-11 * self.brace_length:
             raise NoTrack("dead", x_first)
 
@@ -198,13 +198,13 @@ class Track:
         if self._follows_law and self.profile.path.law.always_rises:
             return (low, high), False
         knots = np.linspace(low, high, KNOTS)
-        rising = self._on_flank(knots)[1] > 0
-        rising[0] |= not skip or self._on_flank(low)[1] >= -1e-12
+        rising = self._evaluate_flank(knots)[1] > 0
+        rising[0] |= not skip or self._evaluate_flank(low)[1] >= -1e-12
         if not rising.any():
             raise NoTrack("dead", low)
         first = int(np.argmax(rising))
         falls = first + int(np.argmin(rising[first:])) if not rising[first:].all() else 0
-        rate = lambda u: float(self._on_flank(u)[1])  # noqa: E731
+        rate = lambda u: float(self._evaluate_flank(u)[1])  # noqa: E731
         begin = bracketed_root(rate, float(knots[first - 1]), float(knots[first])) if first else low
         return (begin, bracketed_root(rate, float(knots[falls - 1]), float(knots[falls])) if falls else high), falls > 0
 
@@ -213,23 +213,23 @@ class Track:
         low, high = self.profile.start, self.profile.end
 
         def margin(u: float) -> float:
-            return self.brace_length * (1 - 1e-12) - float(self.profile.shifted(u, self.shift)[0])
+            return self.brace_length * (1 - 1e-12) - float(self.profile.offset_points(u, self.shift)[0])
 
         return high if margin(high) >= 0 else bracketed_root(margin, low, high)
 
     def _slider(self, x: Real, y: Real | float) -> Real:
         return y + ((self.brace_length - x) * (self.brace_length + x)) ** 0.5
 
-    def _on_flank(self, u: Real) -> tuple[Real, Real]:
+    def _evaluate_flank(self, u: Real) -> tuple[Real, Real]:
         """Return slider position and its derivative along the flank."""
         law = self.profile.path.law
         if self._follows_law:
             return self._slider(u, self.profile.path.height(u)), law.slope(u) - brace_tangent(u, law.brace_length)
-        x, y = self.profile.shifted(u, self.shift)
+        x, y = self.profile.offset_points(u, self.shift)
         rate = (law.slope(u) - brace_tangent(x, self.brace_length)) * (1.0 + self.shift / law.curvature_radius(u))
         return self._slider(x, y), rate
 
-    def _on_corner(self, turn: float) -> tuple[float, float]:
+    def _evaluate_corner(self, turn: float) -> tuple[float, float]:
         """Return slider position, and the sign of its derivative, while the roller pivots on the corner."""
         slider, x, slope = self._corner_piece(turn)
         return slider, slope - brace_tangent(x, self.brace_length)
@@ -321,7 +321,7 @@ class Track:
         return self._slider(x, yc - self.radius * cos), x, sin / cos
 
     def _flank_piece(self, u: Real) -> tuple[Real, Real, Real]:
-        x, y = self.profile.shifted(u, self.shift) if self._is_shifted else (u, self.profile.path.height(u))
+        x, y = self.profile.offset_points(u, self.shift) if self._is_shifted else (u, self.profile.path.height(u))
         return self._slider(x, y), x, self.profile.path.law.slope(u)
 
     def _flank_parameter(self, slider: FloatArray) -> FloatArray:
@@ -333,11 +333,11 @@ class Track:
             return np.minimum(np.maximum(ideal_position(law, travel), low), high)
         zero, places, excess = self._guide
         root = np.sqrt(np.maximum(slider - zero, 0.0))
-        guess = ideal_position(law, root * root) + self._interpolated(root, places, excess)
-        return invert_increasing(self._on_flank, slider, self.flank_range, guess)
+        guess = ideal_position(law, root * root) + self._interpolate(root, places, excess)
+        return invert_increasing(self._evaluate_flank, slider, self.flank_range, guess)
 
     @staticmethod
-    def _interpolated(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
+    def _interpolate(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
         return np.interp(at, places, values)
 
     @cached_property
@@ -348,7 +348,7 @@ class Track:
         """
         low, high = self.flank_range
         knots = low + (high - low) * np.linspace(0.0, 1.0, KNOTS)
-        slider = self._on_flank(knots)[0]
+        slider = self._evaluate_flank(knots)[0]
         zero = np.minimum(self.start, slider[..., :1])
         root = np.sqrt(np.maximum(slider - zero, 0.0))
         return zero, root, knots - ideal_position(self.profile.path.law, root * root)
@@ -414,7 +414,7 @@ class TrackRows(Track):
             yield TrackStretch(on_corner, low, high, self._corner_piece if on_corner else self._flank_piece)
 
     @staticmethod
-    def _interpolated(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
+    def _interpolate(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
         if places.ndim == 1:  # what differs in these tracks does not move them
             return np.interp(at, places, values)
         return np.stack([np.interp(*row) for row in zip(at, places, values, strict=True)])

@@ -81,7 +81,7 @@ class CurveSlopeLaw(SlopeLaw):
         """Return the travel with the roller at x [m]."""
         at = np.asarray(x, dtype=np.float64)
         flat = np.atleast_1d(at).ravel()
-        found = self._integrated(flat) if self.friction else self._from_energy(flat)
+        found = self._evaluate_travel(flat) if self.friction else self._from_energy(flat)
         return found.reshape(at.shape) if at.ndim else float(found[0])
 
     def _work(self, travel: Any) -> Any:
@@ -94,12 +94,12 @@ class CurveSlopeLaw(SlopeLaw):
         energy = out * (out + 2.0 * self.preload) / (2.0 * self.force_constant)
         if self.carried:
             energy = energy - self.carried * drop(x, self.rest_half_width, self.brace_length)
-        least = max(float(self.shape.at(self.travel_end)) - self.carried, 1e-9)
+        least = max(float(self.shape.evaluate(self.travel_end)) - self.carried, 1e-9)
         beyond = max(float(energy.max(initial=0.0)) - float(self._work(self.travel_end)), 0.0)
         far = self.travel_end + 1.01 * beyond / least
 
         def work(travel: FloatArray) -> tuple[FloatArray, FloatArray]:
-            return self._work(travel), self.shape.at(travel) - self.carried
+            return self._work(travel), self.shape.evaluate(travel) - self.carried
 
         places = self._guide
         guess = np.interp(energy, places[1], places[0])
@@ -111,12 +111,12 @@ class CurveSlopeLaw(SlopeLaw):
         first = np.flatnonzero(energy < self._work(piece))
         if not first.size:
             return found
-        wanted, begin = np.maximum(energy[first], 0.0), float(self.shape.at(0.0)) - self.carried
+        wanted, begin = np.maximum(energy[first], 0.0), float(self.shape.evaluate(0.0)) - self.carried
         growth = float(self.shape.slope(0.0))
         root = np.sqrt(np.maximum(begin * begin + 2.0 * growth * wanted, 0.0))
         travel = np.minimum(2.0 * wanted / np.maximum(begin + root, 1e-300), piece)
         for _ in range(NEWTON_STEPS):
-            rate = np.maximum(self.shape.at(travel) - self.carried, 1e-300)
+            rate = np.maximum(self.shape.evaluate(travel) - self.carried, 1e-300)
             travel = np.clip(travel - (self._work(travel) - wanted) / rate, 0.0, piece)
         better = np.abs(self._work(travel) - wanted) <= np.abs(self._work(found[first]) - wanted)
         found[first] = np.where(better, travel, found[first])
@@ -156,20 +156,20 @@ class CurveSlopeLaw(SlopeLaw):
 
     def _vertical(self, x: Any, travel: Any) -> Any:
         """Return what sinks to zero where the path turns vertical, with some way left to it."""
-        phi = self.shape.at(travel)
+        phi = self.shape.evaluate(travel)
         tangent = brace_tangent(x, self.brace_length)
         stretch = (x - self.rest_half_width + self.preload) / self.force_constant
         return phi - self.carried - self.friction * (stretch + phi * tangent) - 1e-9 * phi
 
     def _rate(self, x: Any, travel: Any) -> Any:
         """Return ds/dx."""
-        phi, tangent = self.shape.at(travel), brace_tangent(x, self.brace_length)
+        phi, tangent = self.shape.evaluate(travel), brace_tangent(x, self.brace_length)
         pushed = (x - self.rest_half_width + self.preload) / self.force_constant + phi * tangent
         left = phi - self.carried
         over = pushed * (1.0 + self.friction * tangent) + left * (self.friction - tangent)
         return over / (left - self.friction * pushed)
 
-    def _integrated(self, x: FloatArray) -> FloatArray:
+    def _evaluate_travel(self, x: FloatArray) -> FloatArray:
         solution = self._solution
         return np.asarray(solution.sol(np.clip(x, self.rest_half_width, solution.t[-1]))[0])
 
@@ -179,9 +179,9 @@ class CurveSlopeLaw(SlopeLaw):
         if self.begins_at_zero:
             at = np.maximum(at, self.position(NEAR_START * self.travel_end))
         travel = np.asarray(self.travel(at))
-        return at, travel, self.shape.at(travel)
+        return at, travel, self.shape.evaluate(travel)
 
-    def _pushed(self, x: Any) -> tuple[Any, Any]:
+    def _evaluate_rates(self, x: Any) -> tuple[Any, Any]:
         """Return dy/dx - tan a without friction, and phi's change along the path over phi - gamma."""
         at, travel, phi = self._regular(x)
         tangent = brace_tangent(at, self.brace_length)
@@ -192,7 +192,7 @@ class CurveSlopeLaw(SlopeLaw):
 
     def frictionless(self, x: Real) -> Real:
         """Return p(x), the slope before the contact normal is turned by friction."""
-        slope: Any = self._pushed(x)[0] + brace_tangent(x, self.brace_length)
+        slope: Any = self._evaluate_rates(x)[0] + brace_tangent(x, self.brace_length)
         return slope
 
     def slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -201,7 +201,7 @@ class CurveSlopeLaw(SlopeLaw):
 
     def _rise(self, x: Real) -> Real:
         """Return dp/dx [1/m]: below zero where the force grows so quickly that the flank is hollow."""
-        rate, change = self._pushed(x)
+        rate, change = self._evaluate_rates(x)
         left = self._regular(x)[2] - self.carried
         across = (self.brace_length - x) * (self.brace_length + x)
         turn = self.brace_length**2 / (across * across**0.5)

@@ -83,7 +83,7 @@ class Profile(Model):
 
     @field_validator("file", mode="wrap")
     @classmethod
-    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
+    def _resolve_file(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
         folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
         return None if value is None else DataSource(handler(value), folder)
 

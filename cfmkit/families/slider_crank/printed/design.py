@@ -117,7 +117,7 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     if wanted.shape == "uniform" and task.goal != "stroke":
         return _design_uniform_strip(spec, wanted, task, ranges, run)
     pins, allowed, limits = pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress, _limits(spec)
-    identity, clock = identity_of(spec, run.seed), Clock.of(run.time_budget)
+    identity, clock = identity_of(spec, run.seed), Clock.from_budgets(run.time_budget)
     kept: Design | None = None
     for reserve in RESERVES:
         made_of = replace(task.material, allowable_stress=allowed)
@@ -268,7 +268,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
         ripple or LOOSE,
         beam.goal,
         beam.longest or 0.5 * reach,
-        None if wanted.curve is None else wanted.curve.scaled(1.0 / wanted.size),
+        None if wanted.curve is None else wanted.curve.scale(1.0 / wanted.size),
         spec.mechanism.sets,
     )
 
@@ -299,7 +299,7 @@ def form_of(
             f"design.beam.shares has {len(wanted.shares or ())} ranges, and there are {form.placed} shares"
         )
     table = [(low * 1e3, high * 1e3) for low, high in rows] + list(wanted.shares or ())
-    if not form.ordered(np.mean(table, axis=1), task.corners):
+    if not form.is_ordered(np.mean(table, axis=1), task.corners):
         raise InputError("the middles of the ranges in 'design.beam.shares' must increase: the search begins there")
     if isinstance(width, tuple):
         table.append((width[0] * 1e3, width[1] * 1e3))
@@ -348,9 +348,9 @@ def _design_uniform_strip(
         return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
     if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
         wide = float(np.clip(width, *wanted.width))
-        reached = newton(_four_digits(task.asked(task.force) * wide / width, up=width < wide))
+        reached = newton(_four_digits(task.sum_over_sets(task.force) * wide / width, up=width < wide))
         text = (
-            f"{newton(task.asked(task.force))} need a width of {mm(width)}; within 'design.beam.width', "
+            f"{newton(task.sum_over_sets(task.force))} need a width of {mm(width)}; within 'design.beam.width', "
             f"{mm(wanted.width[0])} to {mm(wanted.width[1])}, the nearest is {reached}"
         )
         nearest = {"design.force": reached, "design.beam.width": mm(width)}
@@ -373,7 +373,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
         limit = (
             "the stress" if allowed is not None and thickness * allowed / stress < high else "'design.beam.thickness'"
         )
-        nearest = task.asked((float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force)
+        nearest = task.sum_over_sets((float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force)
         text = (
             f"a strip {mm(width)} wide would have to be {mm(thickness)} thick; {limit} allows {mm(low)} to "
             f"{mm(thickest)}, which is about {newton(nearest)}"

@@ -158,12 +158,12 @@ class Chain(ShortRepr):
         if wanted == self.side and clear:
             path = _trace(self.build(self.points), drive, tolerance)
             if path.status is PathStatus.COMPLETE:
-                return self._judged(path, wanted)
+                return self._classify_ending(path, wanted)
         other = clear and wanted != self.side
-        helper = mirror_points(self.points, self.pins) if other else self._bowed(wanted)
-        return self._from(helper, drive, wanted, tolerance, other)
+        helper = mirror_points(self.points, self.pins) if other else self._bend_to_side(wanted)
+        return self._trace_from_helper(helper, drive, wanted, tolerance, other)
 
-    def _bowed(self, side: int) -> FloatArray:
+    def _bend_to_side(self, side: int) -> FloatArray:
         """Return the points with the crank pin moved a little to one side: a chain that cannot go the wrong way."""
         axis = (self.pins[2] - self.pins[0]) / self.length
         along = (self.points - self.pins[0]) @ axis
@@ -172,23 +172,25 @@ class Chain(ShortRepr):
         moved: FloatArray = self.points + np.outer(side * BOW * self.length * hat, np.array([-axis[1], axis[0]]))
         return moved
 
-    def _from(self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, other: bool) -> Pressed:
+    def _trace_from_helper(
+        self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, other: bool
+    ) -> Pressed:
         """Return the equilibria nearest to those of a chain that is kinked to the side wanted.
 
         The branch to which the kink does not lead begins with a limit point: nothing before it, nor rest, is on it.
         """
         known = _trace(self.build(helper), drive, tolerance)
         if known.status is not PathStatus.COMPLETE:
-            return self._judged(known, wanted, helped=True)
+            return self._classify_ending(known, wanted, helped=True)
         path = neighbouring(known, self.build(self.points), drive)
         first = _beginning(path, drive) if other else 0
         if other and 0 < first < len(drive.points):
             path = _from_its_limit(part_of(path, path.requested >= first), drive.points[:first])
             text = f"with its kink the other way the chain has an equilibrium only from {path.drive[0] * 1e3:.4g} mm on"
             return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
-        return self._judged(path, wanted)
+        return self._classify_ending(path, wanted)
 
-    def _judged(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
+    def _classify_ending(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
         """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
         ending, message = _ENDINGS.get(path.status, PressingEnd.NOT_CONVERGED), path.message
         if helped or not len(path.at_requested):
@@ -202,7 +204,7 @@ class Chain(ShortRepr):
             ending, message = PressingEnd.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
         chain_like = abs(kink(self.pins)) <= BENT * self.length
         if ending is PressingEnd.COMPLETE and side != wanted and (chain_like or wanted != self.side):
-            return self._crossed(path, sides, wanted)
+            return self._cut_before_crossing(path, sides, wanted)
         return Pressed(path, ending, message, side)
 
     def _sides(self, path: Path, wanted: int) -> FloatArray:
@@ -223,7 +225,7 @@ class Chain(ShortRepr):
             sides[:] = -wanted  # it went there at once, whatever its kink says
         return sides
 
-    def _crossed(self, path: Path, sides: FloatArray, wanted: int) -> Pressed:
+    def _cut_before_crossing(self, path: Path, sides: FloatArray, wanted: int) -> Pressed:
         """Return what there is before the chain bends to the other side: nothing where it does so at once."""
         first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
         if first < FEWEST:
@@ -264,17 +266,17 @@ def _from_its_limit(path: Path, missing: FloatArray) -> Path:
         return path
     free, drive = np.array([spot.free for spot in found[::-1]]), np.array([spot.way for spot in found[::-1]])
     back = path.with_states(np.zeros(len(found), np.int64), free, drive)
-    longer = back.joined(path)
+    longer = back.append(path)
     between, places = interpolate_path(longer), missing[missing > longer.drive[0]]
     if between is None:
         return path
-    number, more = len(missing) - len(places), between.at(places)
+    number, more = len(missing) - len(places), between.solve_at(places)
     requested = np.full(len(back), -1)
     requested[0] = number - 1
     back = replace(back, requested=read_only(requested, np.int64))
     more = replace(more, requested=read_only(np.arange(number, len(missing)), np.int64)).take(more.accurate)
-    before = back.joined(more)
-    return before.take(np.argsort(before.at.drive, kind="stable")).joined(path)
+    before = back.append(more)
+    return before.take(np.argsort(before.at.drive, kind="stable")).append(path)
 
 
 def _followed_back(path: Path) -> list[MarchState]:

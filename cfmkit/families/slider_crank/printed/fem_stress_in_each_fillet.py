@@ -33,7 +33,7 @@ def fillets(
     for one in stressed_fillets(solved, spec.mechanism.fillet):
         nearest = FLEXURES[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
         names = [] if spec.piece == "beam" else [nearest]
-        names += one.arc.touched(pads) or ([] if names else ["strip"])
+        names += one.arc.find_touched(pads) or ([] if names else ["strip"])
         if (found := one.largest(*window)) is not None:
             rows.append(FilletRow(": ".join(names), one.arc, *found))
     stresses = nominal_stresses(

@@ -42,7 +42,7 @@ MARGIN = 0.08
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a printed slider-crank, by file stem."""
-    if result.spec.at("analysis.fidelity") == "solid":
+    if result.spec.get_value("analysis.fidelity") == "solid":
         return {maker.__name__: partial(maker, result) for maker in (curve, stress_map)}
     return {maker.__name__: partial(maker, result) for maker in (curve, stress, guide, part)}
 
@@ -51,7 +51,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 def curve(result: Result) -> Figure:
     """Return the force over the slider's travel, the band that it should keep enlarged."""
     reported = {"lumped": "flexures and rigid links", "beam": "a strip", "solid": "the part as drawn"}
-    what = reported[str(result.spec.at("analysis.fidelity"))]
+    what = reported[str(result.spec.get_value("analysis.fidelity"))]
     return loop_figure(result, None, f"force over travel of the slider: {what}")
 
 
@@ -74,7 +74,7 @@ def stress(result: Result) -> Figure:
     )
     place = np.concatenate([solution.place[1:2], solution.place[1:]])
     lower = Diagram(solution.travel, over, Scale("place", "length"), [Series(place, "along the part", PURPLE)])
-    return diagram_figure(Heading.of(result, "largest stress, and where it is"), [upper, lower])
+    return diagram_figure(Heading.from_result(result, "largest stress, and where it is"), [upper, lower])
 
 
 @apply_style
@@ -86,7 +86,7 @@ def guide(result: Result) -> Figure:
     upper = Diagram(solution.travel, over, Scale("force", "force"), forces)
     moment = [Series(solution.guide_moment, "on the guide", OCHRE)]
     lower = Diagram(solution.travel, over, Scale("moment", "torque"), moment)
-    return diagram_figure(Heading.of(result, "force and moment on the slider's guide"), [upper, lower])
+    return diagram_figure(Heading.from_result(result, "force and moment on the slider's guide"), [upper, lower])
 
 
 @apply_style
@@ -96,7 +96,7 @@ def part(result: Result) -> Figure:
     points = choose_points(solution, POSES)
     shown, view, room = _in_view(result, points)
     figure = new_figure(160.0, 120.0)
-    heading = Heading.of(result, "the part to scale while it is pressed")
+    heading = Heading.from_result(result, "the part to scale while it is pressed")
     write_heading(figure, heading)
     ax = axes_mm(figure, (17.0, 12.0, 138.0, 106.0 - heading.height_mm))
     last = len(points) - 1
@@ -154,7 +154,7 @@ def _length(points: FloatArray) -> float:
 
 def moving(result: Result) -> Moving | None:
     """Return the part over its travel, for a film; None of a part solved as a solid."""
-    if result.spec.at("analysis.fidelity") == "solid":
+    if result.spec.get_value("analysis.fidelity") == "solid":
         return None
     solution: Solution = result.state
     points = film_poses(len(solution.travel))

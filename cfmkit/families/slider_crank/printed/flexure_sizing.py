@@ -116,7 +116,7 @@ class FixedWidth:
     shortest: tuple[float, ...]  # lengths as stated; they grow where the stress asks for it [m]
     stays: bool  # whether they do not
 
-    def corrected(self, parts: Sequence[Flexure], by_force: float, by_stress: float) -> tuple[Flexure, ...]:
+    def correct_sizes(self, parts: Sequence[Flexure], by_force: float, by_stress: float) -> tuple[Flexure, ...]:
         """Return flexures whose force is smaller by a factor, and whose stress is the allowable one or less.
 
         The force goes with h^3/L and the stress with h/L.
@@ -273,7 +273,7 @@ def correct_flexures(
         if not exact or max(abs(by_force - 1.0), abs(by_stress - 1.0)) < 1e-9:
             break
         if fixed is not None:
-            before, parts = parts, fixed.corrected(parts, by_force, by_stress)
+            before, parts = parts, fixed.correct_sizes(parts, by_force, by_stress)
             if all(abs(one.length / old.length - 1.0) < 1e-9 for one, old in zip(parts, before, strict=True)) and (
                 abs(by_force - 1.0) < 1e-9
             ):

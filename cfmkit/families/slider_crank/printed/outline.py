@@ -31,7 +31,7 @@ SWEPT = 25
 
 def drawing(spec: SliderCrankSpec) -> Drawing:
     """Return the outline of one leg, with a table of its sections."""
-    return _draw_leg(spec, Leg.of(spec))
+    return _draw_leg(spec, Leg.from_spec(spec))
 
 
 def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
@@ -52,7 +52,9 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     made: tuple[Contour, ...] = (rounded,)
     if frame:
         check_simple(rounded.points(SAGITTA * leg.thinnest), "the outline of the leg")  # the union would hide it
-        made = merge_pieces([OutlinePiece.within(rounded), *map(OutlinePiece.polygon, frame)], leg.thinnest, fillet)
+        made = merge_pieces(
+            [OutlinePiece.from_contour(rounded), *map(OutlinePiece.polygon, frame)], leg.thinnest, fillet
+        )
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(leg.pads, (False, True), strict=True)]
     marks += [mark(one, driven=False) for one in frame]
@@ -106,10 +108,10 @@ class SolvedPiece:
 
 def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
     """Return one leg as it is solved as a solid."""
-    part, leg = spec.mechanism.part, Leg.of(spec, as_printed=True)
+    part, leg = spec.mechanism.part, Leg.from_spec(spec, as_printed=True)
     frame: tuple[FloatArray, ...] = ()
     if part is not None and part.frame is not None and part.frame.ground is not None:
-        frame = _frame(spec, Leg.of(spec))
+        frame = _frame(spec, Leg.from_spec(spec))
         spec = _remove_frame(spec, part, leg.pads, frame)
     drawn = _draw_leg(spec, leg)
     outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")

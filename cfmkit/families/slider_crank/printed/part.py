@@ -71,7 +71,7 @@ class Leg:
     pad: tuple[float, float, float]  # depth of the pad at the ground, of that at the slider, breadth of both [m]
 
     @classmethod
-    def of(cls, spec: SliderCrankSpec, as_printed: bool = False) -> Leg:
+    def from_spec(cls, spec: SliderCrankSpec, as_printed: bool = False) -> Leg:
         """Return the leg of a specification as it is drawn, or with what printing adds to a strip."""
         linkage = linkage_of(spec.mechanism)
         unloaded = unloaded_angle(spec.mechanism, linkage)
@@ -183,7 +183,7 @@ def _pad_sizes(spec: SliderCrankSpec) -> tuple[float, float, float]:
 def part_over_motion(result: Result) -> PosedPart:
     """Return one leg as it moves; legs lie above each other."""
     spec: Any = result.spec
-    depth = spec.mechanism.legs * float(Leg.of(spec).width.max())
+    depth = spec.mechanism.legs * float(Leg.from_spec(spec).width.max())
     moving = bodies(spec, result.state, choose_points(result.state, N_POSES))
     return PosedPart(moving, direction=0.0, depth=depth, pieces=spec.mechanism.sets)
 
@@ -193,7 +193,7 @@ def bodies(spec: SliderCrankSpec, solution: Solution, points: NDArray[Any]) -> t
 
     The leg's pieces come in their order, from the ground to the slider.
     """
-    leg, path = Leg.of(spec, as_printed=True), solution.pressed.path
+    leg, path = Leg.from_spec(spec, as_printed=True), solution.pressed.path
     at = [int(path.at_requested[point]) for point in points]
     found: list[PosedBody] = []
     for name, beam in path.network.beams.items():

@@ -117,7 +117,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         linkage = linkage_of(spec.mechanism)
         unloaded = unloaded_angle(spec.mechanism, linkage)
         spec = as_run(spec, linkage, unloaded)
-        solved = driven_part(spec).solved(run.progress)
+        solved = driven_part(spec).solve(run.progress)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     except GeometryError as error:

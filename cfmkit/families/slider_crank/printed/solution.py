@@ -75,21 +75,21 @@ class ChainCurve(ShortRepr):
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the force of all legs at travels of any shape [N]."""
-        return self._at(places, 0)
+        return self._evaluate(places, 0)
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of a leg at travels of any shape [Pa]."""
-        return self._at(places, 1)
+        return self._evaluate(places, 1)
 
     def force(self, places: FloatArray) -> FloatArray:
         """Return the force of all legs at travels of any shape [N]."""
-        return self._at(places, 0)
+        return self._evaluate(places, 0)
 
-    def _at(self, places: FloatArray, which: int) -> FloatArray:
+    def _evaluate(self, places: FloatArray, which: int) -> FloatArray:
         law, first = self.laws[which], self.first[which]
         nearest = float(np.exp(law.ends[0]))
         size = np.clip(np.ravel(places), *self.ends)
-        found = law.at(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
+        found = law.evaluate(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
         share = np.minimum(size / nearest, 1.0)
         values = np.where(size < nearest, first + (found - first) * share, found)
         if self.stops and which == 0:
@@ -103,12 +103,12 @@ class ChainCurve(ShortRepr):
     def first_at(self, level: float, which: int = 0) -> float | None:
         """Return the travel at which the force [N], or the stress [Pa] (1), first reaches a level; None if nowhere."""
         places = self.places
-        above = np.flatnonzero(self._at(places, which) >= level)
+        above = np.flatnonzero(self._evaluate(places, which) >= level)
         if not len(above) or above[0] == 0:
             return float(places[0]) if len(above) else None
 
         def off(travel: float) -> float:
-            return float(self._at(np.array([travel]), which)[0]) - level
+            return float(self._evaluate(np.array([travel]), which)[0]) - level
 
         return bracketed_root(off, float(places[above[0] - 1]), float(places[above[0]]))
 
@@ -215,7 +215,7 @@ class Solution(ShortRepr):
     @cached_property
     def _peak(self) -> tuple[FloatArray, FloatArray]:
         peak = self.pressed.path.peak_stress()
-        return peak.value[self._at], self._along(peak.beam[self._at], peak.place[self._at])
+        return peak.value[self._at], self._locate_along_chain(peak.beam[self._at], peak.place[self._at])
 
     @property
     def stress(self) -> FloatArray:
@@ -227,7 +227,7 @@ class Solution(ShortRepr):
         """Place of the largest stress: along the centre line from the clamped end [m]."""
         return self._peak[1]
 
-    def _along(self, beams: FloatArray, shares: FloatArray) -> FloatArray:
+    def _locate_along_chain(self, beams: FloatArray, shares: FloatArray) -> FloatArray:
         """Return places on beams as lengths along the chain [m]."""
         points = self.chain.points
         marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -249,10 +249,10 @@ class Solution(ShortRepr):
     def course(self) -> ChainCurve | None:
         """Force and stress at every travel; None if the chain cannot be followed to places between its points."""
         low, high = float(self.travel[0]), float(self.travel[-1])
-        found = course(self._at_travels, (low, high), (float(self.leg_force[0]), float(self.stress[0])))
+        found = course(self._solve_travels, (low, high), (float(self.leg_force[0]), float(self.stress[0])))
         return None if found is None else replace(found, stops=self.stops)
 
-    def _at_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def _solve_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return force [N] and stress [Pa] at other travels than those of the points; None if one is not reached."""
         found = self.chain.press(travel, self.side, self.accuracy)
         if found.ending not in FOLLOWED or len(found.travel) < len(travel):

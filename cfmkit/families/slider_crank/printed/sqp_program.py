@@ -65,13 +65,13 @@ class StripTask:
     shape: TargetCurve | None = None  # force over travel that is wanted, as a share of `force`; None: it is constant
     sets: int = 1  # equal strips that share what the design asks for
 
-    def asked(self, force: float) -> float:
+    def sum_over_sets(self, force: float) -> float:
         """Return what a design is to ask for where one set has a force [N]."""
         return force * self.sets
 
     def share(self, travel: Any) -> Any:
         """Return the force that is wanted at travels [m], as a share of `force`."""
-        return 1.0 if self.shape is None else self.shape.at(travel)
+        return 1.0 if self.shape is None else self.shape.evaluate(travel)
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Form:
         own = np.real(x[self.count : self.count + self.placed])
         return spread(corners, [own[a:b].tolist() for a, b in itertools.pairwise(ends)])
 
-    def ordered(self, x: FloatArray, corners: FloatArray) -> bool:
+    def is_ordered(self, x: FloatArray, corners: FloatArray) -> bool:
         """Return whether stations that vary come one after the other."""
         return not self.per_piece or bool((np.diff(self.places(x, corners)) > APART).all())
 
@@ -200,12 +200,12 @@ class StripProgram(DesignProgram):
         """Return the pressed strip; None if it has no stable equilibrium at all points."""
         if self._last is not None and np.array_equal(self._last[0], z):
             return self._last[1]
-        if not self.form.ordered(z, self.task.corners):
+        if not self.form.is_ordered(z, self.task.corners):
             return None
         path = self._path(self.network(z[: self.form.size]), self.travel(z))
         if path is None:
             return None
-        found = self._pressed(path)
+        found = self._build_state(path)
         self.known, self._last = path, (z.copy(), found)
         return found
 
@@ -219,7 +219,7 @@ class StripProgram(DesignProgram):
                     return near
         return _trace(network, drive)
 
-    def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
+    def evaluate(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the objective, the rows of the band, and those of the stress."""
         state = self.state(z)
         if state is None:
@@ -325,10 +325,10 @@ class StripProgram(DesignProgram):
         if len(found) < 2:
             return None
         (first, low), (last, high) = found[-2:]
-        before, after = self._pressed(low), self._pressed(high)
+        before, after = self._build_state(low), self._build_state(high)
         return (after.force - before.force) / (last - first), (after.stress - before.stress) / (last - first)
 
-    def _pressed(self, path: Path) -> State:
+    def _build_state(self, path: Path) -> State:
         """Return the strip that is pressed along a path."""
         return State(path, path.effort[path.at_requested], stress_places(path, self.spots))
 

@@ -217,7 +217,7 @@ class StripStarts:
     seed: int
     clock: Clock
 
-    def descended(self, number: int) -> Optimum:
+    def descend(self, number: int) -> Optimum:
         """Return where the last search of a start ended."""
         steps, factors = _ladder(self.form), None
         if number:
@@ -266,7 +266,7 @@ def search(
 
     work = StripStarts(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
     means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
-    outcome = run_stage(Stage(OneStart(work.descended, clock), tuple(range(starts)), identity), means, clock, tell)
+    outcome = run_stage(Stage(OneStart(work.descend, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
         return _nothing(outcome.lost)
     found = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
@@ -282,7 +282,7 @@ def _with_its_ripple(found: FoundStrip) -> FoundStrip:
     Such a search may stop on its way; no ripple is too large for it, and the strip is one.
     """
     descent, program = found.descent, found.program
-    if found.task.goal != "ripple" or descent.feasible or (seen := program.seen(descent.z, False)) is None:
+    if found.task.goal != "ripple" or descent.feasible or (seen := program.evaluate(descent.z, False)) is None:
         return found
     z = descent.z.copy()
     z[-1] -= min(float(rows.values.min()) for rows in seen.rows if rows.name == "band")
@@ -430,7 +430,7 @@ def infeasible(found: FoundStrip) -> Design:
         missed.append(f"is up to {percent(off)} off the force")
         flat = task.shape is None and high - low <= 2.0 * level * program.ripple(descent.z)
         name = "design.force" if flat else "design.tolerance"
-        nearest[name] = newton(task.asked(level)) if flat else format_short(off, "ratio")
+        nearest[name] = newton(task.sum_over_sets(level)) if flat else format_short(off, "ratio")
     worst = float(state.stress.max())
     if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
         missed.append(f"has a stress of {mpa(worst)}")

@@ -65,7 +65,7 @@ def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> 
     """
     if any(not len(one) for one in offered):
         return []
-    few = goal.at(np.unique(np.linspace(0, len(goal.wanted) - 1, PLACES).round().astype(int)))
+    few = goal.select_rows(np.unique(np.linspace(0, len(goal.wanted) - 1, PLACES).round().astype(int)))
     # limits of single rates are those of what is offered
     search = _Sets(goal, replace(few, upper=np.full(len(offered), np.inf), lower=None), count)
     search.begin(offered)
@@ -230,7 +230,9 @@ def _why_not(offer: Offer, ends: tuple[float, float], wanted: CrankDesign) -> tu
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
         return moved / offer.largest - 1.0, f"deflected by {needed}, it allows {allowed}"
-    return SpringInUse.of(offer, *ends).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
+    return (
+        SpringInUse.from_offer(offer, *ends).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
+    )
 
 
 def _binds(offer: Offer, turned: float, pins: Pins | None) -> tuple[float, str] | None:
@@ -286,7 +288,7 @@ class _Sets:
         if len(open_) <= 2:
             self._look_at_pairs(offered, open_)
             return
-        offered = self._within_bounds(offered)
+        offered = self._restrict_to_bound(offered)
         if any(not len(one) for one in offered):
             return
         joint = min((k for k in open_ if len(offered[k]) > 1), key=lambda k: len(offered[k]), default=open_[0])
@@ -295,7 +297,7 @@ class _Sets:
         for rate in one[np.argsort(np.abs(one - 0.5 * (one[0] + one[-1])), kind="stable")]:
             self.look([np.array([rate]) if k == joint else other for k, other in enumerate(offered)])
 
-    def _within_bounds(self, offered: list[FloatArray]) -> list[FloatArray]:
+    def _restrict_to_bound(self, offered: list[FloatArray]) -> list[FloatArray]:
         """Return what is left of each joint's rates if no place may be off by more than the bound."""
         if not np.isfinite(self.bound):
             return offered

@@ -134,7 +134,7 @@ def scene(result: Result) -> PanelView:
     size = 0.045 * extent
     far = float(units.position.max()) if link.branch > 0 else float(units.position.min())
     wall = far + link.branch * 4.0 * size
-    springs: Springs = result.spec.at("mechanism.springs")
+    springs: Springs = result.spec.get_value("mechanism.springs")
     if springs.pulled_outwards(*(float(end[3, 0]) for end in solution.extremes.turns)):
         # it lies beside the coupler, as long as its wire is wound
         rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
@@ -246,7 +246,7 @@ def energy(result: Result) -> Figure:
             if rates[k] > 0.0
         ]
     diagram = Diagram(solution.motion[0], motion_scale(solution), Scale("energy", "energy"), series)
-    figure = diagram_figure(Heading.of(result, "energy of the springs, and its minima"), [diagram])
+    figure = diagram_figure(Heading.from_result(result, "energy of the springs, and its minima"), [diagram])
     _equilibria(figure.axes[0], solution, lambda _motion, height: float(to_border(height, "energy")))
     _name_wells(figure.axes[0], solution)
     return figure
@@ -277,7 +277,7 @@ def springs(result: Result) -> Figure:
     slope = [Series(solution.stiffness[0], "", INK)]
     upper = Diagram(solution.motion[0], over, Scale(f"{drive} of a spring", drive), series)
     lower = Diagram(solution.motion[0], over, Scale("stiffness", rate), slope, [Limit(0.0, "zero stiffness")])
-    heading = Heading.of(result, f"what each spring adds to the {drive}, and the slope of all")
+    heading = Heading.from_result(result, f"what each spring adds to the {drive}, and the slope of all")
     return diagram_figure(heading, [upper, lower])
 
 
@@ -297,7 +297,7 @@ def joints(result: Result) -> Figure:
         Diagram(solution.motion[0], over, Scale("rotation", "angle"), series, limits),
         Diagram(solution.motion[0], over, Scale("force of one leg", "force"), forces),
     ]
-    return diagram_figure(Heading.of(result, "rotations of the joints, and forces inside"), diagrams)
+    return diagram_figure(Heading.from_result(result, "rotations of the joints, and forces inside"), diagrams)
 
 
 @apply_style
@@ -305,7 +305,7 @@ def linkage(result: Result) -> Figure:
     """Return the linkage to scale in its key positions, above each other if it is flat, with the curve they are on."""
     solution: Solution = result.state
     keys, view = key_positions(solution), scene(result)
-    heading = Heading.of(result, "linkage to scale in its key positions")
+    heading = Heading.from_result(result, "linkage to scale in its key positions")
     width, height = view.box[2] - view.box[0], view.box[3] - view.box[1]
     slender = height / width
     stacked = slender < STACK_BELOW

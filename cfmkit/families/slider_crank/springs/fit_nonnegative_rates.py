@@ -54,7 +54,7 @@ class RateGoal:
         scales: FloatArray = np.where(size > 0.0, size, 1.0)
         return scales
 
-    def at(self, rows: Sequence[int] | FloatArray) -> RateGoal:
+    def select_rows(self, rows: Sequence[int] | FloatArray) -> RateGoal:
         """Return the goal at some of the places."""
         index = np.asarray(rows)
         return replace(self, matrix=self.matrix[index], wanted=self.wanted[index])
@@ -75,7 +75,7 @@ def minimax(goal: RateGoal) -> FloatArray | None:
     count = len(goal.wanted)
     rows = np.unique(np.linspace(0, count - 1, count if count <= ALL else FEW).round().astype(int))
     while True:
-        found = _minimax(goal.at(rows))
+        found = _minimax(goal.select_rows(rows))
         if found is None:
             return None
         rates, deviation = found

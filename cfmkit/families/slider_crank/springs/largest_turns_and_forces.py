@@ -96,23 +96,23 @@ class MotionExtremes(ShortRepr):
     @cached_property
     def energy(self) -> FloatArray:
         """The largest energy in the springs, (m,) [J]."""
-        return self._of(lambda units: 0.5 * self.assembly.total(units.turn**2))[0]
+        return self._find_extremes(lambda units: 0.5 * self.assembly.total(units.turn**2))[0]
 
     @cached_property
     def coupler(self) -> Ends:
         """The largest and the smallest tension in the couplers of all legs, (m,) each [N]."""
-        return self._of(lambda units: self._reactions(units)[0])
+        return self._find_extremes(lambda units: self._reactions(units)[0])
 
     @cached_property
     def guide(self) -> Ends:
         """The largest and the smallest force on the guide of all legs, (m,) each [N]."""
-        return self._of(lambda units: self._reactions(units)[1])
+        return self._find_extremes(lambda units: self._reactions(units)[1])
 
     def _reactions(self, units: UnitCurves) -> tuple[FloatArray, FloatArray]:
         is_driven = self.assembly.drive == "force"
         return reactions(self.assembly, units, self.assembly.total(units.effort) if is_driven else np.zeros(1))
 
-    def _of(self, function: Callable[[UnitCurves], FloatArray]) -> Ends:
+    def _find_extremes(self, function: Callable[[UnitCurves], FloatArray]) -> Ends:
         """Return the largest and the smallest value over the motion; NaN where none is finite."""
         values = function(self.units)
         motion, values, last = finite_samples(self.places, values, self.last)

@@ -124,7 +124,7 @@ def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.in
         except CannotBuild:
             continue
         asked = asked_motion(resolved, assembly)
-        if assembly.within(*asked) == asked:
+        if assembly.clip_motion(*asked) == asked:
             built[index] = resolved, assembly, asked
             alike.setdefault(repr(_kind(*built[index])), []).append(index)
     for members in alike.values():
@@ -164,7 +164,7 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
         If it reaches nothing of it.
     """
     asked = asked_motion(spec, assembly)
-    start, stop = assembly.within(*asked)
+    start, stop = assembly.clip_motion(*asked)
     short = tuple(_shortfalls(assembly, asked, (start, stop)))
     if short and not start < stop:
         raise CannotBuild(short[0])

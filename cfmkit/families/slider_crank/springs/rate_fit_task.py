@@ -54,7 +54,7 @@ class SpringTask:
     @cached_property
     def allowed(self) -> tuple[float, float]:
         """Ends of the motion that linkage and joint limits allow around the unloaded position [rad or m]."""
-        low, high = replace(self.assembly, rates=np.ones(len(JOINTS))).within(*self.assembly.reach)
+        low, high = replace(self.assembly, rates=np.ones(len(JOINTS))).clip_motion(*self.assembly.reach)
         start = self.assembly.start
         if self.assembly.drive == "torque":
             low, high = max(low, start - math.pi), min(high, start + math.pi)
@@ -124,17 +124,17 @@ class SpringTask:
             return None
         legs, target = self.spec.mechanism.sets, self.wanted.size
         curve = self.wanted.curve
-        followed = np.ones(len(places)) if curve is None else np.asarray(curve.at(places)) / target
+        followed = np.ones(len(places)) if curve is None else np.asarray(curve.evaluate(places)) / target
         goal = RateGoal(
             effort.T * (legs / target),
-            followed - self._lost(places),
+            followed - self._evaluate_friction(places),
             self._upper(),
             lower=self._lower(),
             least=self._least(window),
         )
         return goal if self.wanted.stiffness is None else self._sloping(goal, places)
 
-    def _lost(self, places: FloatArray) -> FloatArray | float:
+    def _evaluate_friction(self, places: FloatArray) -> FloatArray | float:
         """Return what friction adds to the effort with the springs of the last round, over the target."""
         way = self.wanted.branch
         if self.rates is None or way is None or not self.assembly.rubbing.there:

@@ -83,7 +83,7 @@ def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
         high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
         least, largest = in_the_sense_of_the_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
-        wound = None if one.wound is None else one.wound.wound(one.kind)
+        wound = None if one.wound is None else one.wound.to_wound(one.kind)
         each = wound.rate * springs.stated_over_wires(one.at) if wound is not None else 0.0
         fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
         found.append(SpringInUse(wound, each * least, each * largest, fatigue, one.life))
@@ -112,8 +112,8 @@ def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any
 def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     """Return what pins or guide take over the window, back and forth, (m,) [J]."""
     assert solution.ways is not None
-    (forth, back), motion = solution.ways, solution.for_all(solution.motion)
-    lost = solution.for_all(forth.lost[kind] + back.lost[kind])
+    (forth, back), motion = solution.ways, solution.broadcast(solution.motion)
+    lost = solution.broadcast(forth.lost[kind] + back.lost[kind])
     low, high = (np.broadcast_to(end, (len(solution), 1)) for end in solution.window_or_motion)
     low, high = np.maximum(low, motion[:, :1]), np.minimum(high, motion[:, -1:])
     found = []

@@ -106,7 +106,7 @@ class Solution(ShortRepr):
         """Return a number of each specification, (m, 1); NaN for None."""
         return np.array([[read(spec)] for spec in self.specs], dtype=float)
 
-    def for_all(self, values: Any) -> Any:
+    def broadcast(self, values: Any) -> Any:
         """Return values of one row, or of each, (1, ...) or (m, ...), as (m, ...)."""
         return np.broadcast_to(values, (len(self), *np.shape(values)[1:]))
 
@@ -215,7 +215,7 @@ class Solution(ShortRepr):
     @cached_property
     def effort(self) -> FloatArray:
         """Torque [N m] or force [N], without friction."""
-        return np.asarray(self.for_all(self.assembly.total(self.units.effort)))
+        return np.asarray(self.broadcast(self.assembly.total(self.units.effort)))
 
     @cached_property
     def stiffness(self) -> FloatArray:
@@ -231,7 +231,7 @@ class Solution(ShortRepr):
     def effort_error(self) -> FloatArray:
         """Rounding of the sum of the springs' efforts, (m,) [N m or N]."""
         sizes = np.abs(self.shares).sum(axis=0)
-        return np.asarray(self.for_all(ROUND_OFF * sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))))
+        return np.asarray(self.broadcast(ROUND_OFF * sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))))
 
     @cached_property
     def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:
@@ -264,7 +264,7 @@ class Solution(ShortRepr):
 
     def frictionless(self, place: FloatArray) -> FloatArray:
         """Return the effort without friction at one place of each mechanism, (m, 1), (m,) [N m or N]."""
-        return np.asarray(self.for_all(self.assembly.efforts(place))[:, 0])
+        return np.asarray(self.broadcast(self.assembly.efforts(place))[:, 0])
 
     def part_efforts(self, places: FloatArray) -> FloatArray:
         """Return the largest effort of one spring of one leg at places of each mechanism, (m, n) [N m or N]."""
@@ -275,8 +275,8 @@ class Solution(ShortRepr):
         """The effort on the grid and at its turning points: (m, k), without friction."""
         grid = grid_over(self.drive, self.low, self.high)
         units = self.assembly.units(grid)
-        effort = self.for_all(self.assembly.total(units.effort))
-        slope = self.for_all(self.assembly.total(units.stiffness))
+        effort = self.broadcast(self.assembly.total(units.effort))
+        slope = self.broadcast(self.assembly.total(units.stiffness))
         if not np.isfinite(effort).all():
             slope = finite_samples(slope, effort, GRID - 1)[0]
             grid, effort, end = finite_samples(grid, effort, GRID - 1)
@@ -402,10 +402,10 @@ class Solution(ShortRepr):
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch; with friction there are two."""
-        motion = self.for_all(self.motion)
+        motion = self.broadcast(self.motion)
         efforts = {"load": self.effort}
         if self.ways is not None:
-            efforts = dict(zip(("load", "unload"), (self.for_all(way.effort) for way in self.ways), strict=True))
+            efforts = dict(zip(("load", "unload"), (self.broadcast(way.effort) for way in self.ways), strict=True))
         full = np.full(len(self), motion.shape[1])
         ends = motion[:, 0], motion[:, -1]
         band = getattr(self.spec.analysis, "band", MeasuringFrame.band)

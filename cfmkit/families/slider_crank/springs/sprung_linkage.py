@@ -208,7 +208,7 @@ class Assembly(ShortRepr):
         first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
         return first, last
 
-    def within(self, low: float, high: float) -> tuple[float, float]:
+    def clip_motion(self, low: float, high: float) -> tuple[float, float]:
         """Return the part of a motion that is within reach, and ends before the efforts grow without bound.
 
         What keeps off a pole by itself is left as it is. What touches or passes it ends `SHORT_OF_END` of the way
@@ -279,7 +279,7 @@ def _rubbing(mechanism: Mechanism) -> Rubbing:
     pins = mechanism.pins
     return Rubbing(
         pin=0.5 * pins.diameter * pins.friction if pins else 0.0,
-        guide=GuideFriction.of(mechanism.guide),
+        guide=GuideFriction.from_guide(mechanism.guide),
         mirrored=mechanism.copies == "mirrored",
     )
 

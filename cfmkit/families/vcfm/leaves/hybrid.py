@@ -116,7 +116,7 @@ class HybridLeaf(LeafLaw):
         found: tuple[Any, Any] = self._steepest[1]
         return found
 
-    def buckled(self, travel: Any) -> Any:
+    def is_buckled(self, travel: Any) -> Any:
         """Return False everywhere: the model has no buckled form."""
         return np.zeros(np.shape(travel), dtype=bool)
 

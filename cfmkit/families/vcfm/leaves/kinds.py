@@ -74,7 +74,7 @@ class LeafLaw(ABC):
         """Range of constant negative stiffness, because the leaf is buckled, from and to [m]; NaN: nowhere."""
         return np.nan, np.nan
 
-    def buckled(self, travel: Any) -> Any:
+    def is_buckled(self, travel: Any) -> Any:
         """Return whether the leaf is buckled."""
         first, last = self.linear
         return (travel >= first) & (travel <= last)

@@ -76,9 +76,9 @@ class LawsOneByOne:
         """Return `force` and `stress`."""
         return self.force(travel), self.stress(travel)
 
-    def buckled(self, travel: FloatArray) -> Any:
+    def is_buckled(self, travel: FloatArray) -> Any:
         """Return whether each leaf is buckled."""
-        return self._each("buckled", travel)
+        return self._each("is_buckled", travel)
 
     def _each(self, name: str, travel: FloatArray) -> Any:
         own = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))

@@ -235,7 +235,7 @@ class UShape(LeafSpring):
         """Return one chain, which is held by its lower block."""
         outer, inner, low = edges
         (_, high), arc, (_, foot) = inner
-        around = [*outer, (half, low), (0.0, low), (0.0, foot), inner[2], arc.reversed(), inner[0], (0.0, high)]
+        around = [*outer, (half, low), (0.0, low), (0.0, foot), inner[2], arc.reverse(), inner[0], (0.0, high)]
         return around, high, [(0.0, foot), (half, foot), (half, low), (0.0, low)], False
 
     def bent_lines(self, compression: float, _corner: float) -> tuple[list[FloatArray], float]:

@@ -174,7 +174,7 @@ class VBeam(LeafLaw):
 
     def bent_line(self, travel: float) -> FloatArray:
         """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]."""
-        buckled = bool(self.buckled(np.array([travel]))[0])
+        buckled = bool(self.is_buckled(np.array([travel]))[0])
         return bent_leaf(self.strip, travel, float(critical_force(self.strip)) if buckled else None)
 
     def force(self, travel: Any) -> FloatArray:
@@ -185,7 +185,7 @@ class VBeam(LeafLaw):
         travel : array
             Of the shuttle from the unloaded position, positive towards the flat pose [m].
         """
-        strip, bent = self.strip, ~np.asarray(self.buckled(travel))
+        strip, bent = self.strip, ~np.asarray(self.is_buckled(travel))
         drop = strip.rise - np.asarray(travel, dtype=float)
         force = np.array(np.broadcast_to(critical_force(strip) * (drop / np.hypot(strip.reach, drop)), bent.shape))
         if bent.any():
@@ -201,7 +201,7 @@ class VBeam(LeafLaw):
 
     def state(self, travel: Any) -> tuple[FloatArray, FloatArray]:
         """Return `force` and `stress` at once: both come of one root."""
-        buckled = np.asarray(self.buckled(travel))
+        buckled = np.asarray(self.is_buckled(travel))
         strip, one = self.strip, all(np.ndim(item) == 0 for item in vars(self.strip).values())
         wide = [] if one else [np.broadcast_to(np.asarray(item), buckled.shape) for item in vars(strip).values()]
         place = np.broadcast_to(np.asarray(travel, dtype=float), buckled.shape)
