@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -43,8 +43,8 @@ def lan(x: Any = SHAPE) -> Network:
     section = Section(2e9, 10 * MM, 1 * MM, axial=False)
     cm = 1e-2
     nodes = {
-        "n1": Node(0.25 * cm, 0, CLAMPED),
-        "n2": Node(x[12] * cm, 0, CLAMPED),
+        "n1": Node(0.25 * cm, 0, CLAMPED_SUPPORT),
+        "n2": Node(x[12] * cm, 0, CLAMPED_SUPPORT),
         "n3": Node(x[0] * cm, x[1] * cm),
         "n4": Node(x[2] * cm, x[3] * cm),
         "n5": Node(0.25 * cm, 4 * cm, slider_support(np.pi / 2)),
@@ -58,14 +58,14 @@ def lan(x: Any = SHAPE) -> Network:
 
 def cantilever() -> Network:
     section = Section(2.4e9, 0.1, 1e-3, axial=False)
-    return Network({"root": Node(0, 0, CLAMPED), "tip": Node(0.4, 0)}, {"x": Beam("root", "tip", section)})
+    return Network({"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(0.4, 0)}, {"x": Beam("root", "tip", section)})
 
 
 def v_beam() -> Network:
     length, angle = 35 * MM, np.radians(7)
     section = Section(1477e6, 6 * MM, 1 * MM)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
     }
     return Network(nodes, {"v": Beam("wall", "d", section)})

@@ -19,7 +19,7 @@ from beams_engine import MM, cantilever, lan, v_beam
 from network_cases import from_json, read_cases
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -65,11 +65,13 @@ def cases() -> Iterator[tuple[str, Callable[[], Network], Any, Control]]:
     yield "cantilever, 10 points", cantilever, bend, Control()
     snap = Displacement("d", -np.pi / 2, np.linspace(0.02, 1, 50) * 7 * MM)
     yield "V-beam, both bifurcations, 50 points", v_beam, snap, Control()
-    follower = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})
+    follower = Network(
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+    )
     load = Loading((PointLoad("b", fy=1.0, follows=True),), np.arange(1, 21) * 0.05)
     yield "load that follows, 20 points", lambda: follower, load, Control()
     strip = Beam("a", "b", Section(2e9, 1e-2, 1e-4), arc(2 * np.pi * 20.25))
-    coil = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"coil": strip})
+    coil = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"coil": strip})
     yield "coil of 20 turns, 10 points", lambda: coil, Rotation("b", np.arange(1, 11) / 5), Control()
     known = {case["name"]: case for case in read_cases()}
     for name, title in FROZEN.items():

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -35,18 +35,22 @@ SECTION = Section(2e9, 10 * MM, 1 * MM)
 
 
 def cantilever() -> Network:
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(100 * MM, 0)}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(100 * MM, 0)}
     return Network(nodes, {"x": Beam("root", "tip", SECTION)})
 
 
 def v_beam() -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "top": Node(60 * MM, 6 * MM, slider_support(np.pi / 2))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "top": Node(60 * MM, 6 * MM, slider_support(np.pi / 2))}
     return Network(nodes, {"x": Beam("a", "top", SECTION)})
 
 
 def lan() -> Network:
     places = {"n1": (2.5, 0.0), "n2": (34.5, 0.0), "n3": (30.5, 18.77), "n4": (12.44, 24.0), "n5": (2.5, 40.0)}
-    supports = {"n1": {"support": CLAMPED}, "n2": {"support": CLAMPED}, "n5": {"support": slider_support(np.pi / 2)}}
+    supports = {
+        "n1": {"support": CLAMPED_SUPPORT},
+        "n2": {"support": CLAMPED_SUPPORT},
+        "n5": {"support": slider_support(np.pi / 2)},
+    }
     nodes = {name: Node(x * MM, y * MM, **supports.get(name, {})) for name, (x, y) in places.items()}
     shapes = (
         ("n1", "n3", (0.4592, 1.3092, -1.5707)),

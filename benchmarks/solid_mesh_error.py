@@ -272,10 +272,10 @@ def main() -> None:
         if wanted.only not in name:
             continue
         if wanted.references or name not in known:
-            share = meshed_part.SHARE
-            meshed_part.SHARE = 0.5 * share  # elements along fillets, too
+            share = meshed_part.FILLET_ELEMENT_RATIO
+            meshed_part.FILLET_ELEMENT_RATIO = 0.5 * share  # elements along fillets, too
             found = reference(part.part, part.stops)
-            meshed_part.SHARE = share
+            meshed_part.FILLET_ELEMENT_RATIO = share
             poses = found.course.poses
             known[name] = {
                 "travel": [pose.travel for pose in poses],

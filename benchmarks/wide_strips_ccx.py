@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from cfmkit.elastica import CLAMPED, Beam, Control, Loading, Network, Node, PointLoad, Section, trace
+from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Control, Loading, Network, Node, PointLoad, Section, trace
 
 YOUNG, POISSON, THICKNESS = 2000.0, 0.35, 1.0  # MPa, 1, mm
 ACROSS, PER_WIDTH = 6, 12  # elements in half the width, and along a length of one width
@@ -88,7 +88,7 @@ def beam(length: float, width: float, force: float, wide: bool, flat: float = 0.
     """Return the deflection of a beam that stretches and shears, the first `flat` widths in plane strain [mm]."""
     mm = 1e-3
     section = Section(YOUNG * 1e6, width * mm, THICKNESS * mm, shear=True, poisson_ratio=POISSON, wide=wide)
-    nodes = {"root": Node(0, 0, CLAMPED), "end": Node(length * mm, 0)}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "end": Node(length * mm, 0)}
     beams = {"strip": Beam("root", "end", section)}
     if flat:
         stiff = replace(section, youngs_modulus=section.youngs_modulus / (1 - POISSON**2), wide=False)

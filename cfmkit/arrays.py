@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
-LONGEST = 1500
+MAX_REPR_LENGTH = 1500
 """Characters of a `repr`."""
 
 LONGEST_ITEM = 100
 """Characters of one item in it."""
 
-PLAIN = (str, int, float, type(None))
+PLAIN_TYPES = (str, int, float, type(None))
 """What has a text of its own that is short."""
 
 T = TypeVar("T")
@@ -224,10 +224,12 @@ def brief(value: Any) -> str:
     if hasattr(value, "dtype") and getattr(value, "shape", None):
         text = _array(value)
     elif isinstance(value, (Mapping, tuple, list)):
-        is_short = not isinstance(value, Mapping) and len(value) <= 4 and all(isinstance(one, PLAIN) for one in value)
+        is_short = (
+            not isinstance(value, Mapping) and len(value) <= 4 and all(isinstance(one, PLAIN_TYPES) for one in value)
+        )
         text = repr(value) if is_short else f"{type(value).__name__} of {len(value)}"
     elif is_dataclass(value) and not isinstance(value, ShortRepr):
-        is_short = all(isinstance(getattr(value, item.name), PLAIN) for item in fields(value))
+        is_short = all(isinstance(getattr(value, item.name), PLAIN_TYPES) for item in fields(value))
         text = str(value) if is_short or type(value).__str__ is not object.__str__ else f"<{type(value).__name__}>"
     elif isinstance(value, partial):  # its text has the arrays that it is called with
         text = f"partial of {value.func.__name__}"
@@ -246,6 +248,6 @@ def _array(values: Any) -> str:
 
 def _join_texts(texts: list[str]) -> str:
     """Return texts in a row, as many as there is room for."""
-    count = sum(end <= LONGEST for end in accumulate(len(text) + 2 for text in texts))
+    count = sum(end <= MAX_REPR_LENGTH for end in accumulate(len(text) + 2 for text in texts))
     more = len(texts) - count
     return ", ".join(texts[:count]) + (f", ... and {more} more" if more else "")

@@ -33,7 +33,7 @@ PART_NOT_DRAWN = "part_not_drawn"
 THIN_WALL = "thin_wall"
 """Name of the finding that a part is thinner somewhere than its process can make."""
 
-OVERWRITTEN = "overwritten"
+OVERWRITTEN_FINDING = "overwritten"
 """Finding that a design replaces a value that was stated."""
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cfmkit
-from cfmkit.plots.style import BLUE, GREY, INK, VERMILLION, apply_style, axes_mm, new_figure, png
+from cfmkit.plots.style import LINE_BLUE, LINE_VERMILLION, TEXT_GREY, TEXT_INK, apply_style, axes_mm, new_figure, png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent
 BRANCHES = (
-    ("one side", BLUE, "analysis.other_side=false"),
-    ("its mirror image", VERMILLION, "analysis.other_side=true"),
+    ("one side", LINE_BLUE, "analysis.other_side=false"),
+    ("its mirror image", LINE_VERMILLION, "analysis.other_side=true"),
 )
 
 
@@ -59,7 +59,7 @@ def diagram(*changes: str) -> Figure:
         return unit * (result.curve.extra[name].values if name else result.curve.force)
 
     for ax, name, unit in axes:
-        _draw(ax, primary.curve, values(primary, name, unit), np.ones(len(primary.curve), dtype=bool), INK)
+        _draw(ax, primary.curve, values(primary, name, unit), np.ones(len(primary.curve), dtype=bool), TEXT_INK)
     for label, color, change in BRANCHES:
         branch = solved(change, *changes)
         for ax, name, unit in axes:
@@ -74,12 +74,12 @@ def diagram(*changes: str) -> Figure:
     places = np.array([event.drive for event in primary.state.path.events if event.kind == "bifurcation"])
     for ax, name, unit in axes:
         height = np.interp(places, primary.curve.motion, values(primary, name, unit))
-        ax.plot(1e3 * places, height, "o", color=INK, markersize=4)
+        ax.plot(1e3 * places, height, "o", color=TEXT_INK, markersize=4)
     upper.annotate(
-        "symmetric, dashed where unstable", (3.3, 0.0), (0, 5), textcoords="offset points", color=INK, ha="center"
+        "symmetric, dashed where unstable", (3.3, 0.0), (0, 5), textcoords="offset points", color=TEXT_INK, ha="center"
     )
-    lower.annotate("symmetric", (2.3, 4.6), (0, 4), textcoords="offset points", color=INK, ha="center")
-    lower.annotate("both branches", (1.2, 1.1), color=GREY, ha="left", va="center")
+    lower.annotate("symmetric", (2.3, 4.6), (0, 4), textcoords="offset points", color=TEXT_INK, ha="center")
+    lower.annotate("both branches", (1.2, 1.1), color=TEXT_GREY, ha="left", va="center")
     upper.set_ylabel("rotation of the eye [deg]")
     upper.tick_params(labelbottom=False)
     lower.set_ylabel("force [N]")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cfmkit
-from cfmkit.plots.style import BLUE, VERMILLION, apply_style, axes_mm, new_figure, png
+from cfmkit.plots.style import LINE_BLUE, LINE_VERMILLION, apply_style, axes_mm, new_figure, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,9 +37,9 @@ def trade(rows: list[tuple[float, float, float]]) -> Figure:
     force = axes_mm(figure, (16.0, 12.0, 56.0, 56.0))
     stress = axes_mm(figure, (98.0, 12.0, 56.0, 56.0))
     means, peaks, errors = zip(*rows, strict=True)
-    force.plot(RADII, means, "o-", color=BLUE, linewidth=1.5, markersize=4)
+    force.plot(RADII, means, "o-", color=LINE_BLUE, linewidth=1.5, markersize=4)
     bars = [share * peak for share, peak in zip(errors, peaks, strict=True)]
-    stress.errorbar(RADII, peaks, bars, fmt="o-", color=VERMILLION, linewidth=1.5, markersize=4, capsize=2)
+    stress.errorbar(RADII, peaks, bars, fmt="o-", color=LINE_VERMILLION, linewidth=1.5, markersize=4, capsize=2)
     force.set_ylabel("mean force, 7 ... 13.6 mm [N]")
     stress.set_ylabel("largest stress [MPa]")
     for ax in (force, stress):

@@ -109,12 +109,12 @@ def _metrics() -> str:
 
 
 def _units() -> str:
-    from cfmkit.specs.units import DIMENSIONS, unit_table
+    from cfmkit.specs.units import DIMENSIONS_BY_NAME, unit_table
 
     units = [(f"`{one[0]}`", one[1], one[2].replace("_", " "), f"{one[3]:.12g}") for one in unit_table()]
     kinds = [
         (one.name.replace("_", " "), f"`{one.unit}`", f"`{one.example}`", one.description)
-        for one in DIMENSIONS.values()
+        for one in DIMENSIONS_BY_NAME.values()
         if one.unit
     ]
     text = "Case-sensitive; combine with `*`, `/` and `^`: `N*mm/rad`, `kg/m^3`. Zero needs no unit.\n"
@@ -133,7 +133,7 @@ def _units() -> str:
 
 
 def _materials() -> str:
-    from cfmkit.stock import MATERIALS
+    from cfmkit.stock import MATERIALS_BY_NAME
 
     rows = [
         (
@@ -144,7 +144,7 @@ def _materials() -> str:
             f"{one.density:.4g}",
             one.source,
         )
-        for one in MATERIALS.values()
+        for one in MATERIALS_BY_NAME.values()
     ]
     head = ("material", "E [GPa]", "yield [MPa]", "Poisson", "density [kg/m^3]", "source")
     return "\n".join(["# Materials\n", "At room temperature, under short-term loads.\n", *_table(head, rows)]) + "\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.families import records
-from cfmkit.runs.papers import VERDICTS, check, rows
+from cfmkit.runs.papers import VERDICT_MEANINGS, check, rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -47,7 +47,7 @@ def _papers(done: Iterable[ComputedRow]) -> list[str]:
 
 def _counts(done: Sequence[ComputedRow]) -> Iterator[str]:
     yield "| verdict | numbers | meaning |\n|---|---|---|"
-    for verdict, meaning in VERDICTS.items():
+    for verdict, meaning in VERDICT_MEANINGS.items():
         yield f"| {verdict} | {sum(len(one.row.printed) for one in done if one.row.verdict == verdict)} | {meaning} |"
     yield ""
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
 
-_STYLE: dict[str, Any] = {
+_TYPER_OPTIONS: dict[str, Any] = {
     "rich_markup_mode": "rich",
     "context_settings": {"help_option_names": ["-h", "--help"]},
     "add_completion": False,
@@ -83,7 +83,7 @@ def _command(name: str) -> Any:
         [_parameter(field, hints[field.name]) for field in sorted(fields, key=_place)]
     )
     callback.__annotations__ = {field.name: hints[field.name] for field in fields}
-    app = typer.Typer(**_STYLE)
+    app = typer.Typer(**_TYPER_OPTIONS)
     app.command(name, help=_unwrap_paragraphs(inspect.getdoc(module.run) or ""), epilog=_example(module))(callback)
     return _plain(typer.main.get_command(app))
 
@@ -152,7 +152,7 @@ def _place(field: dataclasses.Field[Any]) -> int:
     return int(field.name in {item.name for item in dataclasses.fields(Common)})
 
 
-ALONE = ("--figure",)
+OPTIONAL_VALUE_OPTIONS = ("--figure",)
 """Options whose value may be left out; typer has none of that kind, so an empty value is written for it."""
 
 
@@ -165,7 +165,7 @@ def _spell_out_empty_values(arguments: list[str]) -> list[str]:
     ['show', '--figure=', '--json']
     """
     followed = zip(arguments, [*arguments[1:], "-"], strict=False)
-    return [f"{one}=" if one in ALONE and after.startswith("-") else one for one, after in followed]
+    return [f"{one}=" if one in OPTIONAL_VALUE_OPTIONS and after.startswith("-") else one for one, after in followed]
 
 
 def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
@@ -190,6 +190,6 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
 
 def program(callback: Callable[..., Any], text: str, epilog: str) -> typer.Typer:
     """Return the program: the group of all verbs, with what stands before them as `callback`."""
-    app = typer.Typer(cls=Verbs, **{**_STYLE, "add_completion": True})
+    app = typer.Typer(cls=Verbs, **{**_TYPER_OPTIONS, "add_completion": True})
     app.callback(invoke_without_command=True, help=text, epilog=epilog)(callback)
     return app

@@ -156,7 +156,7 @@ SYNONYM_WEIGHT = 0.5
 """Weight of what the glossary names in place of the word itself."""
 
 
-NAVIGATION = ("index", "glossary")
+NAVIGATION_PAGES = ("index", "glossary")
 """Pages that name every subject and explain none: no search leads there."""
 
 
@@ -173,8 +173,8 @@ def search(word: str) -> list[PageSection]:
 
 @cache
 def _read_sections() -> tuple[tuple[str, str, str], ...]:
-    """Return the page, heading and text of every section, but for those of `NAVIGATION`."""
-    subjects = (subject for subject in pages() if subject.name not in NAVIGATION)
+    """Return the page, heading and text of every section, but for those of `NAVIGATION_PAGES`."""
+    subjects = (subject for subject in pages() if subject.name not in NAVIGATION_PAGES)
     return tuple(
         (subject.name, heading, text) for subject in subjects for heading, text in _split_into_sections(subject.text)
     )

@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from types import FrameType
 
-TEXT = (
+HELP_TEXT = (
     "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut.\n\n"
     "No spec yet? `cfmkit suggest --force '20 N' --travel '5 mm' --envelope 120x80x15mm --material pom` finds "
     "mechanisms that meet these requirements.\n\n"
     "A spec is a YAML file that describes one mechanism. `cfmkit new cam` writes one to start from, `cfmkit examples` "
     "lists ready ones, `cfmkit show` explains families, keys, metrics and units."
 )
-EPILOG = (
+HELP_EPILOG = (
     "Exit codes: 0 ok, 2 usage, 3 invalid spec or data, 4 no solution, 5 a requirement is missed, 6 partial, "
     "7 input/output, 8 folder in use, 70 a bug, 130 and 143 stopped by a signal."
 )
@@ -101,7 +101,7 @@ def _run(given: list[str]) -> ExitCode:
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
-    call = parse(program(_accept_global_options, TEXT, EPILOG), given)
+    call = parse(program(_accept_global_options, HELP_TEXT, HELP_EPILOG), given)
     if call is None:
         streams.write_output("")
         return ExitCode.OK
@@ -174,7 +174,7 @@ def _listen() -> None:
         sys.unraisablehook = partial(_again, sys.unraisablehook, stop)
 
 
-AGAIN = 0.02
+SIGNAL_RESEND_DELAY = 0.02
 """Until a signal that was lost is sent again [s]: a compiler's callbacks are over sooner than anybody notices this."""
 
 
@@ -185,7 +185,7 @@ def _again(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], 
         return
     number = lost.exc_value.exit_code - 128
     signal.signal(number, stop)
-    timer = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
+    timer = threading.Timer(SIGNAL_RESEND_DELAY, os.kill, (os.getpid(), number))
     timer.daemon = True
     timer.start()
 

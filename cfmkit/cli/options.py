@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.plots.figure_options import FigureForm
 
 
-MOST = 2**63 - 1
+MAX_INTEGER = 2**63 - 1
 """The largest integer of an option: what a signed integer of 64 bits in files and generators holds."""
 
 
@@ -56,9 +56,11 @@ def _require_at_least(low: int) -> Callable[[int | None], int | None]:
     """Return what lets a number pass that is neither too small nor too large for a signed integer of 64 bits."""
 
     def check(value: int | None) -> int | None:
-        if value is None or low <= value <= MOST:
+        if value is None or low <= value <= MAX_INTEGER:
             return value
-        raise typer.BadParameter(f"{value} is not allowed: must be {f'>= {low}' if value < low else f'<= {MOST}'}")
+        raise typer.BadParameter(
+            f"{value} is not allowed: must be {f'>= {low}' if value < low else f'<= {MAX_INTEGER}'}"
+        )
 
     return check
 

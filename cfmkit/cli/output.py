@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Report = Callable[[float, str], None]
 
-NARROWEST, WIDEST = 40, 100
+MIN_PAGE_COLUMNS, MAX_PAGE_COLUMNS = 40, 100
 """Columns of a page: in 40 every number still stands beside its name; wider than 100 a line is hard to read."""
 
 
@@ -45,7 +45,7 @@ class Terminal:
     @property
     def width(self) -> int:
         """Columns to fill; redirected output gets as many as a wide terminal."""
-        return max(NARROWEST, min(shutil.get_terminal_size((WIDEST, 24)).columns, WIDEST))
+        return max(MIN_PAGE_COLUMNS, min(shutil.get_terminal_size((MAX_PAGE_COLUMNS, 24)).columns, MAX_PAGE_COLUMNS))
 
     @property
     def excerpts(self) -> bool:

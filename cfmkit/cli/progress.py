@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DRAW_EVERY = 0.1
 """Seconds between two pictures of the bar: quicker than this nobody reads, and each costs some of the time."""
 
-RECENT = 30.0
+RATE_WINDOW = 30.0
 """Seconds over which the rate is taken: three lines of a log, so that it follows points that get slower and does not
 jump with each."""
 
@@ -96,7 +96,7 @@ class StudyProgress:
         elif now - self._marks[-1][0] < DRAW_EVERY:
             return
         self._marks.append((now, self._done - self._reused))
-        while len(self._marks) > 2 and now - self._marks[1][0] > RECENT:
+        while len(self._marks) > 2 and now - self._marks[1][0] > RATE_WINDOW:
             self._marks.popleft()
 
     def _rate(self, now: float) -> float:
@@ -112,7 +112,7 @@ class StudyProgress:
         if fresh == before:
             return 0.0
         recent, mean = (fresh - before) / (now - since), fresh / (now - self._start)
-        return recent if now - since >= RECENT else max(recent, mean)
+        return recent if now - since >= RATE_WINDOW else max(recent, mean)
 
     def interrupt(self, number: int, _frame: FrameType | None) -> None:
         """Take Ctrl-C: the first time as a request to stop soon, the second time at once."""

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cfmkit.documents.document import BAD, Document, Note, Written
+from cfmkit.documents.document import BAD_TONE, Document, Note, Written
 from cfmkit.documents.run_document import RunCommand, complaints_of, data_of, document_of
 from cfmkit.errors import UsageError
 from cfmkit.runs.run import RunTask, carry_out
-from cfmkit.runs.specfile import STDIN
+from cfmkit.runs.specfile import STDIN_PATH
 
 if TYPE_CHECKING:
     from cfmkit.cli.options import Computing, OneSpec
@@ -54,7 +54,7 @@ def folder_of(options: OneSpec, verb: str) -> str:
         if not options.out.strip():
             raise UsageError("--out is empty; give a folder")
         return options.out
-    if options.spec == STDIN:
+    if options.spec == STDIN_PATH:
         raise UsageError("a spec from standard input has no name; give the output folder with --out")
     return str(Path("cfm-out") / f"{Path(options.spec).stem}-{verb}")
 
@@ -68,7 +68,11 @@ def _document(outcome: FinishedRun) -> Document:
     data = data_of(report) | written.data | ({"kept": outcome.kept} if outcome.kept else {})
     kept = tuple(
         Note(
-            "kept", f"{name} was edited since the last run; the edited version is kept as {spare}", "", BAD, whole=True
+            "kept",
+            f"{name} was edited since the last run; the edited version is kept as {spare}",
+            "",
+            BAD_TONE,
+            whole=True,
         )
         for name, spare in outcome.kept.items()
     )

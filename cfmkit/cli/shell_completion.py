@@ -17,9 +17,9 @@ def families(incomplete: str) -> list[str]:
 
 def topics(incomplete: str) -> list[str]:
     """Return what `cfmkit show` explains and begins so: topics, families, and everything else that has a name."""
-    from cfmkit.cli.show_topics import TOPICS, names
+    from cfmkit.cli.show_topics import TOPIC_HEADINGS, names
 
-    known = [*TOPICS, *families("")]
+    known = [*TOPIC_HEADINGS, *families("")]
     # names by the hundred only once somebody has begun one
     every = [*known, *names()] if incomplete else known
     return list(dict.fromkeys(name for name in every if name.startswith(incomplete)))

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit.cli.guide import compile_phrases, look_for, read_terms, search
-from cfmkit.cli.show_topics import KINDS
+from cfmkit.cli.show_topics import TOPIC_KINDS
 from cfmkit.documents.document import Document, Paragraph, field, record_table
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def _named_texts() -> tuple[tuple[str, str, str], ...]:
     return tuple(
         (singular, *_name_and_meaning(record))
         for kind, singular in KINDS_OF_NAMES.items()
-        for record in chain.from_iterable(KINDS[kind][0]().values())
+        for record in chain.from_iterable(TOPIC_KINDS[kind][0]().values())
     )
 
 

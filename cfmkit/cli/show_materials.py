@@ -25,12 +25,12 @@ PAGE_TEXT = (
 
 def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, list[dict[str, Any]]]]:
     """Return title, text, tables and records of the page."""
-    from cfmkit.stock import MATERIALS
+    from cfmkit.stock import MATERIALS_BY_NAME
     from cfmkit.stock.assumed_lasting import ASSUMED_DATA
 
     records = [
         {**asdict(item), "assumed": asdict(ASSUMED_DATA[item.name]) if item.name in ASSUMED_DATA else None}
-        for item in MATERIALS.values()
+        for item in MATERIALS_BY_NAME.values()
     ]
     columns = (
         field("name", "material", wraps=True),

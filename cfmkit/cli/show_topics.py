@@ -14,7 +14,7 @@ from cfmkit import families
 from cfmkit.cli.guide import list_terms
 from cfmkit.cli.show_materials import materials_page_parts, properties
 from cfmkit.cli.show_stock import stock_page_parts
-from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, line, record_table
+from cfmkit.documents.document import LABEL_TONE, Document, Field, Span, TextLine, Verbatim, field, line, record_table
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,15 +41,15 @@ def explain(name: str | None) -> Document:
     """
     if name is None:
         return overview()
-    if name in TOPICS:
-        return TOPICS[name][1]()
+    if name in TOPIC_HEADINGS:
+        return TOPIC_HEADINGS[name][1]()
     if name in families.names() or name in families.clashing():
         return family_page(name)
     if (known := find_page(name)) is not None:
         return known
     from cfmkit.specs.yamlio import did_you_mean
 
-    topics = [*TOPICS, *families.names()]
+    topics = [*TOPIC_HEADINGS, *families.names()]
     by_name = "keys, materials, metrics, values, warnings, units, papers and symbols by their names"
     every = f"there are {', '.join(topics)}, and {by_name}"
     hint = did_you_mean(name, [*topics, *names()]) or every
@@ -64,7 +64,7 @@ def list_skipped_families(name: str | None) -> tuple[str, ...]:
 
 def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Document:
     def blocks() -> Iterator[Block]:
-        yield TextLine((Span(title, LABEL), Span(f"  {text}")))
+        yield TextLine((Span(title, LABEL_TONE), Span(f"  {text}")))
         for section in sections:
             yield from record_table(*section)
 
@@ -87,7 +87,7 @@ BY_NAME = {
 def overview() -> Document:
     """Return the list of families and topics."""
     mechanisms = [{"name": record.name, "summary": record.summary} for record in families.records()]
-    topics = [{"name": name, "summary": summary} for name, (summary, _) in TOPICS.items()]
+    topics = [{"name": name, "summary": summary} for name, (summary, _) in TOPIC_HEADINGS.items()]
     columns = (field("name", ""), field("summary", "", wraps=True))
     by_name = [{"name": name, "summary": what} for name, what in BY_NAME.items()]
     sections = (
@@ -101,13 +101,13 @@ def overview() -> Document:
 
 def units_page() -> Document:
     """Return the closed list of units, and the dimensions with the unit that files are written in."""
-    from cfmkit.specs.units import DIMENSIONS, unit_table
+    from cfmkit.specs.units import DIMENSIONS_BY_NAME, unit_table
 
     names = ("symbol", "name", "dimension", "si", "input_only")
     units = [dict(zip(names, entry, strict=True)) for entry in unit_table()]
     dimensions = [
         {"name": item.name, "unit": item.unit, "description": item.description, "example": item.example}
-        for item in DIMENSIONS.values()
+        for item in DIMENSIONS_BY_NAME.values()
         if item.unit
     ]
     unit_columns = (
@@ -225,7 +225,7 @@ def _default(key: Record) -> str:
 def find_page(name: str) -> Document | None:
     """Return the page on everything that has a name; None if nothing has."""
     sections: list[Section] = []
-    for kind, (records, fields) in KINDS.items():
+    for kind, (records, fields) in TOPIC_KINDS.items():
         every = records()
         if known := [one for key in _keys(kind, name) for one in every.get(key, ())]:
             sections.append((kind, known, fields or SPEC_KEY_FIELDS))
@@ -254,7 +254,7 @@ def _symbols(name: str) -> list[Record]:
 
 def names() -> list[str]:
     """Return every name that `find_page` knows, but for the paths of keys and symbols."""
-    return [name for records, _ in KINDS.values() for name in records() if "." not in name]
+    return [name for records, _ in TOPIC_KINDS.values() for name in records() if "." not in name]
 
 
 def references() -> list[dict[str, str]]:
@@ -290,13 +290,13 @@ def _keys(kind: str, name: str) -> list[str]:
 
 def _measured_in(unit: str) -> list[str]:
     """Return the dimensions that a unit such as ``N/mm`` measures; none if it is not a unit."""
-    from cfmkit.specs.units import DIMENSIONS
+    from cfmkit.specs.units import DIMENSIONS_BY_NAME
     from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
 
     if not is_unit(unit):
         return []
     powers = unit_size(unit).powers
-    return [one.name for one in DIMENSIONS.values() if one.unit and border_size(one.name).powers == powers]
+    return [one.name for one in DIMENSIONS_BY_NAME.values() if one.unit and border_size(one.name).powers == powers]
 
 
 def _gather_records(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
@@ -307,9 +307,11 @@ def _gather_records(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
 
 
 def _materials() -> Records:
-    from cfmkit.stock import MATERIALS
+    from cfmkit.stock import MATERIALS_BY_NAME
 
-    return _gather_records((name, asdict(one)) for one in MATERIALS.values() for name in (one.name, *one.aliases))
+    return _gather_records(
+        (name, asdict(one)) for one in MATERIALS_BY_NAME.values() for name in (one.name, *one.aliases)
+    )
 
 
 def _metrics() -> Records:
@@ -352,23 +354,23 @@ def _spec_keys() -> Records:
         for key in keys(record.spec_type):
             known.setdefault(key, []).append(record.name)
 
-    def named() -> Iterator[tuple[str, dict[str, Any]]]:
+    def yield_names() -> Iterator[tuple[str, dict[str, Any]]]:
         for key, of in known.items():
             reported = {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
             for name in {key.path, key.path.rpartition(".")[2].removesuffix("[]")}:
                 yield name, reported
 
-    return _gather_records(named())
+    return _gather_records(yield_names())
 
 
 def _findings() -> Records:
     """Return what a run of a family, of a recording or of a study may warn of."""
     from cfmkit.experiment import calibration, correction, findings
-    from cfmkit.studies.findings import FINDINGS
+    from cfmkit.studies.findings import STUDY_FINDINGS
 
     known = [(record.name, record.findings) for record in families.records()]
-    known += [("recordings", findings.FINDINGS), ("calibrate", calibration.FINDINGS)]
-    known += [("correct", correction.FINDINGS), *FINDINGS.items()]
+    known += [("recordings", findings.RECORDING_FINDINGS), ("calibrate", calibration.CALIBRATION_FINDINGS)]
+    known += [("correct", correction.CORRECTION_FINDINGS), *STUDY_FINDINGS.items()]
     return _gather_records(
         (key, {"name": key, "family": name, "meaning": meaning})
         for name, meanings in known
@@ -385,11 +387,11 @@ def _units() -> Records:
 
 
 def _dimensions() -> Records:
-    from cfmkit.specs.units import DIMENSIONS
+    from cfmkit.specs.units import DIMENSIONS_BY_NAME
 
     return _gather_records(
         (one.name, {"name": one.name, "unit": one.unit, "meaning": one.description, "example": one.example})
-        for one in DIMENSIONS.values()
+        for one in DIMENSIONS_BY_NAME.values()
         if one.unit
     )
 
@@ -401,15 +403,15 @@ def _references() -> Records:
     )
 
 
-_ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
-KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
+_METRIC_FIELDS = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
+TOPIC_KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
     "terms": (list_terms, (field("name", "word"), field("meaning", wraps=True))),
     "materials": (
         _materials,
         (field("name", "material"), Field("properties", properties, wraps=True), field("source", wraps=True)),
     ),
     "metrics": (_metrics, (field("name"), field("unit"), field("definition", wraps=True))),
-    "values": (_values, _ABOUT),
+    "values": (_values, _METRIC_FIELDS),
     "keys": (_spec_keys, ()),
     "findings": (_findings, (field("name"), field("family"), field("meaning", wraps=True))),
     "units": (
@@ -439,7 +441,7 @@ SPEC_KEY_FIELDS = (field("path", "key"), field("family", wraps=True), *KEY_FIELD
 SYMBOL_FIELDS = (field("name", "symbol"), field("family"), field("key", wraps=True), field("meaning", wraps=True))
 METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
 
-TOPICS: Mapping[str, tuple[str, Callable[[], Document]]] = {
+TOPIC_HEADINGS: Mapping[str, tuple[str, Callable[[], Document]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
     "materials": ("the named materials, with scatter and source", lambda: _page(*materials_page_parts())),

@@ -48,7 +48,7 @@ def find_active_bounds(values: FloatArray, bounds: FloatArray, close: float, sha
     return np.where(lowest, -1, np.where(highest, 1, 0))
 
 
-AROUND = 0.25
+MAX_RELATIVE_MOVE = 0.25
 """How far a value may move from that of a design, as a share of it: twice as far one mechanism becomes another."""
 
 
@@ -60,6 +60,6 @@ def range_about(value: float, low: float | None = None, high: float | None = Non
     >>> range_about(4.0), range_about(4.0, low=3.5, high=4.0)
     ((3.0, 5.0), (3.5, 4.0))
     """
-    reach = AROUND * abs(value)
+    reach = MAX_RELATIVE_MOVE * abs(value)
     least, most = value - reach, value + reach
     return (least if low is None else max(least, low)), (most if high is None else min(most, high))

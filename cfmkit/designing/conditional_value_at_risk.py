@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-FIRST_ROWS, MORE_ROWS, MOST_PROGRAMS, BROKEN = 4, 2, 12, 1e-7
+FIRST_ROWS, MORE_ROWS, MOST_PROGRAMS, ROW_SELECTION_LIMITS = 4, 2, 12, 1e-7
 """Rows of a part that a linear program begins with, those that may come in each time, how often, and what counts as
 broken [standard deviations]: two or three programs are usual, of 192 parts and 306 rows each."""
 
@@ -63,7 +63,9 @@ def best_move(
         move, level, slack = found
         left = parts + slopes @ move + level + slack[:, None]
         worst = np.argsort(left, axis=1)[:, :MORE_ROWS]
-        broken = (np.take_along_axis(left, worst, axis=1) < -BROKEN) & ~np.take_along_axis(chosen, worst, axis=1)
+        broken = (np.take_along_axis(left, worst, axis=1) < -ROW_SELECTION_LIMITS) & ~np.take_along_axis(
+            chosen, worst, axis=1
+        )
         if not broken.any():
             return move
         np.put_along_axis(chosen, worst, np.take_along_axis(chosen, worst, axis=1) | broken, axis=1)

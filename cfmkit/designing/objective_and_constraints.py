@@ -31,7 +31,7 @@ class LimitRows:
     about: Callable[[], list[str]] = list  # what each row is about; nothing: no report speaks of these rows
 
 
-STILL = 1e-9
+MIN_ROW_SLOPE = 1e-9
 """A row that no variable moves by more than this is met or missed whatever the design: it holds nothing."""
 
 
@@ -65,7 +65,7 @@ def list_active_rows(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
     """Yield what holds a design: the rows that are nearly zero and move with it, as ``limit: about``."""
     for one in rows:
         about = one.about()
-        moves = one.values < 1 if one.slopes is None else abs(one.slopes).max(axis=1, initial=0.0) > STILL
+        moves = one.values < 1 if one.slopes is None else abs(one.slopes).max(axis=1, initial=0.0) > MIN_ROW_SLOPE
         yield from (f"{one.name}: {about[k]}" for k in np.flatnonzero((one.values < close) & moves))
 
 

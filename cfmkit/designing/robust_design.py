@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-STEP = 2e-4
+DIFFERENCE_STEP = 2e-4
 """Step of a difference by a value of the design, as a share of its range."""
 
-ASIDE = 0.25
+ONE_SIDED_MEAN = 0.25
 """An error whose mean exceeds so many standard deviations is one-sided, like a waviness, which is never below zero."""
 
 LINEAR_PARTS = 192
 """Parts of a linear program."""
 
-SURE = 0.01
+YIELD_MARGIN = 0.01
 """The estimated share is to be so much above what was requested: the estimate is of first order."""
 
 FIRST_TRUST, LEAST_TRUST, MOST_TRUST = 0.1, 1e-4, 0.5
@@ -54,7 +54,7 @@ SMALL_GAIN = 0.02
 With other 48 parts the risk of one normal limit at 90 % scatters by 0.27: less is not worth solving parts for.
 """
 
-FLOOR = 1e-2
+MIN_RELATIVE_DEVIATION = 1e-2
 """Least standard deviation of a row, as a share of the largest of its limit: what no error moves is kept strictly."""
 
 
@@ -121,7 +121,7 @@ class RobustProblem:
     def middle(self) -> FloatArray:
         """Errors about which differences are taken, (d,): none, or of a range to one side of the design its middle."""
         mean = self.errors.mean(axis=0)
-        return np.asarray(np.where(np.abs(mean) > ASIDE * self.deviations, mean, 0.0))
+        return np.asarray(np.where(np.abs(mean) > ONE_SIDED_MEAN * self.deviations, mean, 0.0))
 
     @property
     def perfect(self) -> FloatArray:
@@ -191,7 +191,7 @@ def _by_values(
     """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
     if not len(x):  # nothing may move
         return np.zeros((problem.matrix.shape[1], 0))
-    step = STEP * problem.reach
+    step = DIFFERENCE_STEP * problem.reach
     ends = np.column_stack([np.maximum(problem.bounds[:, 0], x - step), np.minimum(problem.bounds[:, 1], x + step)])
 
     def numbers(k: int, value: float) -> FloatArray | None:
@@ -240,7 +240,7 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
     best = now
     best_share, risk, trust, steps = share, tail_risk(now.numbers(few) / scale, problem.share), FIRST_TRUST, 0
     for _ in range(most):
-        if not len(x) or best_share >= min(problem.share + SURE, 1.0) or trust < LEAST_TRUST or problem.late():
+        if not len(x) or best_share >= min(problem.share + YIELD_MARGIN, 1.0) or trust < LEAST_TRUST or problem.late():
             break
         parts = now.numbers(few) / scale
         slopes = np.broadcast_to(now.by_x / scale[:, None], (len(few), *now.by_x.shape))
@@ -284,7 +284,7 @@ def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
         mine = problem.about == one
         # limits that no error moves at all have their own size for a scale
         largest = float(moved[mine].max()) or float(np.abs(problem.constant[mine]).max()) or 1.0
-        out[mine] = np.maximum(moved[mine], FLOOR * largest)
+        out[mine] = np.maximum(moved[mine], MIN_RELATIVE_DEVIATION * largest)
     return out
 
 

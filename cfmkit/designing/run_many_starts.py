@@ -69,7 +69,7 @@ class Clock:
         return None if self.deadline is None else max(self.deadline - time(), 0.0)
 
 
-NEVER = Clock()
+UNLIMITED_CLOCK = Clock()
 """The clock of a search that has all the time."""
 
 

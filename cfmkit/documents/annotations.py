@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics.compare import MetricChange
     from cfmkit.studies.batch_sources_and_outcomes import Entry
 
-PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
+LOCATION_PATTERN = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
 """How the fault of a file begins."""
 
 
@@ -43,8 +43,8 @@ def _annotation(one: Entry, place_of: Callable[[str, int], tuple[int, int]], bey
     """Return the one command for a specification: faults before missed requirements, changes and warnings; or ""."""
     place: dict[str, Any] = {"file": one.spec}
     if one.errors:
-        texts = [found["reported"] if (found := PLACED.fullmatch(text)) else text for text in one.errors]
-        if first := PLACED.fullmatch(one.errors[0]):
+        texts = [found["reported"] if (found := LOCATION_PATTERN.fullmatch(text)) else text for text in one.errors]
+        if first := LOCATION_PATTERN.fullmatch(one.errors[0]):
             place = {"file": first["file"], "line": first["line"], "col": first["col"]}
         return command("error", place, "\n".join(text.removeprefix("error    ") for text in texts))
     texts = [requirement["sentence"] for requirement in one.missed]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from cfmkit.documents.document import (
-    BAD,
-    FAINT,
-    GOOD,
+    BAD_TONE,
+    FAINT_TONE,
+    GOOD_TONE,
     Document,
     GridColumn,
     Note,
@@ -69,24 +69,24 @@ def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
     for one in entries:
         for requirement in one.missed if one.verb and not one.errors else ():
             reported = requirement["sentence"].removesuffix(": missed")
-            yield Note("missed", f"{visible(one.spec)}: {reported}", tone=BAD, whole=True)
+            yield Note("missed", f"{visible(one.spec)}: {reported}", tone=BAD_TONE, whole=True)
 
 
 def _changes(compared: BatchComparison) -> Iterator[Note]:
     """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
     beyond = compared.beyond
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
-    yield Note("compared", text, tone=BAD if beyond else GOOD, whole=True)
+    yield Note("compared", text, tone=BAD_TONE if beyond else GOOD_TONE, whole=True)
     for one in beyond[:MAX_CHANGES]:
-        yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD, whole=True)
+        yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD_TONE, whole=True)
     if len(beyond) > MAX_CHANGES:
-        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more stand in changes.csv", tone=FAINT)
+        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more stand in changes.csv", tone=FAINT_TONE)
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:
     word = outcome(one)
     good = word == "ok"
-    tone = GOOD if good else FAINT if one.skipped else BAD
+    tone = GOOD_TONE if good else FAINT_TONE if one.skipped else BAD_TONE
     link = quote(str(PurePosixPath(one.folder) / "report.html")) if one.written else ""
     spec = Span(visible(one.spec), link=link)
     return spec, one.verb, Span(word if good or one.skipped else word.upper(), tone), detail(one)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-PLAIN, GOOD, BAD, LABEL, FAINT = "", "cyan", "bold yellow", "bold", "dim"
+PLAIN_TONE, GOOD_TONE, BAD_TONE, LABEL_TONE, FAINT_TONE = "", "cyan", "bold yellow", "bold", "dim"
 """Tones. Colours only repeat what a word says, and blue stands against yellow, which everybody can tell apart."""
 
-MARGIN = 11
+LABEL_COLUMNS = 11
 """Columns of the words that begin a paragraph: ``test plan`` and two blanks."""
 
 
@@ -33,7 +33,7 @@ class Span(NamedTuple):
     """A piece of text and its tone."""
 
     text: str
-    tone: str = PLAIN
+    tone: str = PLAIN_TONE
     link: str = ""  # where it leads on a page that has links
 
 
@@ -44,7 +44,7 @@ class TextLine(NamedTuple):
     whole: bool = False  # whether it keeps its length where the terminal is narrower: paths and commands are copied
 
 
-BLANK = TextLine()
+BLANK_LINE = TextLine()
 
 
 class Paragraph(NamedTuple):
@@ -52,7 +52,7 @@ class Paragraph(NamedTuple):
 
     word: str
     text: str
-    tone: str = LABEL
+    tone: str = LABEL_TONE
 
 
 class GridColumn(NamedTuple):
@@ -89,7 +89,7 @@ class JsonText(NamedTuple):
 Block = TextLine | Paragraph | CellGrid | Verbatim | JsonText
 
 
-def line(text: str, tone: str = PLAIN) -> TextLine:
+def line(text: str, tone: str = PLAIN_TONE) -> TextLine:
     """Return a line of one tone."""
     return TextLine((Span(text, tone),))
 
@@ -101,7 +101,7 @@ def whole_line(*spans: str | Span) -> TextLine:
 
 def verdict(ok: bool | None) -> Span:
     """Return how a requirement ended: nothing where there was none."""
-    return Span("") if ok is None else Span("ok", GOOD) if ok else Span("MISSED", BAD)
+    return Span("") if ok is None else Span("ok", GOOD_TONE) if ok else Span("MISSED", BAD_TONE)
 
 
 def format_bounds(bounds: Mapping[str, Any]) -> str:
@@ -135,9 +135,9 @@ def record_table(heading: str, records: Iterable[Record], fields: Sequence[Field
     rows = [[one.cell(record) for one in fields] for record in records]
     if not rows:
         return
-    yield BLANK
+    yield BLANK_LINE
     if heading:
-        yield line(heading, LABEL)
+        yield line(heading, LABEL_TONE)
     yield CellGrid(tuple(GridColumn(one.head, one.wraps) for one in fields), rows, gap=2, indented=True)
 
 
@@ -173,7 +173,7 @@ class Written(NamedTuple):
 
 def next_command(*words: str) -> TextLine:
     """Return the line that says which command follows, never broken: it is copied."""
-    return whole_line(Span(f"{'next':<{MARGIN}}", GOOD), command_line(*words))
+    return whole_line(Span(f"{'next':<{LABEL_COLUMNS}}", GOOD_TONE), command_line(*words))
 
 
 def command_line(*words: str) -> str:
@@ -221,7 +221,7 @@ class Note(NamedTuple):
     word: str
     text: str
     remedy: str = ""  # what changes it, as an option that can be pasted
-    tone: str = LABEL
+    tone: str = LABEL_TONE
     whole: bool = False  # whether a short page has all of it, too: how a run ended
     short: str = ""  # what a short page has instead; empty: the clauses of the text that fit
     is_command: bool = False  # whether the text is a command: it is copied, and never broken
@@ -232,7 +232,7 @@ class WarningEntry(NamedTuple):
     """A finding, for short pages in one clause, with the commands that remedy it."""
 
     name: str
-    short: str  # at most `SHORT` characters
+    short: str  # at most `MAX_WARNING_LENGTH` characters
     text: str
     options: tuple[str, ...] = ()  # ``--set ...``, each of them a remedy
     commands: tuple[str, ...] = ()  # the same as whole commands
@@ -266,27 +266,27 @@ class Document:
     @property
     def tone(self) -> str:
         """``good``, ``warn`` or ``bad``, by how it ended."""
-        return TONES.get(int(self.exit_code), "warn")
+        return TONES_BY_EXIT_CODE.get(int(self.exit_code), "warn")
 
     def __repr__(self) -> str:
         """Return what it is of and how it ended."""
         return f"<Document {self.title!r}: {self.summary}; {self.verdict}>"[:500]
 
 
-TONES = {0: "good", 3: "bad", 4: "bad", 5: "bad", 6: "warn", 7: "bad", 70: "bad"}
+TONES_BY_EXIT_CODE = {0: "good", 3: "bad", 4: "bad", 5: "bad", 6: "warn", 7: "bad", 70: "bad"}
 """How a run ended, by its exit code, as the colour of its verdict."""
 
 
-SHORT = 100
+MAX_WARNING_LENGTH = 100
 """Characters of a warning on a page: its name, its consequence and a remedy."""
 
-SHORTEST = 24
+MIN_CLAUSE_LENGTH = 24
 """Characters below which a clause says too little: rather a part of the next one is taken as well."""
 
 DOTS = "..."
 """What ends a text that is cut inside a clause."""
 
-NUMBER = re.compile(r"(?<![A-Za-z_])\d")
+NUMBER_START = re.compile(r"(?<![A-Za-z_])\d")
 PLAIN_WORDS = re.compile(r"[a-z]+ [a-z]+ ")
 
 
@@ -308,9 +308,9 @@ def shortened_to_clause(text: str, limit: int) -> str:
     if len(text) <= limit:
         return text
     later = re.split(r"(?<=[:;]) ", text)[1:]
-    if not NUMBER.search(_beginning(text, limit)):
+    if not NUMBER_START.search(_beginning(text, limit)):
         for at, clause in enumerate(later):
-            if NUMBER.search(clause) and PLAIN_WORDS.match(clause):
+            if NUMBER_START.search(clause) and PLAIN_WORDS.match(clause):
                 return _beginning(" ".join(later[at:]), limit)
     return _beginning(text, limit)
 
@@ -319,7 +319,9 @@ def _beginning(text: str, limit: int) -> str:
     """Return what fits of a text, cut where a clause ends; else between words, with dots."""
     if len(text) <= limit:
         return text
-    ends = [at for mark in ("; ", ": ", ". ", ", ", " (") for at in _places(text, mark) if SHORTEST <= at <= limit]
+    ends = [
+        at for mark in ("; ", ": ", ". ", ", ", " (") for at in _places(text, mark) if MIN_CLAUSE_LENGTH <= at <= limit
+    ]
     whole = [at for at in ends if text.count("(", 0, at) == text.count(")", 0, at)]
     if whole:
         return text[: max(whole)]

@@ -11,7 +11,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.documents.document import BAD, GOOD
+from cfmkit.documents.document import BAD_TONE, GOOD_TONE
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.documents.document import Document, PageTable
 
-NAME = "report.html"
+REPORT_NAME = "report.html"
 
 
 def page(
@@ -64,8 +64,8 @@ def page(
         texts=texts,
         metrics=metrics,
         style=part("report.css"),
-        GOOD=GOOD,
-        BAD=BAD,
+        GOOD=GOOD_TONE,
+        BAD=BAD_TONE,
         **more,
     )
     return text.encode()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.documents import html
-from cfmkit.documents.html import NAME, escaped_json, part, references_of
+from cfmkit.documents.html import REPORT_NAME, escaped_json, part, references_of
 from cfmkit.documents.run_document import document_of, metrics_table
 from cfmkit.families import family
 from cfmkit.plots.figures import moving_of
@@ -123,4 +123,4 @@ def _nearest(motion: Any, effort: Any, place: float) -> float:
     return float(np.interp(place, motion[order], effort[order], left=np.nan, right=np.nan))
 
 
-__all__ = ["NAME", "Film", "page"]
+__all__ = ["REPORT_NAME", "Film", "page"]

@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.documents import html
 from cfmkit.documents.document import GridColumn
-from cfmkit.documents.html import NAME, escaped_json, part, references_of
+from cfmkit.documents.html import REPORT_NAME, escaped_json, part, references_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -39,13 +39,13 @@ MOST_POINTS = 20_000
 MOST_BYTES = 4_000_000
 """Of JSON for the points: beyond it a browser needs seconds to begin."""
 
-SHOWN = 50
+MAX_STATIC_ROWS = 50
 """Rows that stand in the page itself, for readers without scripts."""
 
-PLAIN = ("requirements_met", "status", "warnings", "message")
+TEXT_COLUMNS = ("requirements_met", "status", "warnings", "message")
 """The columns behind the metrics."""
 
-DIGITS = 6
+PAGE_DIGITS = 6
 """Of a number in the page: more are in results.csv."""
 
 
@@ -104,7 +104,7 @@ def page(
     more = ((len(points) - len(rows), "points"), (len(head) - len(kept), "columns"))
     shown = StudyPoints(
         tuple(map(GridColumn, kept)),
-        tuple(tuple(_short(column[at]) for column in columns) for at in range(min(SHOWN, len(rows)))),
+        tuple(tuple(_short(column[at]) for column in columns) for at in range(min(MAX_STATIC_ROWS, len(rows)))),
         len(points),
         tuple(f"{count} more {things} are in results.csv." for count, things in more if count),
         escaped_json(data),
@@ -128,7 +128,7 @@ def _fitting(
         name: sum(len(row[at] if name in paths else _short(row[at])) + 3 for row in rows)
         for at, name in enumerate(head)
     }
-    first = [name for name in head if name in paths or name in PLAIN or name.partition(" [")[0] in shown]
+    first = [name for name in head if name in paths or name in TEXT_COLUMNS or name.partition(" [")[0] in shown]
     kept, used = set(), 0
     for name in dict.fromkeys((*paths, "status", *first, *head)):
         if name in size and used + size[name] <= MOST_BYTES:
@@ -143,7 +143,7 @@ def _short(text: str) -> str:
         value = float(text)
     except ValueError:
         return text
-    return f"{value:.{DIGITS}g}" if math.isfinite(value) else text
+    return f"{value:.{PAGE_DIGITS}g}" if math.isfinite(value) else text
 
 
 def _numbers(column: Sequence[str], exact: bool) -> list[Any]:
@@ -172,7 +172,7 @@ def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequenc
     head, *rows = csv.reader(io.StringIO(content.decode()))
     numbers = {key: at for at, key in reversed(list(enumerate(zip(*cells, strict=True))))}
     own, branch = [head.index(path) for path in paths], head.index("branch") if "branch" in head else None
-    x, y = (next((at for at, name in enumerate(head) if name.startswith(names)), None) for names in _AXES)
+    x, y = (next((at for at, name in enumerate(head) if name.startswith(names)), None) for names in _AXIS_PREFIXES)
     points: dict[int, dict[str, list[list[float]]]] = {}
     for row in rows:
         number = numbers.get(tuple(row[at] for at in own))
@@ -197,7 +197,7 @@ def _simplify_branch(line: list[list[float]]) -> list[list[float]]:
     if len(places) < 3:
         return _round_points(line)
     span = np.ptp(np.vstack([places, [places[0, 0], 0.0]]), axis=0)
-    pixels = places / np.where(span > 0, span, 1.0) * _PIXELS
+    pixels = places / np.where(span > 0, span, 1.0) * _DIAGRAM_PIXELS
     keep = np.zeros(len(places), bool)
     keep[[0, -1]] = True
     stretches = [(0, len(places) - 1)]
@@ -227,12 +227,12 @@ def _distances(places: FloatArray, start: FloatArray, end: FloatArray) -> FloatA
     return away
 
 
-_PIXELS = np.array([564.0, 264.0])
+_DIAGRAM_PIXELS = np.array([564.0, 264.0])
 """Width and height of the diagram that study.js draws, without its margins."""
 
 
-_AXES = (("displacement [", "angle ["), ("force [", "torque ["))
+_AXIS_PREFIXES = (("displacement [", "angle ["), ("force [", "torque ["))
 """How the columns of a curve begin that are drawn: over which, and which."""
 
 
-__all__ = ["NAME", "StudyPoints", "page"]
+__all__ = ["REPORT_NAME", "StudyPoints", "page"]

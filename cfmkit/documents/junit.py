@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 Element = ElementTree.Element
-FAILURES = (ExitCode.NO_SOLUTION, ExitCode.PARTIAL)
+FAILURE_CODES = (ExitCode.NO_SOLUTION, ExitCode.PARTIAL)
 """Ends that say something about the mechanism; all others but these are errors of the run."""
 
-FINE = (ExitCode.OK, ExitCode.REQUIREMENT_MISSED)
+PASSED_CODES = (ExitCode.OK, ExitCode.REQUIREMENT_MISSED)
 NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold, not even escaped."""
 
@@ -70,8 +70,8 @@ def _solution(entry: Entry) -> Element:
     case = _case(entry, "solved", entry.seconds)
     if entry.skipped:
         case.append(Element("skipped", message=clean(entry.message)))
-    elif entry.code not in FINE:
-        tag = "failure" if entry.code in FAILURES else "error"
+    elif entry.code not in PASSED_CODES:
+        tag = "failure" if entry.code in FAILURE_CODES else "error"
         reported = "\n".join((*entry.errors, entry.bug)).strip() or entry.message
         case.append(_problem(tag, entry.status, entry.message, reported))
     if entry.warnings:
@@ -93,7 +93,7 @@ def _requirements(entry: Entry) -> Iterator[Element]:
         name = requirement_name(one)
         names[name] = names.get(name, 0) + 1
         case = _case(entry, name if names[name] == 1 else f"{name} (again, {names[name]})")
-        if entry.code not in (*FINE, ExitCode.PARTIAL):
+        if entry.code not in (*PASSED_CODES, ExitCode.PARTIAL):
             case.append(Element("skipped", message="there is no solution to measure"))
         elif not one["ok"]:
             case.append(_problem("failure", "requirement", one["sentence"], one["sentence"]))

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 MAX_CHANGES = 50
 """Changed values that are listed; all stand in changes.csv."""
 
-MARKUP = re.compile(r"([\\`*_\[\]<>|~&@#$]|^[=+-])")
-APART = "&#8203;"
+MARKUP_PATTERN = re.compile(r"([\\`*_\[\]<>|~&@#$]|^[=+-])")
+ZERO_WIDTH_SPACE = "&#8203;"
 """A blank of no width: a backslash before it does not keep a page from making a mention of @name."""
 
 
@@ -93,5 +93,9 @@ def plain(text: str) -> str:
     >>> plain("a_b | <i>")
     'a\\\\_b \\\\| \\\\<i\\\\>'
     """
-    shown = MARKUP.sub(r"\\\1", visible(" ".join(text.split())))
-    return shown.replace("@", f"@{APART}").replace("://", f":{APART}//").replace("www.", f"www{APART}.")
+    shown = MARKUP_PATTERN.sub(r"\\\1", visible(" ".join(text.split())))
+    return (
+        shown.replace("@", f"@{ZERO_WIDTH_SPACE}")
+        .replace("://", f":{ZERO_WIDTH_SPACE}//")
+        .replace("www.", f"www{ZERO_WIDTH_SPACE}.")
+    )

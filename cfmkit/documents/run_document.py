@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
-    BAD,
-    GOOD,
-    SHORT,
+    BAD_TONE,
+    GOOD_TONE,
+    MAX_WARNING_LENGTH,
     Document,
     GridColumn,
     Note,
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding, Quantity, Searched
     from cfmkit.specs.spec import Requirement
 
-STDIN = "-"
+STDIN_PATH = "-"
 
-LABELS = {
+SHORT_LABELS = {
     "force_ripple": "ripple",
     "torque_ripple": "ripple",
     "deviation_from_target": "deviation",
@@ -50,7 +50,7 @@ LABELS = {
 }
 """What values are called where there is little room."""
 
-FACTS = (
+SHOWN_METRICS = (
     "force_ripple",
     "torque_ripple",
     "allowable_stress",
@@ -87,7 +87,7 @@ class RunCommand:
         paths = [change.partition("=")[0] for change in changes]
         kept = [change for change in self.changes if change.partition("=")[0].strip() not in paths]
         settings = [word for change in (*kept, *changes) for word in ("--set", change)]
-        folder = ["-o", self.folder] if self.source == STDIN else []
+        folder = ["-o", self.folder] if self.source == STDIN_PATH else []
         return command_line("cfmkit", verb, self.source, *(self.words if verb == self.verb else ()), *settings, *folder)
 
 
@@ -137,7 +137,7 @@ def warning_of(item: Finding, command: RunCommand | None = None) -> WarningEntry
     """Return the entry of a finding."""
     options = tuple(_option(cure, command) for cure in item.cures)
     commands = tuple(command.with_remedy(cure) if command else command_line(*_settings(cure)) for cure in item.cures)
-    short = shortened_to_clause(item.short or item.message, SHORT - len(item.name) - 2)
+    short = shortened_to_clause(item.short or item.message, MAX_WARNING_LENGTH - len(item.name) - 2)
     return WarningEntry(item.name, short, item.message, options, commands)
 
 
@@ -161,7 +161,7 @@ def _notes(report: Report, command: RunCommand | None) -> Iterator[Note]:
     """Yield how the run ended where that is not as requested, what the design decided, and what the verb adds."""
     status, design = report.status, report.design
     if status.exit_code is not ExitCode.OK:
-        yield Note("partial" if status.usable else "failed", report.message, tone=BAD, whole=True)
+        yield Note("partial" if status.usable else "failed", report.message, tone=BAD_TONE, whole=True)
         cures = dict.fromkeys(cure for item in _reasons(report) for cure in item.cures)
         for cure in cures:
             text = command.with_remedy(cure) if command else command_line(*_settings(cure))
@@ -305,7 +305,11 @@ def _long_value(quantity: Quantity) -> str:
 def requirements_table(outcomes: Iterable[Outcome]) -> PageTable:
     """Return one row for each requirement: its metric, the value, the bounds, and whether they are kept."""
     rows = tuple(
-        (words(outcome.metric), *value_and_bounds(outcome), Span("ok", GOOD) if outcome.ok else Span("MISSED", BAD))
+        (
+            words(outcome.metric),
+            *value_and_bounds(outcome),
+            Span("ok", GOOD_TONE) if outcome.ok else Span("MISSED", BAD_TONE),
+        )
         for outcome in outcomes
     )
     return PageTable("Requirements", tuple(map(GridColumn, ("", "value", "required", ""))), rows)
@@ -331,12 +335,12 @@ def _facts(report: Report) -> Iterator[ValueRow]:
     if spec.target_curve is not None:
         known |= {"force_ripple", "torque_ripple"}
     for name in dict.fromkeys(
-        ("deviation_from_curve", "usable_stroke", "hysteresis_area", *family(spec.family).headline, *FACTS)
+        ("deviation_from_curve", "usable_stroke", "hysteresis_area", *family(spec.family).headline, *SHOWN_METRICS)
     ):
         if name not in known and _has_value(report, name):
             text = _stroke(report) if name == "usable_stroke" else branches(report, name, report.metrics)
             about = report.metrics[name].definition
-            yield ValueRow(LABELS.get(name, words(name)), text + _remark(report, name), about=about)
+            yield ValueRow(SHORT_LABELS.get(name, words(name)), text + _remark(report, name), about=about)
 
 
 def _stress(report: Report, known: set[str]) -> ValueRow | None:
@@ -435,7 +439,7 @@ def _format_window(report: Report, name: str, window: Window | None) -> str:
 
 def _required_row(report: Report, requirement: Requirement, outcome: Outcome) -> ValueRow:
     base, branch = split_name(outcome.metric)
-    label = LABELS[base] + (f" on {branch}" if branch else "") if base in LABELS else words(outcome.metric)
+    label = SHORT_LABELS[base] + (f" on {branch}" if branch else "") if base in SHORT_LABELS else words(outcome.metric)
     over = Window(*outcome.over) if outcome.over else None
     apart = "" if over is None or _is_title(report, over) else _format_window(report, outcome.metric, over)
     bound = format_bounds({"min": requirement.min, "max": requirement.max})

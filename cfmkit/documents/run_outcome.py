@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 
-SEVERITY = (
+CODES_BY_SEVERITY = (
     ExitCode.BUG,
     ExitCode.IO,
     ExitCode.INVALID,
@@ -143,7 +143,9 @@ def worst(codes: list[ExitCode]) -> ExitCode:
     >>> worst([ExitCode.OK, ExitCode.REQUIREMENT_MISSED, ExitCode.PARTIAL]).name
     'PARTIAL'
     """
-    return next((code for code in (*SEVERITY, *codes) if code in codes and code is not ExitCode.OK), ExitCode.OK)
+    return next(
+        (code for code in (*CODES_BY_SEVERITY, *codes) if code in codes and code is not ExitCode.OK), ExitCode.OK
+    )
 
 
 def report_on(result: Result, design: Design | None = None) -> Report:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cfmkit.documents.document import BAD, Document, GridColumn, Note, PageTable, ValueRow, Written, name_in_words
+from cfmkit.documents.document import BAD_TONE, Document, GridColumn, Note, PageTable, ValueRow, Written, name_in_words
 from cfmkit.documents.run_document import value_and_bounds, warning_of
 from cfmkit.metrics.metric_definitions import words
 from cfmkit.studies.sensitivity.monte_carlo_yield import VARIANCE_DROP, YIELD_GAIN
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.share import Share
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
-PERCENT = (YIELD_GAIN, VARIANCE_DROP)
+PERCENT_INDICES = (YIELD_GAIN, VARIANCE_DROP)
 """Indices that are shown in percent."""
 
 NO_INFLUENCE = 1e-12
@@ -64,9 +64,9 @@ def _verdict(found: Findings) -> str:
 def _notes(found: Findings) -> Iterator[Note]:
     for outcome in found.setup.nominal.outcomes:
         if not outcome.ok:
-            yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=BAD)
+            yield Note("missed", f"by the nominal values: {outcome.sentence}", tone=BAD_TONE)
     if found.interrupted:
-        yield Note("stopped", message(found), tone=BAD, whole=True)
+        yield Note("stopped", message(found), tone=BAD_TONE, whole=True)
     if by_interval(found):
         yield Note("yield", "its 95 % interval reaches the one that is required: not missed", whole=True)
     if found.evaluator.failed:
@@ -138,7 +138,7 @@ def _index(line: IndexLine | None, of_share: bool) -> str:
     """Return an index with its interval; in per cent if it is a share, or has the unit of a metric that is one."""
     if line is None or line.value is None:
         return "not stated"
-    percent = line.index in PERCENT or (of_share and line.index in IN_UNITS and line.unit == "1")
+    percent = line.index in PERCENT_INDICES or (of_share and line.index in IN_UNITS and line.unit == "1")
     unit = " %" if percent else "" if line.unit == "1" else f" {line.unit}"
     value, low, high = (None if end is None else _short(end, percent) for end in (line.value, line.low, line.high))
     if low is None or low == value == high:

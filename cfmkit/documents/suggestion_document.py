@@ -29,7 +29,7 @@ NO_VALUE = "-"
 NOT_JUDGED = "open"
 """Of a value that no model here has, or of which the material says nothing; a note says the reason."""
 
-RANKS = {"parts": 4, "variant": 3, "hysteresis": 2, "life": 1}
+COLUMN_RANKS = {"parts": 4, "variant": 3, "hysteresis": 2, "life": 1}
 """Columns that narrow pages leave out, the largest first."""
 
 
@@ -69,7 +69,10 @@ def _next(found: Sequence[Mapping[str, Any]], files: Written) -> str:
 
 def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
     columns = _columns(record)
-    heads = (GridColumn("", False), *(GridColumn(head, head == "variant", RANKS.get(head, 0)) for head in columns))
+    heads = (
+        GridColumn("", False),
+        *(GridColumn(head, head == "variant", COLUMN_RANKS.get(head, 0)) for head in columns),
+    )
     listed = (*record["proposals"], *record["unjudged"])
     order = f"proposals by {', '.join(record['order'])}" + ("; not judged in full last" if record["unjudged"] else "")
     numbered = [Span(f"{k} {one['family']}", link=_page_of(one)) for k, one in enumerate(listed, 1)]

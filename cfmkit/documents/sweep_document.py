@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.documents.document import (
-    SHORT,
+    MAX_WARNING_LENGTH,
     Document,
     GridColumn,
     Note,
@@ -79,7 +79,11 @@ def document_of(
         tables=tuple(_ranges(summary, dimensions)),
         notes=tuple(_settings(summary)),
         warnings=tuple(
-            WarningEntry(one["name"], shortened_to_clause(one["message"], SHORT - len(one["name"]) - 2), one["message"])
+            WarningEntry(
+                one["name"],
+                shortened_to_clause(one["message"], MAX_WARNING_LENGTH - len(one["name"]) - 2),
+                one["message"],
+            )
             for one in summary["warnings"]
         ),
         files=files,

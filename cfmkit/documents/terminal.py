@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.documents.document import (
-    BAD,
-    BLANK,
+    BAD_TONE,
+    BLANK_LINE,
     DOTS,
-    FAINT,
-    GOOD,
-    LABEL,
-    MARGIN,
-    NUMBER,
-    SHORTEST,
+    FAINT_TONE,
+    GOOD_TONE,
+    LABEL_COLUMNS,
+    LABEL_TONE,
+    MIN_CLAUSE_LENGTH,
+    NUMBER_START,
     CellGrid,
     GridColumn,
     JsonText,
@@ -53,10 +53,10 @@ if TYPE_CHECKING:
 MAX_LINES, MAX_LINES_WITH_TABLES = 15, 24
 """Of a short page of one mechanism, and of one that lists points, specifications or proposals: a screen."""
 
-INDENT, WORDS = 2, 12
+INDENT_COLUMNS, WORD_COLUMNS = 2, 12
 """Columns before a word such as ``test plan``, and columns that it gets."""
 
-GAP = 3
+GAP_COLUMNS = 3
 """Columns between the two halves of the headline, and before a remedy."""
 
 LEAST_GAP = 2
@@ -68,10 +68,10 @@ LEAST_TEXT = 8
 MIN_FACTS = 4
 """Lines of the headline that are filled with what is not required, where there is room."""
 
-MORE = "-v: all"
+MORE_TEXT = "-v: all"
 """What stands at the end of a short page."""
 
-TONES = {"good": GOOD, "warn": BAD, "bad": BAD}
+TONE_STYLES = {"good": GOOD_TONE, "warn": BAD_TONE, "bad": BAD_TONE}
 
 
 def page(document: Document, width: int, everything: bool = False) -> Iterator[Block]:
@@ -91,8 +91,8 @@ def page(document: Document, width: int, everything: bool = False) -> Iterator[B
 
 def _title(document: Document, width: int) -> Iterator[TextLine]:
     """Yield what it is, its main value and the window, and at the far end the verdict; below where there is no room."""
-    name, summary = Span(document.title, LABEL), f"   {document.summary}" if document.summary else ""
-    end = Span(document.verdict, TONES[document.tone])
+    name, summary = Span(document.title, LABEL_TONE), f"   {document.summary}" if document.summary else ""
+    end = Span(document.verdict, TONE_STYLES[document.tone])
     left = len(document.title) + len(summary)
     if left + LEAST_GAP + len(document.verdict) <= width:
         yield whole_line(name, summary, " " * (width - left - len(document.verdict)), end)
@@ -127,12 +127,12 @@ def _most_of_headline(rows: Sequence[ValueRow]) -> int:
     return max(required, min(MIN_FACTS, -(-len(rows) // 2)))
 
 
-def _word(word: str, tone: str = LABEL) -> Span:
-    return Span(f"{' ' * INDENT}{word:<{WORDS}}" + ("" if len(word) < WORDS else " "), tone)
+def _word(word: str, tone: str = LABEL_TONE) -> Span:
+    return Span(f"{' ' * INDENT_COLUMNS}{word:<{WORD_COLUMNS}}" + ("" if len(word) < WORD_COLUMNS else " "), tone)
 
 
 def _note_lines(note: Note, width: int) -> list[TextLine]:
-    room = width - INDENT - WORDS
+    room = width - INDENT_COLUMNS - WORD_COLUMNS
     if note.is_command:
         return [whole_line(_word(note.word, note.tone), note.text)]
     if note.whole:
@@ -146,9 +146,9 @@ def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> Te
     left = room - len(name)
     shown = shortened_to_clause(text, left) if left >= LEAST_TEXT else ""
     if remedy:
-        beside = shortened_to_clause(text, max(left - len(remedy) - GAP, 0))
-        kept = bool(NUMBER.search(beside)) if NUMBER.search(shown) else not beside.endswith(DOTS)
-        if beside != shown and (len(beside) < SHORTEST or not kept):
+        beside = shortened_to_clause(text, max(left - len(remedy) - GAP_COLUMNS, 0))
+        kept = bool(NUMBER_START.search(beside)) if NUMBER_START.search(shown) else not beside.endswith(DOTS)
+        if beside != shown and (len(beside) < MIN_CLAUSE_LENGTH or not kept):
             remedy = ""
         else:
             shown = beside
@@ -158,17 +158,17 @@ def _with_remedy(word: Span, name: str, text: str, remedy: str, room: int) -> Te
 
 def _warning_lines(warnings: Sequence[WarningEntry], width: int, most: int) -> list[TextLine]:
     """Return one line for each warning, the names of the others in the last."""
-    room = width - INDENT - WORDS
+    room = width - INDENT_COLUMNS - WORD_COLUMNS
     shown = warnings if len(warnings) <= most else warnings[: max(most - 1, 0)]
     lines = []
     for at, one in enumerate(shown):
         word = f"{'warning' if len(warnings) == 1 else f'warnings {len(warnings)}'}" if not at else ""
         remedy = one.options[0] if one.options else ""
-        lines.append(_with_remedy(_word(word, BAD), f"{one.name}: ", one.short, remedy, room))
+        lines.append(_with_remedy(_word(word, BAD_TONE), f"{one.name}: ", one.short, remedy, room))
     if rest := warnings[len(shown) :]:
         names = ", ".join(dict.fromkeys(one.name for one in rest))
         text = shortened_to_clause(f"and {len(rest)} more (-v): {names}", room)
-        lines.append(whole_line(_word("" if shown else f"warnings {len(warnings)}", BAD), text))
+        lines.append(whole_line(_word("" if shown else f"warnings {len(warnings)}", BAD_TONE), text))
     return lines
 
 
@@ -184,7 +184,7 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
         half = min(most, -(-len(facts) // 2))
         required, facts = facts[:half], facts[half:]
     left = _cells(required, width)
-    room, tall = width - _wide(left) - GAP, min(max(len(left), MIN_FACTS), most)
+    room, tall = width - _wide(left) - GAP_COLUMNS, min(max(len(left), MIN_FACTS), most)
     fitting = [row for row in facts if _wide(_cells([row], width)) <= room]
     right = _cells(fitting[:tall], width)
     while right and _wide(right) > room:  # one has the longest label, another the longest value
@@ -202,21 +202,21 @@ def _headline(rows: Sequence[ValueRow], width: int, most: int) -> Iterator[TextL
         return
     for at in range(max(len(left), len(right))):
         texts: tuple[Span, ...] = left[at] if at < len(left) else ()
-        pad = " " * (_wide(left) - sum(len(one.text) for one in texts) + GAP)
+        pad = " " * (_wide(left) - sum(len(one.text) for one in texts) + GAP_COLUMNS)
         yield whole_line(*texts, *([Span(pad), *right[at]] if at < len(right) else []))
 
 
 def _cells(rows: Sequence[ValueRow], width: int) -> list[tuple[Span, ...]]:
     """Return rows as spans: label, value with its window, bound and verdict, in columns."""
     texts = [_value(row) for row in rows]
-    label = max([WORDS, *(len(row.label) + 2 for row in rows)])
+    label = max([WORD_COLUMNS, *(len(row.label) + 2 for row in rows)])
     bounded = [at for at, row in enumerate(rows) if row.required]
     value = max([0, *(len(texts[at]) for at in bounded)])
     bound = max([0, *(len(row.bound) for row in rows)])
-    value = max(min(value, width - INDENT - label - bound - 12), 8)
+    value = max(min(value, width - INDENT_COLUMNS - label - bound - 12), 8)
     lines: list[tuple[Span, ...]] = []
     for row, text in zip(rows, texts, strict=True):
-        head = Span(" " * INDENT + f"{row.label:<{label}}")
+        head = Span(" " * INDENT_COLUMNS + f"{row.label:<{label}}")
         if not row.required:
             lines.append((head, Span(text)))
             continue
@@ -236,7 +236,10 @@ def _wide(lines: Iterable[Sequence[Span]]) -> int:
 def _drop_ranked_columns(table: PageTable, width: int) -> PageTable:
     """Return a table without the columns of the highest ranks, as many as it takes to fit a page."""
     while any(column.rank for column in table.columns):
-        if sum(map(_least_columns, table.columns, _columns(table))) + INDENT + 2 * (len(table.columns) - 1) <= width:
+        if (
+            sum(map(_least_columns, table.columns, _columns(table))) + INDENT_COLUMNS + 2 * (len(table.columns) - 1)
+            <= width
+        ):
             break
         at = max(range(len(table.columns)), key=lambda k: table.columns[k].rank)
         table = table._replace(
@@ -269,12 +272,12 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
     heads = [column.head for column in table.columns]
     least = list(map(_least_columns, table.columns, texts))
     wide = [max(map(len, column), default=0) for column in texts]
-    room = width - INDENT - 2 * (len(wide) - 1)
+    room = width - INDENT_COLUMNS - 2 * (len(wide) - 1)
     top = table.heading
     if not top and sum(wide) - wide[0] + max(wide[0], len(heads[0])) > room:  # a long head takes a line of its own
         top, heads[0] = heads[0], ""
     wide = [max(columns, len(head)) for columns, head in zip(wide, heads, strict=True)]
-    lines: list[TextLine | CellGrid] = [line(f"  {top}", LABEL)] if top else []
+    lines: list[TextLine | CellGrid] = [line(f"  {top}", LABEL_TONE)] if top else []
     while sum(wide) > room:  # texts give way, words and numbers do not
         able = [at for at, column in enumerate(table.columns) if column.wraps and wide[at] > least[at]]
         if not able:  # cells take several lines
@@ -283,14 +286,14 @@ def _table_lines(table: PageTable, width: int) -> list[TextLine | CellGrid]:
         wide[widest] = max(wide[widest] - (sum(wide) - room), least[widest])
     cells = [[one if isinstance(one, Span) else Span(one) for one in row] for row in rows]
     if any(heads):
-        cells.insert(0, [Span(head, FAINT) for head in heads])
+        cells.insert(0, [Span(head, FAINT_TONE) for head in heads])
     for row in cells:
         spans = [
             Span(f"{shortened_to_clause(one.text, wide[at]):<{wide[at] + 2}}", one.tone) for at, one in enumerate(row)
         ]
-        lines.append(whole_line(" " * INDENT, *spans))
+        lines.append(whole_line(" " * INDENT_COLUMNS, *spans))
     if more > 0:
-        lines.append(line(f"  and {more} more (-v)", FAINT))
+        lines.append(line(f"  and {more} more (-v)", FAINT_TONE))
     return lines
 
 
@@ -302,15 +305,19 @@ def _file_lines(files: Written | None, width: int) -> list[TextLine]:
     """Return the folder and as many names as one line has room for; the folder is whole."""
     if files is None:
         return []
-    room, text = width - INDENT - WORDS, files.place
-    names, most = files.names(), room - len(MORE) - GAP
+    room, text = width - INDENT_COLUMNS - WORD_COLUMNS, files.place
+    names, most = files.names(), room - len(MORE_TEXT) - GAP_COLUMNS
     for at, name in enumerate(names):
         if len(text) + 2 + len(name) + (4 if at + 1 < len(names) else 0) > most:
             text += " ..."
             break
         text += f"{'  ' if not at else ' '}{name}"
-    more = " " * (room - len(text) - len(MORE)) + MORE if len(text) + GAP + len(MORE) <= room else ""
-    return [whole_line(_word("files", GOOD), text, Span(more, FAINT))]
+    more = (
+        " " * (room - len(text) - len(MORE_TEXT)) + MORE_TEXT
+        if len(text) + GAP_COLUMNS + len(MORE_TEXT) <= room
+        else ""
+    )
+    return [whole_line(_word("files", GOOD_TONE), text, Span(more, FAINT_TONE))]
 
 
 def _grid(table: PageTable, rows: Sequence[Sequence[str | Span]]) -> CellGrid:
@@ -318,7 +325,7 @@ def _grid(table: PageTable, rows: Sequence[Sequence[str | Span]]) -> CellGrid:
 
 
 def _command(word: str, text: str) -> TextLine:
-    return whole_line(_word(word, GOOD), text)
+    return whole_line(_word(word, GOOD_TONE), text)
 
 
 # --- everything -------------------------------------------------------------------------------------------------------
@@ -326,31 +333,31 @@ def _command(word: str, text: str) -> TextLine:
 
 def _whole_page(document: Document) -> Iterator[Block]:
     """Yield every value, table, note, warning with its remedies, and file."""
-    yield BLANK
+    yield BLANK_LINE
     rows = [*(row for row in document.headline if row.required), *(document.metrics or document.headline)]
     if rows:
         cells = [(f"  {row.label}", _value(row), row.bound, verdict(row.ok)) for row in dict.fromkeys(rows)]
         yield CellGrid((GridColumn(wraps=False), GridColumn(), GridColumn(wraps=False), GridColumn(wraps=False)), cells)
-        yield BLANK
+        yield BLANK_LINE
     for table in document.tables:
         if table.heading:
-            yield line(f"  {table.heading}", LABEL)
+            yield line(f"  {table.heading}", LABEL_TONE)
         yield _grid(table, table.rows)
-        yield BLANK
+        yield BLANK_LINE
     for note in document.notes:
         if note.is_command:
-            yield whole_line(Span(f"{note.word:<{MARGIN}}", note.tone), note.text)
+            yield whole_line(Span(f"{note.word:<{LABEL_COLUMNS}}", note.tone), note.text)
         else:
             yield Paragraph(note.word, note.text + (f": {note.remedy}" if note.remedy else ""), note.tone)
     for one in document.warnings:
-        yield Paragraph("warning", f"{one.name}: {one.text}" + (":" if one.commands else ""), BAD)
-        yield from (whole_line(" " * MARGIN + command) for command in one.commands)
+        yield Paragraph("warning", f"{one.name}: {one.text}" + (":" if one.commands else ""), BAD_TONE)
+        yield from (whole_line(" " * LABEL_COLUMNS + command) for command in one.commands)
     if document.files is not None:
-        yield Paragraph("files", f"{document.files.place}  {' '.join(document.files.files)}", GOOD)
+        yield Paragraph("files", f"{document.files.place}  {' '.join(document.files.files)}", GOOD_TONE)
         if document.files.seconds:
             yield Paragraph("time", f"{document.files.seconds:.2f} s")
     if document.next:
-        yield whole_line(Span(f"{'next':<{MARGIN}}", GOOD), document.next)
+        yield whole_line(Span(f"{'next':<{LABEL_COLUMNS}}", GOOD_TONE), document.next)
 
 
 # --- characters -------------------------------------------------------------------------------------------------------
@@ -384,10 +391,10 @@ def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator
     if isinstance(block, CellGrid):
         yield _table(block, width)
     elif isinstance(block, Paragraph):
-        lines = textwrap.wrap(block.text, width - MARGIN, break_long_words=False, break_on_hyphens=False) or [""]
-        yield _text(Span(f"{block.word:<{MARGIN}}", block.tone), Span(lines[0]), whole=True)
+        lines = textwrap.wrap(block.text, width - LABEL_COLUMNS, break_long_words=False, break_on_hyphens=False) or [""]
+        yield _text(Span(f"{block.word:<{LABEL_COLUMNS}}", block.tone), Span(lines[0]), whole=True)
         for text in lines[1:]:
-            yield _text(Span(" " * MARGIN + text), whole=True)
+            yield _text(Span(" " * LABEL_COLUMNS + text), whole=True)
     else:
         yield _text(*block.spans, whole=block.whole)
 
@@ -418,7 +425,7 @@ def _table(block: CellGrid, width: int) -> RichTable:
     from rich.table import Table
 
     headed = any(column.head for column in block.columns)
-    table = Table(box=None, show_header=headed, header_style=FAINT, padding=(0, block.gap, 0, 0), pad_edge=False)
+    table = Table(box=None, show_header=headed, header_style=FAINT_TONE, padding=(0, block.gap, 0, 0), pad_edge=False)
     if block.indented:
         table.add_column("", width=0)
     rows = [[_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row] for row in block.rows]

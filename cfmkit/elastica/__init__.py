@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
     from cfmkit.elastica.model.network import (
-        CLAMPED,
-        FREE,
-        PINNED,
+        CLAMPED_SUPPORT,
+        FREE_SUPPORT,
+        PINNED_SUPPORT,
         LineLoad,
         LineSpring,
         Link,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         slider_support,
     )
     from cfmkit.elastica.model.section import Section, Taper
-    from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
+    from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE, CosineArch, Polyline, Polynomial, Spline, arc
     from cfmkit.elastica.results.curling_stiffening import HinderedCurling, hindered_curling
     from cfmkit.elastica.results.path import EquilibriumPath as Path
     from cfmkit.elastica.results.path import Event, PathStatus
@@ -45,9 +45,9 @@ _HOMES = {
     "model.beam": ("Beam",),
     "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
     "model.network": (
-        "CLAMPED",
-        "FREE",
-        "PINNED",
+        "CLAMPED_SUPPORT",
+        "FREE_SUPPORT",
+        "PINNED_SUPPORT",
         "LineLoad",
         "LineSpring",
         "Link",
@@ -60,7 +60,7 @@ _HOMES = {
         "slider_support",
     ),
     "model.section": ("Section", "Taper"),
-    "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
+    "model.shapes": ("STRAIGHT_SHAPE", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
     "results.curling_stiffening": ("HinderedCurling", "hindered_curling"),
     "sensitivity": ("Gradient", "gradient"),
     "results.path": ("Event", "Path", "PathStatus"),
@@ -70,10 +70,10 @@ _HOMES = {
 _HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "CLAMPED",
-    "FREE",
-    "PINNED",
-    "STRAIGHT",
+    "CLAMPED_SUPPORT",
+    "FREE_SUPPORT",
+    "PINNED_SUPPORT",
+    "STRAIGHT_SHAPE",
     "Beam",
     "Control",
     "CosineArch",

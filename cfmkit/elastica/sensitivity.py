@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     Output = Callable[[Network, Equilibria], Any]
 
-SINGULAR = "the tangent is singular at a point of the path: no derivative there"
+SINGULAR_MESSAGE = "the tangent is singular at a point of the path: no derivative there"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Gradient:
         try:
             return unknown_slopes(self.at, self.designs)
         except np.linalg.LinAlgError:
-            raise InputError(SINGULAR) from None
+            raise InputError(SINGULAR_MESSAGE) from None
 
     @cached_property
     def stepped(self) -> tuple[Equilibria, ...]:
@@ -98,14 +98,14 @@ class Gradient:
         try:
             return read_only(effort_slopes(self.at, self.designs, self._rates))
         except np.linalg.LinAlgError:
-            raise InputError(SINGULAR) from None
+            raise InputError(SINGULAR_MESSAGE) from None
 
     @cached_property
     def _rates(self) -> FloatArray:
         """Slopes of the free unknowns along the path at the points, (p, free)."""
         solutions = equations(self.path.mesh).solve_each(self.path.free[self.points], self.at.drive)
         if not (solutions.converged.all() and np.isfinite(solutions.rate).all()):
-            raise InputError(SINGULAR)
+            raise InputError(SINGULAR_MESSAGE)
         return solutions.rate
 
     @property

@@ -52,9 +52,9 @@ LONG_CHAIN, ORDER_IN_CHAIN = 8, 6
 """Elements a beam from which on it is a chain, and the order of forces in one: coils of many turns."""
 MAX_DEGREE = 36
 MAX_UNKNOWNS = 4000  # dense matrices of this size take 130 MB each
-NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is zero
+ZERO_FREQUENCY_RTOL = 1e-9  # share of the shift within which the square of a frequency is zero
 UNSTABLE = 1e-7  # the same for a negative square: the end of a branch is located to 1e-8, and has a frequency of zero
-ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
+FLEXIBILITY_RTOL = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
 
@@ -316,9 +316,9 @@ def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[Float
         largest = float(np.abs(inverse).max(initial=0.0))
         lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
         squares = 1 / lowest - shift
-        if inverse[0] < -ROUNDING * largest or (squares < -UNSTABLE * shift).any():
+        if inverse[0] < -FLEXIBILITY_RTOL * largest or (squares < -UNSTABLE * shift).any():
             return found, False, False
-        found[: len(squares)] = np.where(squares < NEUTRAL * shift, 0.0, squares)
+        found[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
         return found, False, False
     return _with_turning(np.linalg.eigvals(flexible), shift, count)
 

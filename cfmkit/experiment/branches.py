@@ -27,25 +27,25 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
-REVERSAL = 0.02
+REVERSAL_SHARE = 0.02
 """The motion has turned back when it has returned by this part of its range."""
 
-WHOLE = 0.9
+COMPLETE_STROKE_SHARE = 0.9
 """The second stroke of a cycle is complete when it covers this part of the first."""
 
-SHORT = 0.1
+SHORT_STROKE_SHARE = 0.1
 """Two strokes of which one covers less than this part of the other are no loop: the machine approached or let go."""
 
-LOAD, UNLOAD = "load", "unload"
+LOAD_BRANCH, UNLOAD_BRANCH = "load", "unload"
 
-_PAUSE = 0.02
+_PAUSE_SPEED_SHARE = 0.02
 """It stands where it moves at less than this part of its usual speed."""
 
 _SHORTEST_PAUSE = 12
-_JITTERS = 8.0
+_REVERSAL_JITTERS = 8.0
 """Standard deviations of the jitter up to a reversal: either end may be off by four, as one value in 16 000 is."""
 
-_FEWEST = 4
+_MIN_SAMPLES = 4
 
 
 @dataclass(frozen=True)
@@ -72,16 +72,18 @@ class Strokes:
         """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
         found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
         pairs = [
-            (pair[0], pair[1]) for pair in found if len(pair) == 2 and covered_fraction((pair[0], pair[1])) >= SHORT
+            (pair[0], pair[1])
+            for pair in found
+            if len(pair) == 2 and covered_fraction((pair[0], pair[1])) >= SHORT_STROKE_SHARE
         ]
-        return tuple([pair for pair in pairs if covered_fraction(pair) >= WHOLE] or pairs)
+        return tuple([pair for pair in pairs if covered_fraction(pair) >= COMPLETE_STROKE_SHARE] or pairs)
 
     @cached_property
     def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
         """The complete cycles that are measured: those that the user chose, else those of full travel."""
         if self.chosen is not None:
             return tuple(pair for pair in self.complete if self.chosen.first <= pair[0].cycle <= self.chosen.last)
-        full = WHOLE * max((travel_of(pair) for pair in self.complete), default=0.0)
+        full = COMPLETE_STROKE_SHARE * max((travel_of(pair) for pair in self.complete), default=0.0)
         return tuple(pair for pair in self.complete if travel_of(pair) >= full)
 
     @property
@@ -198,7 +200,7 @@ def turning_points(motion: FloatArray, threshold: float) -> list[int]:
     return sorted({*found, last})
 
 
-def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
+def split(recording: Recording, reversal: float = REVERSAL_SHARE) -> Strokes:
     """Return the strokes of a recording.
 
     Parameters
@@ -216,17 +218,17 @@ def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
     """
     motion = recording.motion
     extent = float(np.ptp(motion))
-    turns = turning_points(motion, min(max(reversal * extent, _JITTERS * jitter_of(motion)), 0.5 * extent))
+    turns = turning_points(motion, min(max(reversal * extent, _REVERSAL_JITTERS * jitter_of(motion)), 0.5 * extent))
     standing = pauses(motion, turns)
     pieces = []
     for number, (start, stop) in enumerate(pairwise(turns)):
         inside = np.arange(start + (number > 0), stop + 1)
         pieces.append(inside[~standing[inside]])
-    kept = [piece for piece in pieces if len(piece) >= _FEWEST]
+    kept = [piece for piece in pieces if len(piece) >= _MIN_SAMPLES]
     if not kept:
         _, moved = words_of(recording.kind)
         raise DataError(
-            f"{recording.name}: no stroke has at least {_FEWEST} points: the {moved} jumps back and forth, "
+            f"{recording.name}: no stroke has at least {_MIN_SAMPLES} points: the {moved} jumps back and forth, "
             "or the rows are not in the order of time"
         )
     return Strokes(_number_strokes(kept, motion), int(standing.sum()))
@@ -242,19 +244,19 @@ def _number_strokes(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> t
     ways = [float(np.ptp(motion[piece])) for piece in pieces]
     found = [
         tuple(
-            Stroke(LOAD if up else UNLOAD, cycle, piece, way)
+            Stroke(LOAD_BRANCH if up else UNLOAD_BRANCH, cycle, piece, way)
             for up, cycle, piece, way in zip(ups, np.cumsum(np.equal(ups, first)).tolist(), pieces, ways, strict=True)
         )
         for first in ups[:2]
     ]
-    if len(ways) < 3 or ways[0] >= WHOLE * ways[1]:
+    if len(ways) < 3 or ways[0] >= COMPLETE_STROKE_SHARE * ways[1]:
         return found[0]
     return max(found, key=_whole_cycles)
 
 
 def _whole_cycles(strokes: tuple[Stroke, ...]) -> int:
     """Return how many complete cycles some strokes hold."""
-    return sum(covered_fraction(cycle) >= WHOLE for cycle in Strokes(strokes, 0).complete)
+    return sum(covered_fraction(cycle) >= COMPLETE_STROKE_SHARE for cycle in Strokes(strokes, 0).complete)
 
 
 def jitter_of(motion: FloatArray) -> float:
@@ -278,11 +280,11 @@ def pauses(motion: FloatArray, turns: Sequence[int]) -> NDArray[np.bool_]:
     travelled = float(np.abs(np.diff(motion[np.asarray(turns)])).sum())
     # Jitter makes single steps long: the usual step is what the strokes need, pauses aside.
     usual = max(float(np.percentile(steps, 75)) if jitter == 0 else 0.0, travelled / len(motion))
-    span = int(max(_SHORTEST_PAUSE, np.ceil(4.0 * jitter / (_PAUSE * usual)))) if usual else _SHORTEST_PAUSE
+    span = int(max(_SHORTEST_PAUSE, np.ceil(4.0 * jitter / (_PAUSE_SPEED_SHARE * usual)))) if usual else _SHORTEST_PAUSE
     marked = np.zeros(len(motion), dtype=bool)
     if span >= len(motion) // 4:
         return marked
-    return _standing(motion, span, max(_PAUSE * usual * span, 4.0 * jitter))
+    return _standing(motion, span, max(_PAUSE_SPEED_SHARE * usual * span, 4.0 * jitter))
 
 
 def _standing(motion: FloatArray, span: int, slack: float) -> NDArray[np.bool_]:

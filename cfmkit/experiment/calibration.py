@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import CfmError, SolutionError, UsageError
 from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare, model_at
-from cfmkit.experiment.parameters_to_fit import DATA, ZEROS
+from cfmkit.experiment.parameters_to_fit import DATA_PREFIX, ZERO_OFFSETS
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
@@ -48,10 +48,10 @@ POORLY_DETERMINED = 0.3
 BY_CHANCE = 1e-3
 """Residuals are not random where chance makes their means as large less often than that."""
 
-SWING = 0.2
+NEGLIGIBLE_SWING = 0.2
 """Swings of the residuals that are smaller than this part of their noise are left alone, however certain."""
 
-UNKNOWN = 1.0
+MAX_HALF_INTERVAL = 1.0
 """Parameters whose half interval exceeds this part of their size cannot be determined."""
 
 ALIKE_RTOL = 1e-7
@@ -60,9 +60,9 @@ ALIKE_RTOL = 1e-7
 TIED_CORRELATION = 0.999
 """Parameters more correlated than this are reported as poorly distinguished."""
 
-CANNOT = "cannot be determined from this recording"
+UNDETERMINED_MESSAGE = "cannot be determined from this recording"
 
-FINDINGS = {
+CALIBRATION_FINDINGS = {
     "weakly_identified": "the data determine a fitted value poorly",
     "at_bound": "a fitted value is at its bound: the data require a value beyond",
     "lack_of_fit": "the residuals are not random: the model does not describe the measurement",
@@ -128,7 +128,7 @@ class ModelCurves:
     def _changes(self, parameters: Sequence[FitParameter], values: FloatArray) -> dict[str, float]:
         changes: dict[str, float] = {}
         for item, value in zip(parameters, values, strict=True):
-            if not item.path.startswith(DATA):
+            if not item.path.startswith(DATA_PREFIX):
                 changes |= item.changes(self.spec, float(value))
         return changes
 
@@ -249,14 +249,14 @@ def _step(item: FitParameter) -> float:
 
 
 def _is_shift(item: FitParameter) -> bool:
-    return item.path in (f"{DATA}displacement_offset", f"{DATA}angle_offset")
+    return item.path in (f"{DATA_PREFIX}displacement_offset", f"{DATA_PREFIX}angle_offset")
 
 
 def _zeros(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     """Return what the parameters say of the recording."""
     found = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
     for item, value in zip(parameters, values, strict=True):
-        if item.path.startswith(DATA):
+        if item.path.startswith(DATA_PREFIX):
             name = "motion" if _is_shift(item) else "drift" if item.path.endswith("drift") else "effort"
             found[name] = float(value)
     return Zeros(**found)
@@ -328,9 +328,11 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
     for k, item in enumerate(parameters):
         if fit.at_bound[k]:
             found.append(Finding("at_bound", f"{item.label} is at its bound: the data require a value beyond"))
-        elif half[k] > UNKNOWN * item.size:
+        elif half[k] > MAX_HALF_INTERVAL * item.size:
             found.append(
-                Finding("weakly_identified", f"{item.label} {CANNOT}: fit fewer values, or give it with --set")
+                Finding(
+                    "weakly_identified", f"{item.label} {UNDETERMINED_MESSAGE}: fit fewer values, or give it with --set"
+                )
             )
         elif half[k] > POORLY_DETERMINED * item.size:
             found.append(
@@ -355,12 +357,12 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
     ordered = [item.errors(after.curve)[np.argsort(item.motion, kind="stable")] for item in after.samples]
     found = lack_of_fit(ordered, len(parameters))
     level = float(np.abs(np.concatenate([item.effort for item in after.samples])).max())
-    if found.chance > BY_CHANCE or found.swing < max(SWING * found.noise, 1e-5 * level):
+    if found.chance > BY_CHANCE or found.swing < max(NEGLIGIBLE_SWING * found.noise, 1e-5 * level):
         return []
     kind = after.curve.kind
     swing, noise = (format_short(value, kind, 3) for value in (found.swing, found.noise))
     fitted = {item.path for item in parameters}
-    other = ", ".join(path for path in (DATA + name for name in ZEROS[kind]) if path not in fitted)
+    other = ", ".join(path for path in (DATA_PREFIX + name for name in ZERO_OFFSETS[kind]) if path not in fitted)
     cure = f"zeros of the recording can be fitted, too: {other}" if other else "another value or the model is wrong"
     return [
         Finding(
@@ -390,6 +392,17 @@ def table(calibration: Calibration) -> list[dict[str, Any]]:
 
 
 __all__ = [
-    "CANNOT", "FINDINGS", "POORLY_DETERMINED", "UNKNOWN", "Calibration", "ModelCurves", "Samples", "calibrate",
-    "fit_samples", "has_no_loss", "resolve_spec", "scaled_jacobian", "table",
+    "CALIBRATION_FINDINGS",
+    "MAX_HALF_INTERVAL",
+    "POORLY_DETERMINED",
+    "UNDETERMINED_MESSAGE",
+    "Calibration",
+    "ModelCurves",
+    "Samples",
+    "calibrate",
+    "fit_samples",
+    "has_no_loss",
+    "resolve_spec",
+    "scaled_jacobian",
+    "table",
 ]  # fmt: skip

@@ -10,11 +10,11 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
-from cfmkit.experiment.branches import LOAD, UNLOAD
+from cfmkit.experiment.branches import LOAD_BRANCH, UNLOAD_BRANCH
 from cfmkit.experiment.coverage import empty_uncovered, holes_of, large_holes
 from cfmkit.experiment.curves_and_metrics_of_recording import elapsed_fraction
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
-from cfmkit.experiment.value_definitions import RECORDED, define_recorded_values
+from cfmkit.experiment.value_definitions import RECORDED_VALUES, define_recorded_values
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from cfmkit.metrics.compare import Measure
     from cfmkit.results import Result
 
-PLACES = 257
+N_COMPARED_PLACES = 257
 """Places of a window at which the branches of a loop are laid beside each other."""
 
-MOST = 2000
+MAX_BRANCH_POINTS = 2000
 """Points of a branch that are compared; more are averaged in groups."""
 
 
@@ -91,10 +91,10 @@ class Comparison(ShortRepr):
     def loop(self) -> MeasuredLoop | None:
         """Both measured branches at even places of the window; None if one way only was measured."""
         found = {item.branch: item for item in self.branches or self.samples}
-        if set(found) != {LOAD, UNLOAD}:
+        if set(found) != {LOAD_BRANCH, UNLOAD_BRANCH}:
             return None
-        places = np.linspace(self.window.lo, self.window.hi, PLACES)
-        up, down = (_average_effort(found[branch], places) for branch in (LOAD, UNLOAD))
+        places = np.linspace(self.window.lo, self.window.hi, N_COMPARED_PLACES)
+        up, down = (_average_effort(found[branch], places) for branch in (LOAD_BRANCH, UNLOAD_BRANCH))
         return MeasuredLoop(places, up, down)
 
     def causes(self, result: Result) -> Mapping[str, Quantity]:
@@ -112,7 +112,7 @@ class Comparison(ShortRepr):
             item.branch: Points(item.motion, item.effort, item.model_branch, item.weight) for item in self.samples
         }
         found = compare_sides(Compared("measured", points=points), Compared("model", self.curve), self.window)
-        return empty_uncovered(found.summarize(_ERRORS, self.curve.kind), self.holes, self.curve.kind)
+        return empty_uncovered(found.summarize(_ERROR_METRICS, self.curve.kind), self.holes, self.curve.kind)
 
     def loss(self) -> dict[str, Quantity]:
         """Return what a cycle loses, its loss factor, and half the gap of the branches; nothing without a loop."""
@@ -133,17 +133,17 @@ class Comparison(ShortRepr):
 
     def of_the_mean(self) -> Comparison:
         """Return the comparison of a model without losses: with the mean of the branches, cycle by cycle."""
-        up, down = (next(item for item in self.samples if item.branch == name) for name in (LOAD, UNLOAD))
+        up, down = (next(item for item in self.samples if item.branch == name) for name in (LOAD_BRANCH, UNLOAD_BRANCH))
         parts = [_mean_of(up, down, cycle) for cycle in sorted(set(up.cycle) & set(down.cycle))]
         motion, effort, passed = (
             np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True)
         )
         cycles = np.repeat([cycle for *_, cycle in parts], [len(part[0]) for part in parts])
-        mean = Samples(MEAN, up.model_branch, motion, effort, passed, np.ones(len(motion)), cycles)
+        mean = Samples(MEAN_BRANCH, up.model_branch, motion, effort, passed, np.ones(len(motion)), cycles)
         return replace(self, samples=(mean,), branches=self.samples)
 
 
-MEAN = "mean"
+MEAN_BRANCH = "mean"
 """Name of the samples that are the mean of both branches."""
 
 
@@ -166,10 +166,10 @@ def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatA
     return places, effort, passed, cycle
 
 
-_ERRORS: dict[str, Measure] = {
-    "data_rmse": (rms, RECORDED["data_rmse"][1]),
-    "data_error_max": (largest, RECORDED["data_error_max"][1]),
-    "data_offset": (mean, RECORDED["data_offset"][1]),
+_ERROR_METRICS: dict[str, Measure] = {
+    "data_rmse": (rms, RECORDED_VALUES["data_rmse"][1]),
+    "data_error_max": (largest, RECORDED_VALUES["data_error_max"][1]),
+    "data_offset": (mean, RECORDED_VALUES["data_offset"][1]),
 }
 """What is reported of the errors: name -> (function, definition)."""
 
@@ -208,7 +208,7 @@ def compare(result: Result, source: MeasuredCurves, window: Window | None = None
 
 def model_branch(curve: Curve, measured: str) -> str:
     """Return the branch of a model that a measured one is compared with: by name, else by its direction."""
-    return counterpart(curve, measured, 1.0 if measured == LOAD else -1.0)
+    return counterpart(curve, measured, 1.0 if measured == LOAD_BRANCH else -1.0)
 
 
 def model_at(curve: Curve, branch: str, motion: FloatArray) -> FloatArray:
@@ -263,7 +263,7 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
     slack = 1e-9 * (window.hi - window.lo)
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]
     times = np.split(elapsed_fraction(source, branch), np.cumsum([len(inside) for inside in keep])[:-1])
-    size = max(-(-sum(int(inside.sum()) for inside in keep) // MOST), 1)
+    size = max(-(-sum(int(inside.sum()) for inside in keep) // MAX_BRANCH_POINTS), 1)
     # Cycle by cycle: the end of one and the start of the next have nothing to do with each other.
     grouped = []
     for number, (part, inside, passed) in enumerate(zip(parts, keep, times, strict=True)):

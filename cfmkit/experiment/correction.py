@@ -16,12 +16,12 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.experiment.aimed_curve import aim_of, analyze_part
 from cfmkit.experiment.errors_of_made_part import explain, name_of
-from cfmkit.experiment.parameters_to_fit import DATA
+from cfmkit.experiment.parameters_to_fit import DATA_PREFIX
 from cfmkit.experiment.redrawn_values import Redesign, largest_miss, limits_of
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
-from cfmkit.stock.materials import MATERIALS
+from cfmkit.stock.materials import MATERIALS_BY_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +42,7 @@ LEAST_CORRECTION = 0.005
 LARGEST_REMAINDER = 0.01
 """Deviation of the mean force that a corrected part may still have."""
 
-FINDINGS = {
+CORRECTION_FINDINGS = {
     "not_told_apart": "the recording does not tell errors of the part apart: the correction allows for each",
     "modulus_outside": "the fitted modulus is outside the range that is known of the material",
 }
@@ -124,7 +124,7 @@ def correct(
     aim = aim_of(nominal)
     made = best.part_of(spec)
     built = analyze_part(made)
-    told = tared or fit is not None or any(item.path.startswith(DATA) for item in best.calibration.parameters)
+    told = tared or fit is not None or any(item.path.startswith(DATA_PREFIX) for item in best.calibration.parameters)
     zero = 0.0 if told else UNKNOWN_ZERO * float(np.abs(source.recording.effort).max())
     before = _force(explanations, spec, aim, zero)
     off = _largest_departure(explanations, spec, aim)
@@ -205,7 +205,7 @@ def _warnings(spec: Spec, explanations: Sequence[Explanation]) -> Iterator[Findi
     best = explanations[0]
     for item, value in zip(best.errors, best.values, strict=True):
         material = spec.get_value(item.path.rpartition(".")[0]) if item.path.endswith(".youngs_modulus") else None
-        known = MATERIALS.get(getattr(material, "name", None) or "")
+        known = MATERIALS_BY_NAME.get(getattr(material, "name", None) or "")
         if known is None or known.scatter.youngs_modulus[0] <= value <= known.scatter.youngs_modulus[1]:
             continue
         low, high = (format_short(end, "stress", 4) for end in known.scatter.youngs_modulus)

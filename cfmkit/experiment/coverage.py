@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.experiment.value_definitions import RECORDED
+from cfmkit.experiment.value_definitions import RECORDED_VALUES
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.metric_definitions import split_name
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
@@ -76,7 +76,7 @@ def of_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[Unrecord
     return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
 
 
-UNKNOWN = "not recorded"
+NOT_RECORDED_TEXT = "not recorded"
 """Begins the reason why a metric over a hole has no value."""
 
 
@@ -96,7 +96,7 @@ def hole_finding(large: Sequence[UnrecordedInterval], window: Window, kind: Kind
     listed = ", ".join(named[:4]) + (f" and {len(named) - 4} more" if len(named) > 4 else "")
     share = max(hole.width for hole in large) / (window.hi - window.lo)
     reported = (
-        f"{UNKNOWN}: {listed} (up to {100 * share:.0f} % of the window): numbers over the window "
+        f"{NOT_RECORDED_TEXT}: {listed} (up to {100 * share:.0f} % of the window): numbers over the window "
         f"{span_text(window.lo, window.hi, kind)} cannot be known there and have no value{cure}"
     )
     return Finding("holes", reported)
@@ -119,7 +119,7 @@ def empty_uncovered(
         branch = split_name(name)[1]
         hole = branches.get(branch) if branch is not None else next(iter(large), None)
         if hole is not None and item.value is not None:
-            found[name] = replace(item, value=None, reason=f"{UNKNOWN}: {hole.text(kind)}")
+            found[name] = replace(item, value=None, reason=f"{NOT_RECORDED_TEXT}: {hole.text(kind)}")
     return found
 
 
@@ -128,7 +128,7 @@ def coverage(curve: Curve, holes: Sequence[UnrecordedInterval], window: Window) 
     shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}
     named = {f"coverage[{name}]": share for name, share in shares.items()} if len(shares) > 1 else {}
     found = {"coverage": min(shares.values()), **named}
-    return {name: Quantity(value, *RECORDED["coverage"]) for name, value in found.items()}
+    return {name: Quantity(value, *RECORDED_VALUES["coverage"]) for name, value in found.items()}
 
 
 def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve, Kind
 from cfmkit.errors import DataError, UsageError
-from cfmkit.experiment.branches import LOAD, UNLOAD, Cycles, Stroke, Strokes, choose, read_cycles, split
+from cfmkit.experiment.branches import LOAD_BRANCH, UNLOAD_BRANCH, Cycles, Stroke, Strokes, choose, read_cycles, split
 from cfmkit.experiment.coverage import (
     UnrecordedInterval,
     coverage,
@@ -33,7 +33,7 @@ from cfmkit.experiment.coverage import (
     number_of,
     of_cycle,
 )  # fmt: skip
-from cfmkit.experiment.findings import FINDINGS, passages_left_out, spikes_left_out, warnings_of
+from cfmkit.experiment.findings import RECORDING_FINDINGS, passages_left_out, spikes_left_out, warnings_of
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
@@ -259,7 +259,7 @@ def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) ->
 def _by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
     """Return the order of a stroke's points along its way."""
     motion = recording.motion[stroke.points]
-    return np.argsort(motion if stroke.branch == LOAD else -motion, kind="stable")
+    return np.argsort(motion if stroke.branch == LOAD_BRANCH else -motion, kind="stable")
 
 
 def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, strokes: Strokes) -> Curve:
@@ -453,7 +453,16 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 __all__ = [
-    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "MeasuredCurves", "Measurement", "common_window", "elapsed_fraction",
+    "LEFT_OUT",
+    "LOAD_BRANCH",
+    "RECORDING_FINDINGS",
+    "UNLOAD_BRANCH",
+    "MeasuredCurves",
+    "Measurement",
+    "common_window",
+    "elapsed_fraction",
     "measure_recording",
-    "numbers_of", "read_measured", "require_loop",
+    "numbers_of",
+    "read_measured",
+    "require_loop",
 ]  # fmt: skip

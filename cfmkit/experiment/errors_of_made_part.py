@@ -25,7 +25,7 @@ import numpy as np
 from cfmkit.errors import CfmError, DataError, SolutionError
 from cfmkit.experiment.calibration import POORLY_DETERMINED, ModelCurves, fit_samples, has_no_loss, scaled_jacobian
 from cfmkit.experiment.comparison import compare
-from cfmkit.experiment.parameters_to_fit import DATA, ZEROS, FitParameter, parameters
+from cfmkit.experiment.parameters_to_fit import DATA_PREFIX, ZERO_OFFSETS, FitParameter, parameters
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
@@ -89,11 +89,11 @@ class Explanation:
     @property
     def errors(self) -> tuple[FitParameter, ...]:
         """Those of the part, without the zeros of the recording."""
-        return tuple(item for item in self.calibration.parameters if not item.path.startswith(DATA))
+        return tuple(item for item in self.calibration.parameters if not item.path.startswith(DATA_PREFIX))
 
     @cached_property
     def _places(self) -> list[int]:
-        return [k for k, item in enumerate(self.calibration.parameters) if not item.path.startswith(DATA)]
+        return [k for k, item in enumerate(self.calibration.parameters) if not item.path.startswith(DATA_PREFIX)]
 
     @property
     def values(self) -> FloatArray:
@@ -257,7 +257,7 @@ def explain(
         fits = list(_fits(before, curves, candidates, zeros if told.zero_is_told(zeros) else (), told, tell))
     if not fits:
         raise SolutionError("the recording determines neither modulus nor thickness nor friction of this part")
-    explanations = _ranked(fits, before, assume_errors(curves.spec))
+    explanations = _rank_explanations(fits, before, assume_errors(curves.spec))
     best = explanations[0]
     _check_best(best, before, source)
     return tuple(_irreducible([item for item in explanations if item.criterion <= best.criterion + STRONG_EVIDENCE]))
@@ -293,7 +293,7 @@ def _rubbing(
 
 def _zeros(spec: Spec, source: MeasuredCurves, before: Comparison) -> tuple[FitParameter, ...]:
     """Return the zero of the force as a parameter."""
-    return parameters(spec, [f"{DATA}{next(iter(ZEROS[before.curve.kind]))}"], None, source.recording)
+    return parameters(spec, [f"{DATA_PREFIX}{next(iter(ZERO_OFFSETS[before.curve.kind]))}"], None, source.recording)
 
 
 @dataclass(frozen=True)
@@ -387,7 +387,7 @@ def _surprise(fit: Calibration, expected: Assumed | None) -> float:
             usual = max(abs(end - item.start) for end in expected.modulus) / 2.0
         elif is_thickness(item) and expected is not None:
             usual = expected.process.thickness
-        total += 0.0 if item.path.startswith(DATA) else ((float(value) - item.start) / usual) ** 2
+        total += 0.0 if item.path.startswith(DATA_PREFIX) else ((float(value) - item.start) / usual) ** 2
     return total
 
 
@@ -400,7 +400,7 @@ def _criterion(fit: Calibration, before: Comparison, inflation: float) -> float:
     return independent * float(np.log(power / level**2)) + len(fit.parameters) * float(np.log(independent))
 
 
-def _ranked(fits: list[Calibration], before: Comparison, expected: Assumed | None) -> list[Explanation]:
+def _rank_explanations(fits: list[Calibration], before: Comparison, expected: Assumed | None) -> list[Explanation]:
     """Return explanations in the order of their criterion, in which errors that are unusually large count, too.
 
     How many residuals count as one says the closest fit.

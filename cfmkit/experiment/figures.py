@@ -15,7 +15,7 @@ from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, write_hea
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import MarkedRange
-from cfmkit.plots.style import GREY, LINES, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import LINE_COLOURS, TEXT_GREY, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 LITTLE_MORE = 2.0
 """Forces outside the window are shown as well if the range grows by no more than this factor."""
 
-BINS = 1200
+MAX_DRAWN_BINS = 1200
 """Columns of points that a picture can show: more samples are drawn as their extremes."""
 
 
@@ -118,7 +118,7 @@ def _draw_faint(curve: Curve, ax: Axes) -> None:
     for name in curve.branches:
         part = curve.select_branch(name)
         x, y = to_border(part.motion, curve.motion_dimension), to_border(part.effort, curve.kind)
-        ax.plot(x, y, color=GREY, linewidth=0.5, alpha=0.55, zorder=2, gid="no-obstacle")
+        ax.plot(x, y, color=TEXT_GREY, linewidth=0.5, alpha=0.55, zorder=2, gid="no-obstacle")
 
 
 def _range_in(curves: tuple[Curve, ...], window: tuple[float, float]) -> tuple[float, float]:
@@ -142,15 +142,15 @@ def _note_window(source: MeasuredCurves, window: Window, ax: Axes) -> None:
     left, right = ax.get_xlim()
     for place in (low, high):
         if left < place < right:
-            ax.axvline(place, color=GREY, linewidth=0.7, dashes=(2, 2), zorder=1.5)
+            ax.axvline(place, color=TEXT_GREY, linewidth=0.7, dashes=(2, 2), zorder=1.5)
     shown = np.linspace(max(low, left), min(high, right), 40)
     text = "grey: raw" if source.filtered else ""
     if text:
         points = np.column_stack([shown, np.full(40, floor + 0.04 * (ceiling - floor))])
-        place_labels(ax, [Label(text, GREY, points, prefer=0.05)])
+        place_labels(ax, [Label(text, TEXT_GREY, points, prefer=0.05)])
 
 
-def thin_curve(curve: Curve, bins: int = BINS) -> Curve:
+def thin_curve(curve: Curve, bins: int = MAX_DRAWN_BINS) -> Curve:
     """Return a curve for a picture: of each branch no more than the extremes of `bins` equal parts."""
     keep: list[NDArray[np.intp]] = []
     for name in curve.branches:
@@ -187,8 +187,8 @@ def overlay(comparison: Comparison, before: Comparison | None, heading: tuple[st
     labels = [_draw_measured(item, comparison, upper, 0.25 - 0.12 * k) for k, item in enumerate(shown)]
     if comparison.branches:
         mean = _unbroken_runs(comparison.samples[0], comparison)
-        upper.plot(*mean.T, color=GREY, linewidth=0.8, dashes=(4, 2), zorder=2.5)
-        labels.append(Label("mean of the branches", GREY, mean, prefer=0.9))
+        upper.plot(*mean.T, color=TEXT_GREY, linewidth=0.8, dashes=(4, 2), zorder=2.5)
+        labels.append(Label("mean of the branches", TEXT_GREY, mean, prefer=0.9))
     for one in models:
         labels += _draw_model(one, upper, dashed=one is before)
     _fit_limits(upper, np.concatenate(values), comparison)
@@ -208,9 +208,9 @@ def _in_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -
 def _draw_measured(samples: Samples, comparison: Comparison, ax: Axes, prefer: float) -> Label:
     """Draw a measured branch, cycle by cycle; return its name."""
     points = _unbroken_runs(samples, comparison)
-    ax.plot(*points.T, color=GREY, linewidth=0.5, alpha=0.6, zorder=2, gid="no-obstacle")
+    ax.plot(*points.T, color=TEXT_GREY, linewidth=0.5, alpha=0.6, zorder=2, gid="no-obstacle")
     several = len(comparison.branches or comparison.samples) > 1
-    return Label(f"measured, {samples.branch}" if several else "measured", GREY, points, prefer=prefer)
+    return Label(f"measured, {samples.branch}" if several else "measured", TEXT_GREY, points, prefer=prefer)
 
 
 def _unbroken_runs(samples: Samples, comparison: Comparison, values: FloatArray | None = None) -> FloatArray:
@@ -229,7 +229,7 @@ def _draw_model(comparison: Comparison, ax: Axes, dashed: bool) -> list[Label]:
     places = np.linspace(comparison.window.lo, comparison.window.hi, 400)
     for number, samples in enumerate(comparison.samples):
         points = _in_border(comparison, places, model_at(comparison.curve, samples.model_branch, places))
-        color = LINES[number % len(LINES)]
+        color = LINE_COLOURS[number % len(LINE_COLOURS)]
         ax.plot(*points.T, color=color, linewidth=0.9 if dashed else 1.4, linestyle="--" if dashed else "-", zorder=3)
         if not dashed:
             name = f"model, {samples.model_branch}" if len(comparison.samples) > 1 else "model"
@@ -253,8 +253,8 @@ def _draw_errors(comparison: Comparison, ax: Axes) -> None:
     """Draw model less measurement, smoothed only by what the eye does."""
     for number, samples in enumerate(comparison.samples):
         points = _unbroken_runs(samples, comparison, samples.errors(comparison.curve))
-        ax.plot(*points.T, color=LINES[number % len(LINES)], linewidth=0.6, alpha=0.8, zorder=3)
-    ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
+        ax.plot(*points.T, color=LINE_COLOURS[number % len(LINE_COLOURS)], linewidth=0.6, alpha=0.8, zorder=3)
+    ax.axhline(0.0, color=TEXT_GREY, linewidth=0.7, zorder=2)
     curve = comparison.curve
     ax.set_xlabel(axis_label(curve.motion_name, curve.motion_dimension))
     ax.set_ylabel(axis_label("model \N{MINUS SIGN}\nmeasured", curve.kind))

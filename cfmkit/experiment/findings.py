@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.experiment.branches import WHOLE, covered_fraction
+from cfmkit.experiment.branches import COMPLETE_STROKE_SHARE, covered_fraction
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.reversal_transitions import Settled
 
-FINDINGS = {
+RECORDING_FINDINGS = {
     "one_branch": "the recording has no return branch: there is no loop",
     "unfinished_cycle": "strokes that belong to no complete cycle are left out",
     "seating_cycles": "first cycles that cover less of the travel than the others are left out: they seat the parts",
@@ -42,7 +42,7 @@ def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
         only = strokes.measured[0][0].branch
         found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
     left = len(strokes.strokes) - (2 * len(strokes.complete) or 1)
-    if cycles and covered_fraction(cycles[0]) < WHOLE:
+    if cycles and covered_fraction(cycles[0]) < COMPLETE_STROKE_SHARE:
         reported = f"the shorter stroke covers only {100 * covered_fraction(cycles[0]):.0f} % of the longer one"
         found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
     if left:

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.metrics import Window
 
-PLACES = 513
+N_CYCLE_PLACES = 513
 """Places in the window at which cycles are compared."""
 
-TURNED = 1e-3
+REVERSED_LOOP_SHARE = 1e-3
 """A loop runs the wrong way round if its area is negative by more than this part of mean force times travel."""
 
 
@@ -74,10 +74,10 @@ def turned_loop(curves: Sequence[Curve]) -> bool:
         up, down = curve.select_branch("load").motion, curve.select_branch("unload").motion
         low, high = max(up.min(), down.min()), min(up.max(), down.max())
         if low < high:
-            places = np.linspace(low, high, PLACES)
+            places = np.linspace(low, high, N_CYCLE_PLACES)
             areas.append(loop_area(places, branch_at(curve, "load", places), branch_at(curve, "unload", places)))
             sizes.append(float(np.abs(curve.effort).mean() * (high - low)))
-    return sum(areas) < -TURNED * sum(sizes)
+    return sum(areas) < -REVERSED_LOOP_SHARE * sum(sizes)
 
 
 def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity]:
@@ -97,7 +97,7 @@ def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity
     """
     kind = curves[0].kind
     meant = define_recorded_values(kind)[f"{kind}_repeatability"]
-    places = np.linspace(window.lo, window.hi, PLACES)
+    places = np.linspace(window.lo, window.hi, N_CYCLE_PLACES)
     found = {}
     for branch in curves[0].branches:
         name = f"{kind}_repeatability[{branch}]"

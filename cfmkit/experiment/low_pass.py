@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 Per = Literal["time", "length", "angle"]
 
 DEFAULT_ORDER = 6
-_EVEN = 1e-3
+_STEP_RTOL = 1e-3
 """Steps that differ by less than this part of their mean are even."""
 
-_TEXT = re.compile(r"(?P<cutoff>.+?)(?:[, ]+order +(?P<order>[0-9]+))?(?P<corrected>[, ]+corrected)?")
+_FILTER_PATTERN = re.compile(r"(?P<cutoff>.+?)(?:[, ]+order +(?P<order>[0-9]+))?(?P<corrected>[, ]+corrected)?")
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def read_filter(text: str) -> LowPass | None:
     """
     if text.strip() == "none":
         return None
-    match = _TEXT.fullmatch(text.strip())
+    match = _FILTER_PATTERN.fullmatch(text.strip())
     try:
         cutoff, per = _read_cutoff(match["cutoff"] if match else text)
     except QuantityError as error:
@@ -151,7 +151,7 @@ def low_passed(values: FloatArray, over: FloatArray, filtered_by: LowPass) -> Fl
     step = float(over[-1] - over[0]) / max(len(over) - 1, 1)
     if step == 0 or not len(steps):
         raise DataError("there is no travel to filter over: all points are at one position")
-    if np.abs(steps - step).max() <= _EVEN * abs(step):
+    if np.abs(steps - step).max() <= _STEP_RTOL * abs(step):
         return _both_ways(values, abs(step), filtered_by)
     way = 1 if step > 0 else -1
     even = np.linspace(over[0], over[-1], len(over))

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
-from cfmkit.experiment.calibration import CANNOT, UNKNOWN, table
+from cfmkit.experiment.calibration import MAX_HALF_INTERVAL, UNDETERMINED_MESSAGE, table
 from cfmkit.experiment.coverage import hole_finding
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
@@ -345,8 +345,8 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     lines = []
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
-        if width > UNKNOWN * item.size and not calibration.fit.at_bound[k]:
-            lines.append(("fitted", f"{item.label} {CANNOT}"))
+        if width > MAX_HALF_INTERVAL * item.size and not calibration.fit.at_bound[k]:
+            lines.append(("fitted", f"{item.label} {UNDETERMINED_MESSAGE}"))
             continue
         low, high = max(value - width, item.low), min(value + width, item.high)
         reported = f"± {_exact(width, item.dimension, 2)} (95 %)"

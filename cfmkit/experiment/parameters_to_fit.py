@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from cfmkit.experiment.reading import Recording
     from cfmkit.specs.spec import Spec
 
-DATA = "data."
+DATA_PREFIX = "data."
 """What begins so is no value of the specification, but of the recording."""
 
-ZEROS = {
+ZERO_OFFSETS = {
     "force": {"force_offset": "force", "displacement_offset": "length", "drift": "force"},
     "torque": {"torque_offset": "torque", "angle_offset": "angle", "drift": "torque"},
 }
 """By kind of curve, what can be fitted of a recording, with its dimension: what the sensors show without load and at
 the mechanism's zero, and by how much the former grows from the first point of the recording to the last."""
 
-SHIFT = 0.02
+MAX_ZERO_SHIFT = 0.02
 """Of the recorded travel: how far the zero of the displacement may be off unless bounds say more."""
 
-INSIDE = 1e-9
+BOUND_CLEARANCE = 1e-9
 """How far inside an open bound a value stays, in sizes of the parameter."""
 
 
@@ -96,7 +96,7 @@ def parameters(
         raise UsageError(f"--bounds names {strange!r}, which --fit does not")
     return tuple(
         _of_data(name, (bounds or {}).get(name), recording)
-        if name.startswith(DATA)
+        if name.startswith(DATA_PREFIX)
         else _parameter(spec, name, (bounds or {}).get(name))
         for name in names
     )
@@ -106,7 +106,7 @@ def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording
     """Return a zero of the recording to fit; it starts from none."""
     dimension = _zero(path, "--fit", recording)
     if recording and path.endswith(("displacement_offset", "angle_offset")):
-        size = 0.5 * SHIFT * recording.travel
+        size = 0.5 * MAX_ZERO_SHIFT * recording.travel
         low, high = bounds or (-2.0 * size, 2.0 * size)
     else:
         size = 0.01 * float(np.abs(recording.effort).max()) if recording else 1.0
@@ -118,10 +118,10 @@ def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording
 
 def _zero(path: str, option: str, recording: Recording | None) -> str:
     """Return the dimension of a value of the recording."""
-    known = ZEROS[recording.kind if recording else "force"]
-    name = path.removeprefix(DATA)
+    known = ZERO_OFFSETS[recording.kind if recording else "force"]
+    name = path.removeprefix(DATA_PREFIX)
     if name not in known:
-        there = ", ".join(DATA + item for item in known)
+        there = ", ".join(DATA_PREFIX + item for item in known)
         raise UsageError(f"{option}: there is no {path!r}; a recording has {there}")
     return known[name]
 
@@ -138,7 +138,7 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Fit
     low, high = _limits(type(spec), path)
     asked_low, asked_high = bounds or (-math.inf, math.inf)
     size = _size(value, (max(low, asked_low), min(high, asked_high)), dimension)
-    margin = INSIDE * size
+    margin = BOUND_CLEARANCE * size
     low = max(low + margin * _open(type(spec), path, "gt"), asked_low)
     high = min(high - margin * _open(type(spec), path, "lt"), asked_high)
     if not low < high or not low <= value <= high:
@@ -250,7 +250,7 @@ def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> flo
     """Return a bound of a value of the specification or of the recording, SI."""
     from cfmkit.specs.units import read_quantity
 
-    if path.startswith(DATA):
+    if path.startswith(DATA_PREFIX):
         return read_quantity(text, _zero(path, "--bounds", recording))
     return float(leaf(type(spec), path).read(_number(text))[0])
 

@@ -20,7 +20,7 @@ from cfmkit.errors import DataError, UsageError, reason_of, visible
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.tables.lab_columns import column_named, read_units, roles_of
-from cfmkit.tables.lab_file import EMPTY, SEPARATORS, decode_file, lines_of, tables_in
+from cfmkit.tables.lab_file import EMPTY_CHARACTERS, SEPARATOR_NAMES, decode_file, lines_of, tables_in
 
 if TYPE_CHECKING:
     import os
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from cfmkit.tables.lab_file import LabTable
 
 
-LARGEST = 500_000_000
+MAX_FILE_BYTES = 500_000_000
 """Bytes of the largest file that is read."""
 
-FEWEST = 8
+MIN_CURVE_POINTS = 8
 """Points without which there is no curve."""
 
 
@@ -186,17 +186,17 @@ def read_recordings(
     key, _, value = (part.strip() for part in (group or "").partition("="))
     if group is not None and not key:
         raise UsageError("--group is empty; give the column that tells the specimens apart, as --group Specimen")
-    if len(tables) > 1 or key == TABLE:
+    if len(tables) > 1 or key == TABLE_WORD:
         return _each_table(tables, group, encoding, name)
     table = tables[0]
     roles = roles_of(table.numeric, table.columns, name)
-    if key in ("", ONE):
+    if key in ("", NO_COLUMN_WORD):
         found = None if key else _specimens(table, roles)
         if found is not None:
             values = list(dict.fromkeys(_labels(table, found)))
             raise DataError(
                 f"{name}: {quote(found.name)} tells {len(values)} specimens apart, which no single curve describes; "
-                f"choose {_options(found.name, values)}, or --group {ONE} if all rows are of one"
+                f"choose {_options(found.name, values)}, or --group {NO_COLUMN_WORD} if all rows are of one"
             )
         return {"": _recording(table, roles, encoding, name)}
     column = column_named(key, table.columns, name)
@@ -212,7 +212,7 @@ def read_recordings(
     }
 
 
-TABLE, ONE = "table", "none"
+TABLE_WORD, NO_COLUMN_WORD = "table", "none"
 """Words in place of a column: tables one below the other, and no column at all."""
 
 _NO_SPECIMEN = re.compile(
@@ -222,16 +222,16 @@ _NO_SPECIMEN = re.compile(
 """Columns of such names tell parts of one recording apart, or say something of its points."""
 
 
-_SPECIMEN = re.compile(r"(?i).*(specimen|sample|probe|pr\u00fcfling|muster|teil|part|piece|serial|\bid\b).*")
+_SPECIMEN_PATTERN = re.compile(r"(?i).*(specimen|sample|probe|pr\u00fcfling|muster|teil|part|piece|serial|\bid\b).*")
 
 
 def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, name: str) -> dict[str, Recording]:
     """Return the curve of each table of a file, or of the one that is chosen."""
     key, _, value = (part.strip() for part in (group or "").partition("="))
     names = [str(number + 1) for number in range(len(tables))]
-    if key != TABLE or (value and value not in names):
+    if key != TABLE_WORD or (value and value not in names):
         places = ", ".join(str(table.rows[0] + 1) for table in tables)
-        choices = _options(TABLE, names)
+        choices = _options(TABLE_WORD, names)
         raise DataError(
             f"{name}: there are {len(tables)} tables, with numbers from lines {places} on; choose {choices}"
         )
@@ -283,13 +283,13 @@ def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo |
             continue
         labels = np.array(_labels(filled, column))
         values, runs = set(labels.tolist()), 1 + int((labels[1:] != labels[:-1]).sum())
-        named = _SPECIMEN.fullmatch(column.name) is not None
+        named = _SPECIMEN_PATTERN.fullmatch(column.name) is not None
         if len(values) < 2 or "" in values or (runs > len(values) and not named):
             continue
-        if any(_is_fraction(value, table) for value in values) or len(values) > len(labels) // FEWEST:
+        if any(_is_fraction(value, table) for value in values) or len(values) > len(labels) // MIN_CURVE_POINTS:
             continue
         parts = [motion[labels == value] for value in values]
-        if all(len(part) >= FEWEST and np.ptp(part) > 0.5 * np.ptp(motion) for part in parts):
+        if all(len(part) >= MIN_CURVE_POINTS and np.ptp(part) > 0.5 * np.ptp(motion) for part in parts):
             return column
     return None
 
@@ -307,11 +307,11 @@ def _recording(
     filled = table.with_values(list(roles.values()))
     n_rows = len(filled.rows) if n_rows is None else n_rows
     values = {role: filled.numbers(column) for role, column in roles.items()}
-    others = sum(bool(line.strip(EMPTY)) for line in table.lines) - n_rows - (table.header is not None)
+    others = sum(bool(line.strip(EMPTY_CHARACTERS)) for line in table.lines) - n_rows - (table.header is not None)
     dialect = table.shape.dialect
     decisions = Decisions(
         encoding,
-        SEPARATORS[dialect.separator],
+        SEPARATOR_NAMES[dialect.separator],
         {".": "point", ",": "comma"}[dialect.decimal],
         filled.rows[0] + 1,
         None if table.header is None else table.header + 1,
@@ -344,13 +344,13 @@ def _content(path: Path) -> bytes:
         if path.is_dir():
             raise UsageError(f"{path} is a folder; name a data file in it")
         with path.open("rb") as file:  # not by its stated size: a pipe or a device states none
-            data = file.read(LARGEST + 1)
+            data = file.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
         raise UsageError(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise UsageError(f"{visible(str(path))} cannot be read: {reason_of(error)}") from None
-    if len(data) > LARGEST:
-        raise DataError(f"{path.name}: is larger than {LARGEST // 1_000_000} MB; thin it out or split it")
+    if len(data) > MAX_FILE_BYTES:
+        raise DataError(f"{path.name}: is larger than {MAX_FILE_BYTES // 1_000_000} MB; thin it out or split it")
     return data
 
 
@@ -359,8 +359,8 @@ def _check_values(recording: Recording) -> None:
     name, motion, effort = recording.name, recording.motion, recording.effort
     if len({len(motion), len(effort), len(motion if recording.time is None else recording.time)}) != 1:
         raise DataError(f"{name}: the columns differ in length")
-    if len(motion) < FEWEST:
-        raise DataError(f"{name}: has {len(motion)} points; a curve needs at least {FEWEST}")
+    if len(motion) < MIN_CURVE_POINTS:
+        raise DataError(f"{name}: has {len(motion)} points; a curve needs at least {MIN_CURVE_POINTS}")
     if not (np.isfinite(motion).all() and np.isfinite(effort).all()):
         raise DataError(f"{name}: not every value is a finite number")
     words = ("displacement", "force") if recording.kind == "force" else ("angle", "torque")
@@ -372,4 +372,4 @@ def _check_values(recording: Recording) -> None:
             )
 
 
-__all__ = ["FEWEST", "Decisions", "Recording", "read_recording", "read_recordings"]
+__all__ = ["MIN_CURVE_POINTS", "Decisions", "Recording", "read_recording", "read_recordings"]

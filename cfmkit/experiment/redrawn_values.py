@@ -17,7 +17,7 @@ from cfmkit.errors import CfmError, SolutionError
 from cfmkit.experiment.aimed_curve import N_PLACES, analyze_part
 from cfmkit.experiment.errors_of_made_part import is_thickness
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE, function_named
+from cfmkit.families.base import ENVELOPE_METRICS, function_named
 from cfmkit.metrics import check, values_of_family
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -336,7 +336,7 @@ def largest_miss(result: Result, of_envelope: bool = False) -> float:
     values = values_of_family(family(result.spec.family).values)
     shares = [0.0]
     for outcome in check(result.spec.part_requirements, result, values):
-        if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE):
+        if outcome.value is None or (of_envelope and outcome.metric not in ENVELOPE_METRICS):
             continue
         for bound, way in ((outcome.max, 1.0), (outcome.min, -1.0)):
             if bound is not None:

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.experiment.branches import LOAD, UNLOAD, Stroke, Strokes
+from cfmkit.experiment.branches import LOAD_BRANCH, UNLOAD_BRANCH, Stroke, Strokes
 from cfmkit.numerics.least_squares import correlation_time
 
 if TYPE_CHECKING:
@@ -34,23 +34,23 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
-REACH = 0.2
+GAP_REACH = 0.2
 """Part of the shorter stroke, from its end, over which the gap is looked at; a passage takes half of it at most."""
 
-CLOSES = 0.05
+MIN_CLOSED_SHARE = 0.05
 """A passage closes at least this part of the gap: smooth gaps that bend a little are left alone."""
 
-CERTAIN = 5.0
+MIN_SIGNIFICANCE = 5.0
 """A passage is believed where the gap closes by so many standard deviations of what noise and waves would make it."""
 
-LEFT = 0.003
+END_OF_DECAY = 0.003
 """An exponential is over where this part of the gap is still closed."""
 
-_FEWEST = 8
-_MOST = 400
-_SINGLE = 24
-_LENGTHS = 120
-_MARGIN = 1.05
+_MIN_SAMPLES = 8
+_MAX_SAMPLES = 400
+_MIN_SINGLE_SAMPLES = 24
+_N_LENGTHS = 120
+_LENGTH_RATIO = 1.05
 """Lengths are tried in steps of some per cent."""
 
 
@@ -122,7 +122,7 @@ class End:
     @property
     def reach(self) -> float:
         """Distance over which the gap is looked at [m or rad]."""
-        return REACH * min(float(part[0][-1]) for part in (self.up, self.down))
+        return GAP_REACH * min(float(part[0][-1]) for part in (self.up, self.down))
 
 
 def _ends(recording: Recording, strokes: tuple[Stroke, ...]) -> Iterator[End]:
@@ -134,12 +134,12 @@ def _ends(recording: Recording, strokes: tuple[Stroke, ...]) -> Iterator[End]:
         if strokes[one].branch == strokes[other].branch:
             continue
         first = at == (0,)
-        way = 1.0 if (strokes[one].branch == LOAD) == first else -1.0
+        way = 1.0 if (strokes[one].branch == LOAD_BRANCH) == first else -1.0
         places = np.concatenate([recording.motion[strokes[k].points] for k in at])
         place = float(places.min() if way > 0 else places.max())
         seen = {strokes[k].branch: _seen_from(recording, strokes[k], place, way) for k in (one, other)}
-        up, down = seen[LOAD], seen[UNLOAD]
-        if min(len(up[0]), len(down[0])) >= _FEWEST:
+        up, down = seen[LOAD_BRANCH], seen[UNLOAD_BRANCH]
+        if min(len(up[0]), len(down[0])) >= _MIN_SAMPLES:
             yield End(at, place, way, up, down)
 
 
@@ -156,7 +156,7 @@ def _shorten_stroke(recording: Recording, stroke: Stroke, ends: Sequence[tuple[E
     keep = np.ones(len(motion), dtype=bool)
     for end, length in ends:
         keep &= end.way * (motion - end.place) >= length
-    return replace(stroke, points=stroke.points[keep]) if keep.sum() >= _FEWEST else stroke
+    return replace(stroke, points=stroke.points[keep]) if keep.sum() >= _MIN_SAMPLES else stroke
 
 
 def passage(ends: Sequence[End]) -> float:
@@ -173,7 +173,7 @@ def passage(ends: Sequence[End]) -> float:
     distance, gap = (np.concatenate(parts) for parts in zip(*(_gap(end, reach) for end in ends), strict=True))
     order = np.argsort(distance, kind="stable")
     distance, gap, weight = _thin_neighbours(distance[order], gap[order])
-    if len(distance) < _FEWEST:
+    if len(distance) < _MIN_SAMPLES:
         return 0.0
     beyond = gap[distance > 0.5 * reach]
     if not len(beyond):  # a hole in the recording
@@ -193,7 +193,7 @@ def passage(ends: Sequence[End]) -> float:
 def _gap(end: End, reach: float) -> tuple[FloatArray, FloatArray]:
     """Return distances from an end where both strokes have a force, and the way up less the way down there."""
     near = [part[0][(part[0] >= 0) & (part[0] <= reach)] for part in (end.up, end.down)]
-    if min(map(len, near)) < _FEWEST // 2:
+    if min(map(len, near)) < _MIN_SAMPLES // 2:
         return np.empty(0), np.empty(0)
     places = np.union1d(*near)
     # The sample at the reversal belongs to one stroke only: the other one starts a sample further in.
@@ -204,8 +204,10 @@ def _gap(end: End, reach: float) -> tuple[FloatArray, FloatArray]:
 
 def _thin_neighbours(places: FloatArray, gap: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return averages over neighbours where there are many; those next to the end stay single."""
-    size = max(-(-(len(places) - _SINGLE) // _MOST), 1)
-    edges = np.concatenate([np.arange(min(_SINGLE, len(places))), np.arange(_SINGLE, len(places), size)])
+    size = max(-(-(len(places) - _MIN_SINGLE_SAMPLES) // _MAX_SAMPLES), 1)
+    edges = np.concatenate(
+        [np.arange(min(_MIN_SINGLE_SAMPLES, len(places))), np.arange(_MIN_SINGLE_SAMPLES, len(places), size)]
+    )
     counts = np.diff(np.append(edges, len(places))).astype(float)
     if not len(counts):
         return places, gap, counts
@@ -216,7 +218,7 @@ def _one_passage(
     distance: FloatArray, gap: FloatArray, weight: FloatArray, reach: float, level: float
 ) -> tuple[float, float]:
     """Return the length of the passage that explains the gap best, 0 where none does, and the gap beyond it."""
-    if len(distance) < _FEWEST:
+    if len(distance) < _MIN_SAMPLES:
         return 0.0, level
     shapes, lengths = _shapes(distance, reach)
     root = np.sqrt(weight)
@@ -233,22 +235,24 @@ def _one_passage(
     left = rest + size * bent[best]
     noise = float(np.sqrt((left @ left) / max(len(distance) - 4, 1)))
     level = level or float(np.median(gap[distance >= 0.5 * float(distance.max())]))
-    certain = size * np.sqrt(power[best]) > CERTAIN * noise * np.sqrt(correlation_time(left))
-    if not certain or not CLOSES * level < size < 2.5 * level:
+    certain = size * np.sqrt(power[best]) > MIN_SIGNIFICANCE * noise * np.sqrt(correlation_time(left))
+    if not certain or not MIN_CLOSED_SHARE * level < size < 2.5 * level:
         return 0.0, level
     decay = float(lengths[best])
-    if best < len(lengths) - _LENGTHS:
-        return _MARGIN * decay, level
-    small = max(LEFT * level, 0.5 * noise)
+    if best < len(lengths) - _N_LENGTHS:
+        return _LENGTH_RATIO * decay, level
+    small = max(END_OF_DECAY * level, 0.5 * noise)
     return min(decay * max(np.log(size / small), 1.0), 0.5 * reach), level
 
 
 def _shapes(distance: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
     """Return how far each passage that is tried is from its end at each distance, 1 to 0, and the lengths of all."""
-    spacing = max(float(distance[min(_SINGLE, len(distance)) - 1] - distance[0]) / _SINGLE, 1e-6 * reach)
+    spacing = max(
+        float(distance[min(_MIN_SINGLE_SAMPLES, len(distance)) - 1] - distance[0]) / _MIN_SINGLE_SAMPLES, 1e-6 * reach
+    )
     steps = 0.5 * (distance[1:] + distance[:-1])
     steps = steps[steps <= 0.5 * reach]
-    lengths = np.geomspace(0.5 * spacing, 0.5 * reach, _LENGTHS)
+    lengths = np.geomspace(0.5 * spacing, 0.5 * reach, _N_LENGTHS)
     step = distance[None, :] < steps[:, None]
     ramp = np.maximum(1.0 - distance[None, :] / lengths[:, None], 0.0)
     decays = lengths / 4.0

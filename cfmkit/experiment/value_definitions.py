@@ -5,23 +5,24 @@
 
 from __future__ import annotations
 
-from cfmkit.numerics.holes_in_samples import STEPS
+from cfmkit.numerics.holes_in_samples import HOLE_STEP_RATIO
 
-_OVER = "over the measured travel in the window"
+_OVER_WINDOW = "over the measured travel in the window"
 
-RECORDED = {
+RECORDED_VALUES = {
     "coverage": (
         "ratio",
-        f"part of the window that was recorded, from steps of more than {STEPS:g} usual ones; of several cycles the "
+        f"part of the window that was recorded, from steps of more than {HOLE_STEP_RATIO:g} usual ones; of "
+        f"several cycles the "
         "least",
     ),
     "repeatability": (
         "effort",
         "sqrt(mean over the window of the variance (n - 1) of the {} between cycles at the same place)",
     ),
-    "data_rmse": ("effort", f"root mean square of (model - measured) {{}}, {_OVER}"),
+    "data_rmse": ("effort", f"root mean square of (model - measured) {{}}, {_OVER_WINDOW}"),
     "data_error_max": ("effort", "(model - measured) {} where it is largest in magnitude, in the window"),
-    "data_offset": ("effort", f"mean of (model - measured) {{}}, {_OVER}"),
+    "data_offset": ("effort", f"mean of (model - measured) {{}}, {_OVER_WINDOW}"),
     "data_loss": ("energy", "area between the measured branches over the window"),
     "data_loss_factor": (
         "ratio",
@@ -44,5 +45,5 @@ def define_recorded_values(kind: str) -> dict[str, tuple[str, str]]:
             kind if dimension == "effort" else dimension,
             definition.format(kind),
         )
-        for name, (dimension, definition) in RECORDED.items()
+        for name, (dimension, definition) in RECORDED_VALUES.items()
     }

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
-START = "start"
+START_WORD = "start"
 """In place of a value: the mean of the first points, where the machine has not moved yet."""
 
-_STANDS = 1e-3
+_STANDSTILL_SHARE = 1e-3
 """The machine has not moved where it is this near to its first place, in parts of the travel."""
 
 
@@ -77,7 +77,7 @@ def raw_zeros(recording: Recording, effort: float, motion: float) -> tuple[float
 
 def _resting(recording: Recording) -> int:
     """Return how many points there are before the machine moves; at least one."""
-    moved = np.abs(recording.motion - recording.motion[0]) > _STANDS * recording.travel
+    moved = np.abs(recording.motion - recording.motion[0]) > _STANDSTILL_SHARE * recording.travel
     return max(int(np.argmax(moved)), 1)
 
 
@@ -88,12 +88,12 @@ def _to_shown_unit(value: str | float | None, first: FloatArray, option: str, di
         return 0.0
     if not isinstance(value, str):
         return float(value)
-    if value.strip() == START:
+    if value.strip() == START_WORD:
         return float(first.mean())
     try:
         return read_quantity(value, dimension)
     except QuantityError as error:
-        raise UsageError(f"{option}: {error}; or write {START!r} for the mean before the machine moves") from None
+        raise UsageError(f"{option}: {error}; or write {START_WORD!r} for the mean before the machine moves") from None
 
 
 def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:

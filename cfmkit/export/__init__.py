@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.contours import TOLERANCE
+from cfmkit.export.contours import OUTLINE_TOLERANCE
 from cfmkit.export.dxf import dxf_bytes, write_dxf
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.layers import check_name
@@ -21,16 +21,19 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Drawing
 
-__all__ = ["FORMATS", "TOLERANCE", "USUAL", "files", "write_dxf", "write_points", "write_svg"]
+__all__ = ["DEFAULT_FORMATS", "FILE_FORMATS", "OUTLINE_TOLERANCE", "files", "write_dxf", "write_points", "write_svg"]
 
-FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")
+FILE_FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")
 """What `files` can write."""
-USUAL = FORMATS[:3]
+DEFAULT_FORMATS = FILE_FORMATS[:3]
 """What it writes unless told: what a cutter needs."""
 
 
 def files(
-    drawing: Drawing, kerf: float | None = None, tolerance: float | None = None, formats: Sequence[str] = USUAL
+    drawing: Drawing,
+    kerf: float | None = None,
+    tolerance: float | None = None,
+    formats: Sequence[str] = DEFAULT_FORMATS,
 ) -> dict[str, bytes]:
     """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are requested.
 
@@ -47,7 +50,7 @@ def files(
         Largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs;
         default: that of the drawing.
     formats : sequence of str
-        Of `FORMATS`.
+        Of `FILE_FORMATS`.
 
     Raises
     ------

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-_LEAN = 1e-3  # largest angle of the arcs to the exact curve [rad], as far as its points allow; see `outlines`
-_GAP = 5e-9  # two ends closer than this are one point, in sizes of the contour
-_STRAIGHT = 1e-12  # an arc no higher than this over its chord is a line [m]
+_MAX_ARC_ANGLE = 1e-3  # largest angle of the arcs to the exact curve [rad], as far as its points allow; see `outlines`
+_POINT_RTOL = 5e-9  # two ends closer than this are one point, in sizes of the contour
+_LINE_RISE = 1e-12  # an arc no higher than this over its chord is a line [m]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
     x0, y0, x1, y1 = contour.extents
     if not np.isfinite(x0 + y0 + x1 + y1):
         raise GeometryError(f"{name} has a point that is not finite")
-    gap = _GAP * (x1 - x0 + y1 - y0)
+    gap = _POINT_RTOL * (x1 - x0 + y1 - y0)
     edges = [edge for edge in contour.edges if isinstance(edge, Arc) or not _is_point(edge, gap)]
     if not edges:
         raise GeometryError(f"{name} has no edges")
@@ -88,7 +88,7 @@ def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
     chains = [_chain(edge, tolerance, f"{name}, edge {index}") for index, edge in enumerate(edges, start=1)]
     nodes = np.concatenate([chains[0].nodes, *(chain.nodes[1:] for chain in chains[1:])])
     bulges = np.concatenate([chain.bulges for chain in chains])
-    bulges[np.abs(bulges) * np.abs(np.diff(nodes)) < 2 * _STRAIGHT] = 0.0
+    bulges[np.abs(bulges) * np.abs(np.diff(nodes)) < 2 * _LINE_RISE] = 0.0
     chain = ArcChain(nodes, bulges)
     whole = edges[0] if len(edges) == 1 and isinstance(edges[0], Arc) and edges[0].full else None
     circle = (complex(*whole.center), whole.radius) if whole and contour.closed else None
@@ -117,7 +117,7 @@ def _chain(edge: Edge, tolerance: float, name: str) -> ArcChain:
     if isinstance(edge, Arc):
         return _arc_chain(edge, name)
     try:
-        return fit_arcs(edge.points, edge.tangents, tolerance, _LEAN)
+        return fit_arcs(edge.points, edge.tangents, tolerance, _MAX_ARC_ANGLE)
     except CoarseDataError as error:
         where = complex(*edge.points[error.index])
         raise GeometryError(
@@ -135,7 +135,7 @@ def _arc_chain(edge: Arc, name: str) -> ArcChain:
     return ArcChain(nodes, np.full(count, np.tan(turn / count / 4)))
 
 
-SAGITTA = 1e-6  # distance of the flattening from the arcs, in sizes of the chain
+SAGITTA_RTOL = 1e-6  # distance of the flattening from the arcs, in sizes of the chain
 
 
 def place(point: complex) -> str:
@@ -146,7 +146,7 @@ def place(point: complex) -> str:
 
 def flat_sagitta(chain: ArcChain) -> float:
     """Return how far the lines between `flat_points` are from a chain at most [m]."""
-    return SAGITTA * float(np.ptp(chain.nodes.real) + np.ptp(chain.nodes.imag))
+    return SAGITTA_RTOL * float(np.ptp(chain.nodes.real) + np.ptp(chain.nodes.imag))
 
 
 def flat_points(chain: ArcChain) -> Any:

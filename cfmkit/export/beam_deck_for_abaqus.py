@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network, Support
     from cfmkit.elastica.model.section import Section
 
-ELEMENTS = 24
+MIN_ELEMENTS_PER_BEAM = 24
 """Along a beam, at least; twice as many change the force of Lan's part by less than 1e-4."""
-STIFF = 100.0
+RIGID_MODULUS_FACTOR = 100.0
 """Modulus of rigid links, in that of the beams."""
-TOGETHER = 1e-9
+NODE_DISTANCE_TOL = 1e-9
 """Linked nodes closer than this are one [m]."""
-FIRM = "1.E7"
+DRIVE_STIFFNESS = "1.E7"
 """Stiffness of the spring between the drive and what it drives [N/mm]; with a decimal point, CalculiX wants one."""
-LEVER, ARC = 10.0, 360
+LEVER_LENGTH, N_ARC_LINES = 10.0, 360
 """Length of the lever that turns a node, in thicknesses; lines that its end's way is made of."""
-FIRST = 0.02
+FIRST_INCREMENT_SHARE = 0.02
 """First increment, in those that follow: chains that are almost straight would jump to a higher mode."""
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class _Lines:
             yield from self._support(name, node.support)
         yield f"*STEP, NLGEOM, INC={100 * self.increments}"
         yield "*STATIC"
-        yield f"{FIRST / self.increments:.10g}, 1., 1e-6, {1 / self.increments:.10g}"
+        yield f"{FIRST_INCREMENT_SHARE / self.increments:.10g}, 1., 1e-6, {1 / self.increments:.10g}"
         yield "*BOUNDARY"
         yield "ALL, 3, 3, 0"
         yield from self.moves
@@ -156,7 +156,7 @@ class _Lines:
         marks = [0.0]
         for left, right in pairwise(breaks.tolist()):
             share = float(np.real(fit.arc(right) - fit.arc(left)))
-            marks += np.linspace(left, right, max(4, math.ceil(share * ELEMENTS)) + 1)[1:].tolist()
+            marks += np.linspace(left, right, max(4, math.ceil(share * MIN_ELEMENTS_PER_BEAM)) + 1)[1:].tolist()
         halves = np.interp(np.arange(2 * len(marks) - 1) / 2, np.arange(len(marks)), marks)
         start = np.array(beam_end_at(self.network, name, 0), float)
         places = np.concatenate([[start], start + np.cumsum([_run(fit, *one) for one in pairwise(halves)], axis=0)])
@@ -166,12 +166,13 @@ class _Lines:
         return _Chain(places, thickness, float(beam.section.width), float(beam.section.youngs_modulus))
 
     def _links(self) -> Iterator[str]:
-        """Yield rigid links as beams that are `STIFF` times as stiff as the stiffest beam of the network.
+        """Yield rigid links as beams that are `RIGID_MODULUS_FACTOR` times as stiff as the stiffest beam of the
+        network.
 
         CalculiX's rigid bodies do not take nodes of beams.
         """
         section = max((beam.section for beam in self.network.beams.values()), key=_rigidity)
-        modulus = STIFF * to_border(section.youngs_modulus, "stress")
+        modulus = RIGID_MODULUS_FACTOR * to_border(section.youngs_modulus, "stress")
         size = to_border(float(np.max(section.thickness_at(np.linspace(0.0, 1.0, 33), 0.5))), "length")
         links = [link for link in self.network.links if self.number[link.node] != self.number[link.master]]
         if not links:
@@ -221,7 +222,7 @@ class _Lines:
         section = max((beam.section for beam in self.network.beams.values()), key=_rigidity)
         size = to_border(float(np.max(section.thickness_at(np.linspace(0.0, 1.0, 33), 0.5))), "length")
         x, y = (to_border(float(one), "length") for one in (node.x, node.y))
-        arm, (middle, end, pulling) = LEVER * size, (self.spare, self.spare + 1, self.spare + 2)
+        arm, (middle, end, pulling) = LEVER_LENGTH * size, (self.spare, self.spare + 1, self.spare + 2)
         self.spare += 3
         yield (
             f"** the torque is {arm:.10g} mm times the reaction of DRIVE perpendicular to the lever, which initially "
@@ -234,7 +235,7 @@ class _Lines:
         yield f"{pulling}, {x + arm:.10g}, {y:.10g}, 0"
         yield "*MATERIAL, NAME=LEVER"
         yield "*ELASTIC"
-        yield f"{STIFF * to_border(section.youngs_modulus, 'stress'):.10g}, 0"
+        yield f"{RIGID_MODULUS_FACTOR * to_border(section.youngs_modulus, 'stress'):.10g}, 0"
         yield "*ELEMENT, TYPE=B32, ELSET=LEVER"
         yield f"{self.spare_element}, {number}, {middle}, {end}"
         yield "*BEAM SECTION, ELSET=LEVER, MATERIAL=LEVER, SECTION=RECT"
@@ -245,9 +246,9 @@ class _Lines:
             yield f"{self.spare_element + axis}, {end}, {pulling}"
             yield f"*SPRING, ELSET=FIRM-{axis}"
             yield f"{axis}, {axis}"
-            yield FIRM
+            yield DRIVE_STIFFNESS
             yield f"*AMPLITUDE, NAME=ARC-{axis}"
-            shares = np.linspace(0.0, 1.0, ARC + 1)
+            shares = np.linspace(0.0, 1.0, N_ARC_LINES + 1)
             places = arm * (way(shares * angle) - way(0.0))
             yield from (f"{share:.10g}, {place:.10g}" for share, place in zip(shares, places, strict=True))
             self.led.append((f"ARC-{axis}", f"{pulling}, {axis}, {axis}, 1."))
@@ -284,7 +285,7 @@ class _Lines:
         yield f"{self.spare_element}, {number}, {pulling}"
         yield "*SPRING, ELSET=FIRM"
         yield "1, 1"
-        yield FIRM
+        yield DRIVE_STIFFNESS
         self.moves += [f"{pulling}, 1, 1, {end:.10g}", f"{pulling}, 2, 3, 0"]
 
 
@@ -294,7 +295,7 @@ def _numbers(network: Network) -> dict[str, int]:
     for name, node in network.nodes.items():
         master = network.master_of(name)
         lead = network.nodes[master]
-        if math.hypot(lead.x - node.x, lead.y - node.y) < TOGETHER:
+        if math.hypot(lead.x - node.x, lead.y - node.y) < NODE_DISTANCE_TOL:
             number[name] = number[master]
     return number
 
@@ -311,6 +312,6 @@ def _place(number: int, place: tuple[float, float] | FloatArray) -> str:
 def _run(fit: Fit, left: float, right: float) -> FloatArray:
     """Return the way along a fitted shape between two parameters (2,) [m]."""
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
-    t = middle + half * _GAUSS
-    angle, speed = np.real(fit.angle(t, middle)), np.real(fit.speed(t, middle)) * _WEIGHTS * half
+    t = middle + half * _GAUSS_NODES
+    angle, speed = np.real(fit.angle(t, middle)), np.real(fit.speed(t, middle)) * _GAUSS_WEIGHTS * half
     return np.array([float(np.sum(speed * np.cos(angle))), float(np.sum(speed * np.sin(angle)))])

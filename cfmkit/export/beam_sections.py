@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-ALLOWED = 1e-3
+SECTION_RTOL = 1e-3
 """Largest relative error of an area and of a section modulus, b t^2 / 6."""
 
 
@@ -59,7 +59,7 @@ class BeamSection:
         cfmkit.errors.GeometryError
             With the beam, the place, both values and a remedy.
         """
-        if abs((measured / self.thickness) ** 2 - 1.0) <= ALLOWED:
+        if abs((measured / self.thickness) ** 2 - 1.0) <= SECTION_RTOL:
             return
         x, y = (format_short(float(one), "length") for one in self.at)
         found = f"{format_short(measured, 'length')} thick" if np.isfinite(measured) else "endless"

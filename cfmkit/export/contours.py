@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
-from cfmkit.export.layers import DRIVEN, HELD
+from cfmkit.export.layers import DRIVEN_LAYER, HELD_LAYER
 from cfmkit.numerics.biarcs import cubic
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.results import Finding
 
-TOLERANCE = 5e-6
+OUTLINE_TOLERANCE = 5e-6
 """How far outlines may be from the exact ones by default [m]."""
 
 
@@ -193,7 +193,7 @@ def _points_between(edge: Smooth, sagitta: float) -> FloatArray:
     return np.vstack([found, edge.points[-1]])
 
 
-UNCUT = ("path", "reference", HELD, DRIVEN)
+UNCUT_LAYERS = ("path", "reference", HELD_LAYER, DRIVEN_LAYER)
 """Layers that nothing is cut along."""
 
 
@@ -210,7 +210,7 @@ def polygon(corners: Sequence[tuple[float, float]], layer: str, hole: bool = Fal
 
 def mark(shape: FloatArray, driven: bool) -> Contour:
     """Return a polygon (n, 2) [m], or a line (2, 2), on the layer of what stands or of what is driven."""
-    layer, corners = DRIVEN if driven else HELD, [(float(x), float(y)) for x, y in shape]
+    layer, corners = DRIVEN_LAYER if driven else HELD_LAYER, [(float(x), float(y)) for x, y in shape]
     return Contour((Line(*corners),), layer) if len(corners) == 2 else polygon(corners, layer)
 
 
@@ -300,13 +300,13 @@ class Drawing(ShortRepr):
     facts: tuple[tuple[str, str], ...] = ()
     labels: tuple[EngravedText, ...] = ()
     warnings: tuple[Finding, ...] = ()
-    tolerance: float = TOLERANCE
+    tolerance: float = OUTLINE_TOLERANCE
     sections: tuple[BeamSection, ...] = ()
 
     @property
     def extents(self) -> tuple[float, float, float, float]:
         """Smallest x and y, largest x and y of what is cut [m]."""
-        boxes = np.array([one.box for one in self.contours if one.layer not in UNCUT])
+        boxes = np.array([one.box for one in self.contours if one.layer not in UNCUT_LAYERS])
         return (*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:

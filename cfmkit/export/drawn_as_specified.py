@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.beam_sections import ALLOWED, lines_of
+from cfmkit.export.beam_sections import SECTION_RTOL, lines_of
 from cfmkit.export.contours import signed_area
-from cfmkit.export.union import GRID
+from cfmkit.export.union import GRID_DISTANCE
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour
 
-EXACT = 1e-5
+MEASURING_TOLERANCE = 1e-5
 """How far lines may be from the edges of an outline that is measured, in thicknesses of the thinnest beam."""
 
-FREE = 4.0
+MIN_FREE_RADII = 4.0
 """Pieces of a beam that are shorter than this are not measured unless none is longer, in radii of the fillets: those at
 both ends may reach its middle."""
 
@@ -67,7 +67,7 @@ def check_outline(
     """
     from shapely import LineString, STRtree, polygons
 
-    rings = [one.points(EXACT * thinnest) for one in contours]
+    rings = [one.points(MEASURING_TOLERANCE * thinnest) for one in contours]
     areas: list[FloatArray] = []
     owner: list[int] = []
     for number, piece in enumerate(pieces):
@@ -88,7 +88,7 @@ def check_outline(
     enclosed = sum(
         (-1.0 if one.hole else 1.0) * abs(signed_area(ring)) for one, ring in zip(contours, rings, strict=True)
     )
-    _check_area(enclosed, *_areas(areas, holes, fillet, GRID * thinnest))
+    _check_area(enclosed, *_areas(areas, holes, fillet, GRID_DISTANCE * thinnest))
     return tuple(found)
 
 
@@ -98,7 +98,7 @@ def _measurable(pieces: Sequence[SpecifiedPiece], fillet: float) -> Iterator[tup
     longest: dict[str, float] = {}
     for _, one in sections:
         longest[one.beam] = max(one.length, longest.get(one.beam, 0.0))
-    return ((number, one) for number, one in sections if one.length >= min(longest[one.beam], FREE * fillet))
+    return ((number, one) for number, one in sections if one.length >= min(longest[one.beam], MIN_FREE_RADII * fillet))
 
 
 def _is_of(piece: SpecifiedPiece, beam: str) -> bool:
@@ -113,7 +113,7 @@ def _check_area(measured: float, least: float, largest: float) -> None:
     cfmkit.errors.GeometryError
         With the areas.
     """
-    if least * (1.0 - ALLOWED) <= measured <= largest * (1.0 + ALLOWED):
+    if least * (1.0 - SECTION_RTOL) <= measured <= largest * (1.0 + SECTION_RTOL):
         return
     raise GeometryError(
         f"the outline encloses {1e6 * measured:.6g} mm2, but its beams and blocks {1e6 * least:.6g} to "

@@ -21,7 +21,7 @@ import numpy as np
 
 from cfmkit.errors import OutputError
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
-from cfmkit.export.layers import ENGRAVED, LayerLook, looks
+from cfmkit.export.layers import ENGRAVED_LAYER, LayerLook, looks
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
     from cfmkit.export.contours import Drawing, EngravedText
 
-_MILLIMETRES, _METRIC = 4, 1
-_DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors
-_CENTER, _MIDDLE = 1, 2  # of texts, about their point
-_LOCK = threading.Lock()
+_UNITS_MILLIMETRES, _MEASUREMENT_METRIC = 4, 1
+_COORDINATE_DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors
+_ALIGN_CENTER, _ALIGN_MIDDLE = 1, 2  # of texts, about their point
+_EZDXF_LOCK = threading.Lock()
 
 
 def write_dxf(drawing: Drawing, tolerance: float | None = None) -> bytes:
@@ -56,10 +56,10 @@ def write_dxf(drawing: Drawing, tolerance: float | None = None) -> bytes:
 
 def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
     """Return outlines and engraved texts as DXF; see `write_dxf`."""
-    layers = looks([*(outline.layer for outline in drawn), *(ENGRAVED for _ in labels)])
-    with _LOCK, _same_bytes(_ezdxf()) as ezdxf:
-        document = ezdxf.new("R2010", units=_MILLIMETRES)
-        document.header["$MEASUREMENT"] = _METRIC
+    layers = looks([*(outline.layer for outline in drawn), *(ENGRAVED_LAYER for _ in labels)])
+    with _EZDXF_LOCK, _same_bytes(_ezdxf()) as ezdxf:
+        document = ezdxf.new("R2010", units=_UNITS_MILLIMETRES)
+        document.header["$MEASUREMENT"] = _MEASUREMENT_METRIC
         for name, look in layers.items():
             _add_layer(document, name, look)
         space = document.modelspace()
@@ -83,10 +83,10 @@ def _add_layer(document: Any, name: str, look: LayerLook) -> None:
 def _add_outline(space: Any, outline: Outline) -> None:
     attributes = {"layer": outline.layer}
     if outline.circle:
-        center, radius = (np.round(to_border(value, "length"), _DIGITS) for value in outline.circle)
+        center, radius = (np.round(to_border(value, "length"), _COORDINATE_DIGITS) for value in outline.circle)
         space.add_circle((float(center.real), float(center.imag)), float(radius), dxfattribs=attributes)
         return
-    nodes = np.round(to_border(outline.chain.nodes, "length"), _DIGITS) + 0.0
+    nodes = np.round(to_border(outline.chain.nodes, "length"), _COORDINATE_DIGITS) + 0.0
     bulges = np.append(outline.chain.bulges, 0.0)
     vertices = zip(nodes.real.tolist(), nodes.imag.tolist(), bulges.tolist(), strict=True)
     kept = list(vertices)[:-1] if outline.closed else list(vertices)
@@ -94,16 +94,18 @@ def _add_outline(space: Any, outline: Outline) -> None:
 
 
 def _add_label(space: Any, label: EngravedText) -> None:
-    x, y = (round(float(to_border(value, "length")), _DIGITS) for value in label.at)
-    look = {"layer": ENGRAVED, "rotation": round(math.degrees(label.angle), _DIGITS)}
-    text = space.add_text(label.text, height=round(float(to_border(label.height, "length")), _DIGITS), dxfattribs=look)
-    text.dxf.halign, text.dxf.valign = _CENTER, _MIDDLE
+    x, y = (round(float(to_border(value, "length")), _COORDINATE_DIGITS) for value in label.at)
+    look = {"layer": ENGRAVED_LAYER, "rotation": round(math.degrees(label.angle), _COORDINATE_DIGITS)}
+    text = space.add_text(
+        label.text, height=round(float(to_border(label.height, "length")), _COORDINATE_DIGITS), dxfattribs=look
+    )
+    text.dxf.halign, text.dxf.valign = _ALIGN_CENTER, _ALIGN_MIDDLE
     text.dxf.insert = text.dxf.align_point = (x, y)
 
 
 def _show_all(document: Any, points: Any) -> None:
     """Set the extents, and what a viewer shows first."""
-    low, high = np.round(points.min(axis=0), _DIGITS), np.round(points.max(axis=0), _DIGITS)
+    low, high = np.round(points.min(axis=0), _COORDINATE_DIGITS), np.round(points.max(axis=0), _COORDINATE_DIGITS)
     document.modelspace().reset_extents((*low.tolist(), 0.0), (*high.tolist(), 0.0))
     height = 1.1 * max(*(high - low).tolist(), 1.0)
     document.set_modelspace_vport(height=height, center=tuple(((low + high) / 2).tolist()))

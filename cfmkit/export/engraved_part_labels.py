@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.export.contours import EngravedText
-from cfmkit.export.layers import DRIVEN, HELD
+from cfmkit.export.layers import DRIVEN_LAYER, HELD_LAYER
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
     from cfmkit.export.contours import Drawing, Sheet
 
-SHARE, BREADTH = 0.6, 0.8
+MAX_HEIGHT_SHARE, LETTER_BREADTH = 0.6, 0.8
 """Largest height of the text in parts of the piece's shorter side; breadth of a letter in its heights, which no usual
 font exceeds."""
-LARGEST = 5e-3
+MAX_TEXT_HEIGHT = 5e-3
 """Height of the text at most [m]."""
-SPECK = 1e-8
+MIN_HOLE_AREA = 1e-8
 """Holes that cover less of a piece than this beside it touch it only [m2]."""
-NEAR = 5e-6
+FLATTENING_TOLERANCE = 5e-6
 """Outlines of bodies are flattened within this [m]."""
 
 
@@ -46,20 +46,24 @@ def engrave_labels(drawing: Drawing, name: str) -> Drawing:
 def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
     from shapely import Polygon
 
-    cut = [(one, Polygon(one.points(NEAR))) for one in drawing.contours if one.layer == "cut" and one.closed]
+    cut = [
+        (one, Polygon(one.points(FLATTENING_TOLERANCE)))
+        for one in drawing.contours
+        if one.layer == "cut" and one.closed
+    ]
     holes = [shape for one, shape in cut if one.hole]
-    marks = [one for one in drawing.contours if one.layer in (HELD, DRIVEN) and one.closed]
+    marks = [one for one in drawing.contours if one.layer in (HELD_LAYER, DRIVEN_LAYER) and one.closed]
     for body in (shape for one, shape in cut if not one.hole):
         found: list[Any] = []
-        for layer in (HELD, DRIVEN):
-            own = [Polygon(one.points(NEAR)) for one in marks if one.layer == layer]
+        for layer in (HELD_LAYER, DRIVEN_LAYER):
+            own = [Polygon(one.points(FLATTENING_TOLERANCE)) for one in marks if one.layer == layer]
             found = found or [one for one in own if body.contains(one.centroid)]
         spots = sorted(found, key=lambda one: -one.area)
         for spot in spots:
             thick = _thickness(drawing.sheet, spot.centroid)
             text = name if thick is None else f"{name}, sheet {format_short(thick, 'length')}"
             if (label := _place_text(text, spot)) is not None and not any(
-                spot.intersection(hole).area > SPECK for hole in holes
+                spot.intersection(hole).area > MIN_HOLE_AREA for hole in holes
             ):
                 yield label
                 break
@@ -82,6 +86,8 @@ def _place_text(text: str, spot: Any) -> EngravedText | None:
     longer = int(lengths.argmax())
     angle = float(np.arctan2(*sides[longer][::-1]))
     angle = (angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-    height = min(SHARE * float(lengths.min()), float(lengths.max()) / (BREADTH * len(text)), LARGEST)
+    height = min(
+        MAX_HEIGHT_SHARE * float(lengths.min()), float(lengths.max()) / (LETTER_BREADTH * len(text)), MAX_TEXT_HEIGHT
+    )
     middle = spot.centroid
     return EngravedText(text, (float(middle.x), float(middle.y)), height, angle)

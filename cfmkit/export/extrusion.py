@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Drawing, Sheet
 
-SPECK = 1e-12
+MIN_FACE_AREA = 1e-12
 """Faces smaller than this are rounding, where the edge of a region runs along the edge of the part, in squares of its
 size."""
-GRID = 1e-9
+POINT_RTOL = 1e-9
 """Points of outlines and regions that are nearer to each other are one, in sizes of the part."""
 
 
@@ -106,13 +106,15 @@ def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
     usual = float(sheet.thickness or 0.0)
     x0, y0, x1, y1 = part.bounds
     size = x1 - x0 + y1 - y0
-    part = set_precision(part, GRID * size)
+    part = set_precision(part, POINT_RTOL * size)
     other = [one for one in sheet.regions if one.thickness != usual]
-    areas = [(set_precision(Polygon(one.polygon), GRID * size), one.thickness) for one in other]
-    areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > SPECK * size**2]
+    areas = [(set_precision(Polygon(one.polygon), POINT_RTOL * size), one.thickness) for one in other]
+    areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > MIN_FACE_AREA * size**2]
     if not areas:
         return LayeredPolygon(((part, usual),))
-    lines = union_all([part.boundary, *(area.boundary.intersection(part) for area, _ in areas)], grid_size=GRID * size)
+    lines = union_all(
+        [part.boundary, *(area.boundary.intersection(part) for area, _ in areas)], grid_size=POINT_RTOL * size
+    )
     prepare(part)
     faces = []
     for face in polygonize(lines):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.export.contours import Edge
 
-SMOOTH = math.radians(0.5)
+TANGENT_ANGLE = math.radians(0.5)
 """Where the direction turns by less than this the edges are tangent: nothing to round [rad]."""
 
 
@@ -45,7 +45,7 @@ def round_inside_corners(contour: Contour, radius: float) -> tuple[Contour, tupl
     sharp, arcs = [], {}
     for k, turn in enumerate(turns):
         before, after = edges[k - 1], edges[k]
-        if turn * side > -SMOOTH:
+        if turn * side > -TANGENT_ANGLE:
             continue
         if (found := _round_corner(before, after, radius, side)) is None:
             sharp.append(after.ends[0])

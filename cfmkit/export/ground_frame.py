@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-ROOT = 2e-5
+ROOT_SIDE = 2e-5
 """Bars that cover less of a beam at its root than a square of this side stand beside it [m]."""
-DEEPER = 0.25
+BAR_OVERLAP_SHARE = 0.25
 """Part of the frame's thickness by which bars reach into it."""
 
 
@@ -77,7 +77,7 @@ def ground_frame(
     low, high = _opening(pads, moving, covered, clearance) if inside is None else np.sort(np.array(inside), axis=0)
     sides = _sides(low, high, thickness)
     ring = union_all([Polygon(side) for side in sides])
-    if (common := ring.intersection(moving)).area > ROOT**2:
+    if (common := ring.intersection(moving)).area > ROOT_SIDE**2:
         raise GeometryError(
             f"the frame is in the way of the moving parts at {_place(common)}; make "
             f"'mechanism.part.frame.inside' larger"
@@ -136,14 +136,14 @@ def _bar(
     )
     for length, way in sorted(ways, key=lambda one: one[0]):
         for breadth in sorted({min(sizes), 0.5 * min(sizes)}, reverse=True):
-            reach, half = length + DEEPER * thickness, 0.5 * breadth
+            reach, half = length + BAR_OVERLAP_SHARE * thickness, 0.5 * breadth
             along, across = np.array(way), half * np.array([-way[1], way[0]])
             end = middle + reach * along
             bar = np.array([middle - across, end - across, end + across, middle + across])
             shape = Polygon(bar).difference(Polygon(pad))
             inside_way = shape.intersection(moving)
             beside = shape.difference(near).intersection(free)
-            if inside_way.area <= ROOT**2 and beside.area <= ROOT**2:
+            if inside_way.area <= ROOT_SIDE**2 and beside.area <= ROOT_SIDE**2:
                 return bar
             tried = tried or _place(inside_way if inside_way.area > beside.area else beside)
     raise GeometryError(

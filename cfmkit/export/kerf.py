@@ -110,7 +110,7 @@ def _follows(chain: ArcChain, outline: Outline, half: float, region: Any, error:
     return bool(not near and not far and moved.is_valid and abs(moved.area - region.area) < slack)
 
 
-_SMOOTH = 1e-7  # a turn below this [rad] is no corner; a fraction of an arc below it is no piece
+_TANGENT_ANGLE = 1e-7  # a turn below this [rad] is no corner; a fraction of an arc below it is no piece
 
 
 @dataclass
@@ -178,11 +178,11 @@ def _pieces(chain: ArcChain, distance: float) -> tuple[list[_Piece], list[int]]:
             pieces.append(_Piece(starts[index], chord, turn))
         else:
             breaks.append(len(pieces) - 1)
-        if corners[index] > _SMOOTH:
+        if corners[index] > _TANGENT_ANGLE:
             begin = complex(chain.nodes[index + 1] - 1j * distance * out[index])
             end = starts[(index + 1) % len(starts)]
             pieces.append(_Piece(begin, end - begin, float(corners[index] * np.sign(distance))))
-        elif corners[index] < -_SMOOTH:
+        elif corners[index] < -_TANGENT_ANGLE:
             breaks.append(len(pieces) - 1)
     return pieces, list(dict.fromkeys(breaks))
 
@@ -193,11 +193,11 @@ def _trim(pieces: list[_Piece], kept: list[int], i: int, j: int) -> bool:
         crossing = _crossing(pieces[i], pieces[j])
         if crossing is None:
             return False
-        if crossing[0] <= pieces[i].begin + _SMOOTH:
+        if crossing[0] <= pieces[i].begin + _TANGENT_ANGLE:
             before = kept[kept.index(i) - 1]
             kept.remove(i)
             i = before
-        elif crossing[1] >= pieces[j].end - _SMOOTH:
+        elif crossing[1] >= pieces[j].end - _TANGENT_ANGLE:
             after = kept[(kept.index(j) + 1) % len(kept)]
             kept.remove(j)
             j = after

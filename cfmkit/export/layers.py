@@ -21,30 +21,30 @@ class LayerLook:
     dashes: tuple[float, ...] = ()
 
 
-_LOOKS = {
+_LAYER_LOOKS = {
     "cut": LayerLook(1, "#ff0000"),
     "path": LayerLook(150, "#007fff", (6.0, 1.5, 1.0, 1.5)),
     "reference": LayerLook(8, "#808080"),
 }
-HELD, DRIVEN = "held", "driven"
+HELD_LAYER, DRIVEN_LAYER = "held", "driven"
 """Layers of what stands while the mechanism works, and of what is moved: closed contours that nothing is cut along."""
 
-ENGRAVED = "engraved"
+ENGRAVED_LAYER = "engraved"
 """Layer of texts on the parts."""
 
-_MARKS = {HELD: LayerLook(3, "#008000", (1.0, 1.0)), DRIVEN: LayerLook(30, "#ff8000", (1.0, 1.0))}
-_MARKS[ENGRAVED] = LayerLook(5, "#0000ff")
-_OTHERS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(34, "#995200"), LayerLook(92, "#408000"))
+_MARK_LOOKS = {HELD_LAYER: LayerLook(3, "#008000", (1.0, 1.0)), DRIVEN_LAYER: LayerLook(30, "#ff8000", (1.0, 1.0))}
+_MARK_LOOKS[ENGRAVED_LAYER] = LayerLook(5, "#0000ff")
+_OTHER_LOOKS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(34, "#995200"), LayerLook(92, "#408000"))
 
 
 def looks(used: Iterable[str]) -> dict[str, LayerLook]:
     """Return the look of the three usual layers, of marks and of every other one in use, in that order."""
     used = list(dict.fromkeys(used))
-    marks = {name: look for name, look in _MARKS.items() if name in used}
-    others = [name for name in used if name not in _LOOKS | marks]
+    marks = {name: look for name, look in _MARK_LOOKS.items() if name in used}
+    others = [name for name in used if name not in _LAYER_LOOKS | marks]
     for name in others:
         check_name(name, "layer")
-    return _LOOKS | marks | {name: _OTHERS[index % len(_OTHERS)] for index, name in enumerate(others)}
+    return _LAYER_LOOKS | marks | {name: _OTHER_LOOKS[index % len(_OTHER_LOOKS)] for index, name in enumerate(others)}
 
 
 def check_name(name: str, what: str) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Role = Literal["held", "driven", "free", "contact"]
 """Whether a body stands, moves as the drive says, moves as the mechanism lets it, or rolls or slides on another one."""
 
-MIRROR = np.array([-1.0, 1.0])
+MIRROR_FACTORS = np.array([-1.0, 1.0])
 """Factors of x and y of the mirror image about the y axis."""
 
 N_CIRCLE_POINTS = 73
@@ -79,7 +79,7 @@ class PosedBody:
 
     def mirror(self) -> PosedBody:
         """Return its mirror image about the y axis; a polygon runs in the same sense."""
-        return replace(self, core=(self.core[:, ::-1] if self.closed else self.core) * MIRROR)
+        return replace(self, core=(self.core[:, ::-1] if self.closed else self.core) * MIRROR_FACTORS)
 
     def shape(self, pose: int) -> Any:
         """Return what it covers in a pose, as a geometry of shapely; a line as far as it reaches anywhere."""

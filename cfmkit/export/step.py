@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Region, Sheet
 
-STRAIGHT = 1e-6
+LINE_RISE = 1e-6
 """Arcs that rise less over their chord are lines: less than a CAD kernel can tell [mm]."""
 
 
@@ -85,7 +85,7 @@ def _edges(kernel: Any, outline: Outline) -> list[Any]:
     found = []
     for k in range(len(middles)):
         a, m, b = ((float(z.real), float(z.imag)) for z in (nodes[k], middles[k], nodes[k + 1]))
-        straight = rise[k] < STRAIGHT
+        straight = rise[k] < LINE_RISE
         found.append(kernel.Edge.make_line(a, b) if straight else kernel.Edge.make_three_point_arc(a, m, b))
     return found
 

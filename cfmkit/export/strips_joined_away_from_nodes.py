@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
 
-APART = 6.0
+MIN_WAY_APART = 6.0
 """Shortest way between places that are apart, in thicknesses with a fillet on either side: beams that leave a node with
 less than 19 degrees between them are still one piece that far from it."""
-FINE = 4.0
+POINTS_PER_THICKNESS = 4.0
 """Points along a strip in each thickness with its fillets: two that touch have points close to the place."""
-MOST = 2000
+MAX_STRIP_POINTS = 2000
 """Points of a strip at most; those of more windings are farther apart."""
-TOUCHING = 1e-6
+GAP_RTOL = 1e-6
 """Gaps that are rounding, in thicknesses of the thinnest strip."""
-TRIED = 200
+MAX_TRIED_LINES = 200
 """Lines between two strips that are looked at, the shortest ones."""
-SAGITTA = 1e-3
+SAGITTA_RTOL = 1e-3
 """How far arcs of the outline may be from their lines, in the same."""
-ROUNDING = 1e-5
+OUTSIDE_RTOL = 1e-5
 """Lines run through the material if less than this lies outside, in the same."""
 
 
@@ -49,8 +49,8 @@ class DrawnStrip:
     def sample(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points (k, 2), the way to them from the start (k,) and half thicknesses (k,) there, closely [m]."""
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
-        step = (float(self.thickness.min()) + 2.0 * fillet) / FINE
-        places = np.linspace(0.0, way[-1], min(MOST, math.ceil(way[-1] / step) + 1))
+        step = (float(self.thickness.min()) + 2.0 * fillet) / POINTS_PER_THICKNESS
+        places = np.linspace(0.0, way[-1], min(MAX_STRIP_POINTS, math.ceil(way[-1] / step) + 1))
         at = np.column_stack([np.interp(places, way, self.points[:, k]) for k in (0, 1)])
         return at, places, 0.5 * np.interp(places, way, self.thickness)
 
@@ -130,7 +130,7 @@ def joined_away_from_nodes(
     shapely.prepare(whole)
     joins: dict[tuple[str, str], Join] = {}
     for one, other, starts, ends, gaps in found:
-        order = np.argsort(gaps, kind="stable")[:TRIED]
+        order = np.argsort(gaps, kind="stable")[:MAX_TRIED_LINES]
         lines = shapely.linestrings(np.stack([starts[order], ends[order]], axis=1))
         inside = np.flatnonzero(shapely.covers(whole, lines))
         if len(inside) and (one, other) not in joins:
@@ -144,9 +144,9 @@ def _material(contours: Sequence[Contour], thinnest: float) -> Any:
     from shapely import Polygon, union_all
 
     closed = [one for one in contours if one.closed]
-    areas = [union_all([Polygon(one.points(SAGITTA * thinnest)).buffer(0.0) for one in closed if one.hole is hole])
+    areas = [union_all([Polygon(one.points(SAGITTA_RTOL * thinnest)).buffer(0.0) for one in closed if one.hole is hole])
              for hole in (False, True)]  # fmt: skip
-    return areas[0].difference(areas[1]).buffer(ROUNDING * thinnest)
+    return areas[0].difference(areas[1]).buffer(OUTSIDE_RTOL * thinnest)
 
 
 Candidates = tuple[str, str, "FloatArray", "FloatArray", "FloatArray"]
@@ -159,7 +159,7 @@ class _Look:
     def __init__(self, strips: Sequence[DrawnStrip], nodes: NodesAndBodies, fillet: float) -> None:
         self.nodes, self.fillet = nodes, fillet
         self.thinnest = min((float(strip.thickness.min()) for strip in strips), default=1.0)
-        self.filled = 2.0 * fillet + TOUCHING * self.thinnest
+        self.filled = 2.0 * fillet + GAP_RTOL * self.thinnest
         self.names = [strip.name for strip in strips]
         sampled = [strip.sample(fillet) for strip in strips]
         self.points, self.way, self.half = (
@@ -186,7 +186,7 @@ class _Look:
         gap = np.hypot(*(self.points[one] - self.points[other]).T) - self.half[one] - self.half[other]
         near = gap < self.filled
         one, other, gap = one[near], other[near], gap[near]
-        apart = self._way_between(one, other) > APART * (self.half[one] + self.half[other] + 2.0 * self.fillet)
+        apart = self._way_between(one, other) > MIN_WAY_APART * (self.half[one] + self.half[other] + 2.0 * self.fillet)
         one, other, gap = one[apart], other[apart], gap[apart]
         pair = self.strip[one] * len(self.names) + self.strip[other]
         for which in np.unique(pair).tolist():
@@ -213,7 +213,7 @@ class _Look:
             way = np.minimum(*(self.to_ends[k] + to_node[self.ends[k]] for k in (0, 1)))
             shape = shapely.Polygon(block.shape)
             gap = shapely.distance(places, shape) - self.half
-            near = (gap < self.filled) & (way > APART * 2.0 * (self.half + self.fillet))
+            near = (gap < self.filled) & (way > MIN_WAY_APART * 2.0 * (self.half + self.fillet))
             for which in np.unique(self.strip[near]).tolist():
                 own = np.flatnonzero(near & (self.strip == which))
                 if _found_in_other_half(self.names[which], block.name):

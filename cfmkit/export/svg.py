@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
-from cfmkit.export.layers import ENGRAVED, LayerLook, check_name, looks
+from cfmkit.export.layers import ENGRAVED_LAYER, LayerLook, check_name, looks
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from cfmkit.export.contours import Drawing, EngravedText
 
-_MARGIN = 5.0  # around the drawing [mm]
-_STROKE = 0.25  # width of every line [mm]
+_DRAWING_MARGIN = 5.0  # around the drawing [mm]
+_STROKE_WIDTH = 0.25  # width of every line [mm]
 
 
 def write_svg(drawing: Drawing, tolerance: float | None = None) -> bytes:
@@ -48,7 +48,7 @@ def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText
     points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
     digits = _digits(float(np.ptp(points, axis=0).max()))
     shape = partial(_shape, digits=digits)
-    (left, low), (right, high) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+    (left, low), (right, high) = points.min(axis=0) - _DRAWING_MARGIN, points.max(axis=0) + _DRAWING_MARGIN
     width, height = _text(right - left), _text(high - low)
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{width}mm" height="{height}mm"'
@@ -67,7 +67,7 @@ def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText
 
 def _group(layer: str, look: LayerLook, members: Sequence[str]) -> list[str]:
     dashes = f' stroke-dasharray="{" ".join(map(_text, look.dashes))}"' if look.dashes else ""
-    style = f'fill="none" stroke="{look.rgb}" stroke-width="{_text(_STROKE)}" stroke-linejoin="round"{dashes}'
+    style = f'fill="none" stroke="{look.rgb}" stroke-width="{_text(_STROKE_WIDTH)}" stroke-linejoin="round"{dashes}'
     return [f'<g id="{layer}" {style}>', *members, "</g>"] if members else []
 
 
@@ -76,7 +76,8 @@ def _texts(labels: Sequence[EngravedText]) -> list[str]:
     if not labels:
         return []
     found = [
-        f'<g id="{ENGRAVED}" fill="{looks([ENGRAVED])[ENGRAVED].rgb}" font-family="sans-serif" text-anchor="middle">'
+        f'<g id="{ENGRAVED_LAYER}" fill="{looks([ENGRAVED_LAYER])[ENGRAVED_LAYER].rgb}" '
+        f'font-family="sans-serif" text-anchor="middle">'
     ]
     for one in labels:
         x, y, size = (float(to_border(value, "length")) for value in (*one.at, one.height))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import TOLERANCE
+from cfmkit.export.contours import OUTLINE_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
 
-FACING = 0.7
+MIN_FACING_SINE = 0.7
 """Sine of the angle at which a ray must meet an edge that is the other side of a wall: 45 degrees."""
 
 PER_WALL, MOST_PLACES = 2.0, 20_000
 """Places along an edge in the thinnest wall that a process makes, and all round a part at most."""
 
-AROUND = 4.0
+MIN_WAY_AROUND = 4.0
 """Way along the edge from one side of a wall to the other, in its thickness, at least: round a tip of 27 degrees it is
 4.2 times as long as the ray, round blunter ones less. The end of a wall belongs to it up to 1.5 thicknesses from there.
 """
@@ -65,7 +65,7 @@ def facing_lines(
         depth = (way[:, 0] * side[:, 1] - way[:, 1] * side[:, 0]) / det
         share = (way[:, 0] * normals[ray, 1] - way[:, 1] * normals[ray, 0]) / det
         # a wall looks back: lines that the ray meets at less than 45 degrees belong to a corner, not to a wall
-        steep = np.abs(det) > FACING * np.hypot(*side.T)
+        steep = np.abs(det) > MIN_FACING_SINE * np.hypot(*side.T)
     met = steep & (share >= 0) & (share <= 1) & (depth > 1e-8 * reach) & (depth <= reach)
     return ray[met], line[met], depth[met]
 
@@ -112,7 +112,7 @@ class EdgeLines:
         return line, (number + 0.5) / count[line]
 
 
-def thin_walls(contours: Sequence[Contour], least: float, tolerance: float = TOLERANCE) -> tuple[ThinWall, ...]:
+def thin_walls(contours: Sequence[Contour], least: float, tolerance: float = OUTLINE_TOLERANCE) -> tuple[ThinWall, ...]:
     """Return the walls of a part that are thinner than can be made, the thinnest first.
 
     Parameters
@@ -143,7 +143,7 @@ def thin_walls(contours: Sequence[Contour], least: float, tolerance: float = TOL
     here = edges.at[line[ray]] + share[ray] * lengths[line[ray]]
     there = edges.at[met] + np.hypot(*(ends - edges.starts[met]).T)
     apart, around = np.abs(there - here), edges.around[edges.ring[met]]
-    tip = (edges.ring[met] == edges.ring[line[ray]]) & (np.minimum(apart, around - apart) < AROUND * depth)
+    tip = (edges.ring[met] == edges.ring[line[ray]]) & (np.minimum(apart, around - apart) < MIN_WAY_AROUND * depth)
     return tuple(_walls(places[ray][~tip], ends[~tip], depth[~tip], least))
 
 

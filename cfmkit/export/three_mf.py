@@ -19,19 +19,20 @@ if TYPE_CHECKING:
 
     from cfmkit.export.extrusion import Body
 
-_XML = '<?xml version="1.0" encoding="UTF-8"?>\n'
-_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-_PACKAGE = "http://schemas.openxmlformats.org/package/2006"
-_TYPES = (
-    f'{_XML}<Types xmlns="{_PACKAGE}/content-types">'
+_XML_HEADER = '<?xml version="1.0" encoding="UTF-8"?>\n'
+_CORE_NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_PACKAGE_NAMESPACE = "http://schemas.openxmlformats.org/package/2006"
+_CONTENT_TYPES = (
+    f'{_XML_HEADER}<Types xmlns="{_PACKAGE_NAMESPACE}/content-types">'
     '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
     '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>\n'
 )
-_RELATIONS = (
-    f'{_XML}<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Target="/3D/3dmodel.model" Id="model" '
+_PACKAGE_RELATIONS = (
+    f'{_XML_HEADER}<Relationships xmlns="{_PACKAGE_NAMESPACE}/relationships"><Relationship '
+    f'Target="/3D/3dmodel.model" Id="model" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
 )
-_DATE = (1980, 1, 1, 0, 0, 0)
+_FILE_DATE = (1980, 1, 1, 0, 0, 0)
 """Of every file in the archive: the same part gives the same bytes."""
 
 
@@ -41,18 +42,18 @@ def threemf_bytes(name: str, bodies: Sequence[Body]) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for path, text in (
-            ("[Content_Types].xml", _TYPES),
-            ("_rels/.rels", _RELATIONS),
+            ("[Content_Types].xml", _CONTENT_TYPES),
+            ("_rels/.rels", _PACKAGE_RELATIONS),
             ("3D/3dmodel.model", _model(name, bodies)),
         ):
-            entry = zipfile.ZipInfo(path, _DATE)
+            entry = zipfile.ZipInfo(path, _FILE_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, text)
     return file.getvalue()
 
 
 def _model(name: str, bodies: Sequence[Body]) -> str:
-    lines = [f'{_XML}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE}">', "<resources>"]
+    lines = [f'{_XML_HEADER}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE_NAMESPACE}">', "<resources>"]
     for number, body in enumerate(bodies, start=1):
         lines += [f'<object id="{number}" type="model" name="{name}-{number}"><mesh>', *_mesh(body), "</mesh></object>"]
     items = "".join(f'<item objectid="{number}"/>' for number in range(1, len(bodies) + 1))

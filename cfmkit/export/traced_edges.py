@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-SAME = 1e-6
+ANGLE_TOL = 1e-6
 """Arcs whose angles differ by less are the same [rad]."""
 
 
@@ -101,7 +101,7 @@ class TracedEdge:
         if isinstance(edge, Arc):
             count = len(self.z) - 1
             low, high = (edge.start + (edge.end - edge.start) * u / count for u in (first, last))
-            if abs(high - low - (edge.end - edge.start)) < SAME:
+            if abs(high - low - (edge.end - edge.start)) < ANGLE_TOL:
                 return edge
             return Arc(edge.center, edge.radius, low, high)
         inner = np.arange(math.floor(first) + 1, math.ceil(last))

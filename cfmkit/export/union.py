@@ -29,20 +29,20 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-GRID = 1e-8
+GRID_DISTANCE = 1e-8
 """Distance of the points between which the union is computed, in sizes of the thinnest piece."""
-NEAR = 50.0
+MAX_GRID_DISTANCES = 50.0
 """Places nearer to each other than this are one, in grid distances: rounding moves lines by less than one."""
-SAGITTA = 1e-3
+SAGITTA_RTOL = 1e-3
 """How far the polygons of arcs may be from them while the union is computed, in the same sizes: what crosses is then
 found, and where it crosses is computed on the arcs themselves."""
-SPECK = 1e-3
+MIN_HOLE_SIDE = 1e-3
 """Holes and parts smaller than the square of this are rounding, in the same sizes."""
-SMOOTH = 1e-6
+TANGENT_ANGLE = 1e-6
 """Where the direction turns by less than this edges are tangent [rad]."""
-TANGENT = 1e-3
+MIN_CROSSING_ANGLE = 1e-3
 """Edges that cross at less than this angle [rad] are cut where their polygons cross: where they overlap, anywhere."""
-CHUNK = 0.5 * math.pi
+MAX_BAND_TURN = 0.5 * math.pi
 """By how much a band beside an edge may turn in one polygon [rad]: it cannot overlap itself then."""
 
 
@@ -118,15 +118,15 @@ def merge_pieces(
     cfmkit.errors.GeometryError
         If nothing is left.
     """
-    near = NEAR * GRID * size
-    tracks = [TracedEdge.from_edge(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
+    near = MAX_GRID_DISTANCES * GRID_DISTANCE * size
+    tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for piece in pieces for edge in piece.edges]
     whole = _unite([area for piece in pieces for area in piece.to_polygons(size)], size)
     rings = [_recognise_edges(_ring(runs, near), near) for runs in _trace_rings(whole, tracks, size)]
     if fillet > 0:
         rings = _round_chains(rings, fillet, size)
     if holes:
-        tracks = [TracedEdge.from_edge(edge, SAGITTA * size) for ring in rings for edge in ring]
-        tracks += [TracedEdge.from_edge(edge, SAGITTA * size) for hole in holes for edge in hole.reverse_edges()]
+        tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for ring in rings for edge in ring]
+        tracks += [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for hole in holes for edge in hole.reverse_edges()]
         left = _area(rings, size).difference(_unite([area for hole in holes for area in hole.to_polygons(size)], size))
         rings = [_ring(runs, near) for runs in _trace_rings(left, tracks, size)]
     if not rings:
@@ -141,7 +141,7 @@ def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
     shapes = np.array([*map(Polygon, areas), *others])
     wrong = ~is_valid(shapes)
     shapes[wrong] = make_valid(shapes[wrong])
-    return union_all(shapes, grid_size=GRID * size)
+    return union_all(shapes, grid_size=GRID_DISTANCE * size)
 
 
 def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
@@ -153,7 +153,7 @@ def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
 
 
 def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
-    return np.concatenate([TracedEdge.from_edge(edge, SAGITTA * size).corners[:-1] for edge in ring])
+    return np.concatenate([TracedEdge.from_edge(edge, SAGITTA_RTOL * size).corners[:-1] for edge in ring])
 
 
 def _encloses(ring: Sequence[Edge]) -> float:
@@ -187,12 +187,20 @@ def _trace_rings(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Itera
     owner = np.repeat(np.arange(len(tracks)), [len(track.z) - 1 for track in tracks])
     number = np.concatenate([np.arange(len(track.z) - 1) for track in tracks])
     lines = np.stack([xy(starts), xy(ends)], axis=1)
-    sources = _Sources(tracks, starts, ends - starts, owner, number, STRtree(linestrings(lines)), NEAR * GRID * size)
+    sources = _Sources(
+        tracks,
+        starts,
+        ends - starts,
+        owner,
+        number,
+        STRtree(linestrings(lines)),
+        MAX_GRID_DISTANCES * GRID_DISTANCE * size,
+    )
     for part in getattr(orient_polygons(whole), "geoms", [orient_polygons(whole)]):
         for ring in (part.exterior, *part.interiors) if part.geom_type == "Polygon" else ():
             corners = _apart(np.asarray(ring.coords)[:-1] @ np.array([1, 1j]), sources.near)
             away = corners - corners[0]
-            if 0.5 * abs((np.conj(away) * np.roll(away, -1)).imag.sum()) > (SPECK * size) ** 2:
+            if 0.5 * abs((np.conj(away) * np.roll(away, -1)).imag.sum()) > (MIN_HOLE_SIDE * size) ** 2:
                 yield sources.runs(corners)
 
 
@@ -289,12 +297,12 @@ def _meeting(one: _Run, other: _Run) -> _Meeting:
     """
     u, v, a, b = one.last, other.first, one.track, other.track
     step = 1e-4
-    crossing = abs((a.ahead(u).conjugate() * b.ahead(v)).imag) > TANGENT
+    crossing = abs((a.ahead(u).conjugate() * b.ahead(v)).imag) > MIN_CROSSING_ANGLE
     for _ in range(30 if crossing else 0):
         gap = b.locate(v) - a.locate(u)
         p, q = ((track.locate(w + step) - track.locate(w - step)) / (2 * step) for track, w in ((a, u), (b, v)))
         cross = (p.conjugate() * q).imag
-        if abs(cross) < TANGENT * abs(p) * abs(q):
+        if abs(cross) < MIN_CROSSING_ANGLE * abs(p) * abs(q):
             break
         by = (gap.conjugate() * q).imag / cross, (gap.conjugate() * p).imag / cross
         u, v = u + by[0], v + by[1]
@@ -359,7 +367,7 @@ def _as_one(one: Edge, other: Edge, near: float) -> Edge | None:
 
 def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> list[list[Edge]]:
     """Return closed chains of edges with inside corners as a cutter of a radius [m] leaves them."""
-    fine = SAGITTA * min(size, radius)
+    fine = SAGITTA_RTOL * min(size, radius)
     ways: list[TracedEdge] = []
     areas: list[FloatArray] = []
     for ring in rings:
@@ -369,18 +377,18 @@ def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -
             ways.append(beside)
             areas += _bands(track.z, beside.z)
             out, turn = -1j * track.tangents[-1], float(np.angle(following.tangents[0] / track.tangents[-1]))
-            if turn > SMOOTH:  # an outside corner: the cutter turns about it
+            if turn > TANGENT_ANGLE:  # an outside corner: the cutter turns about it
                 start = float(np.angle(out))
                 around = TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, start, start + turn), fine)
                 ways.append(around)
                 areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
-            elif turn < -SMOOTH:  # an inside corner: beside edges shorter than the radius only it is near enough
+            elif turn < -TANGENT_ANGLE:  # an inside corner: beside edges shorter than the radius only it is near enough
                 areas.append(TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
     reach = _unite(areas, size, _area(rings, size))
-    near = NEAR * GRID * size
+    near = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     touched = (_touch_edges(runs, radius, near) for runs in _trace_rings(reach, ways, size))
     closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= near)
-    return [ring for ring in closed if abs(_encloses(ring)) > (SPECK * size) ** 2]
+    return [ring for ring in closed if abs(_encloses(ring)) > (MIN_HOLE_SIDE * size) ** 2]
 
 
 def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iterator[FloatArray]:
@@ -389,7 +397,7 @@ def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iter
 
     along = np.angle(np.diff(edge))
     turned = np.concatenate([[0.0], np.cumsum(np.abs(np.angle(np.exp(1j * np.diff(along)))))])
-    cuts = [*np.searchsorted(turned, np.arange(0.0, turned[-1] + 1e-9, CHUNK)).tolist(), len(edge) - 1]
+    cuts = [*np.searchsorted(turned, np.arange(0.0, turned[-1] + 1e-9, MAX_BAND_TURN)).tolist(), len(edge) - 1]
     for first, last in itertools.pairwise(dict.fromkeys(cuts)):
         band = np.concatenate([edge[first : last + 1], beside[first : last + 1][::-1]])
         if is_valid(Polygon(xy(band))):

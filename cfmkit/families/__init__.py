@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Family
 
-FAMILIES = {
+FAMILY_MODULES = {
     "beam": "cfmkit.families.beam",
     "cam": "cfmkit.families.cam",
     "slider-crank": "cfmkit.families.slider_crank",
@@ -52,7 +52,7 @@ def register(record: Family) -> Family:
     if not isinstance(record, Family):
         raise UsageError(f"a cfmkit.families.base.Family is needed, not {type(record).__name__}")
     fault = entry_point_plugins.fault_of_record(record, needs_interface=False) or _fault_of_name(record)
-    if record.name in FAMILIES:
+    if record.name in FAMILY_MODULES:
         fault = "cfmkit itself has a family of this name"
     elif record.name in {offer.name for offer in entry_point_plugins.offers()}:
         fault = "an installed package has a family of this name"
@@ -78,7 +78,11 @@ def list_registered() -> Mapping[str, Family]:
 
 def names() -> tuple[str, ...]:
     """Return the names of all families, those of other packages last; nothing is imported for it."""
-    return (*FAMILIES, *_REGISTERED_FAMILIES, *entry_point_plugins.usable_names((*FAMILIES, *_REGISTERED_FAMILIES)))
+    return (
+        *FAMILY_MODULES,
+        *_REGISTERED_FAMILIES,
+        *entry_point_plugins.usable_names((*FAMILY_MODULES, *_REGISTERED_FAMILIES)),
+    )
 
 
 def clashing() -> tuple[str, ...]:
@@ -118,14 +122,14 @@ def _with_own_metrics(record: Family) -> Family:
 
 
 def _record(name: str) -> Family:
-    if name in FAMILIES:
-        record: Family = import_module(FAMILIES[name]).FAMILY
+    if name in FAMILY_MODULES:
+        record: Family = import_module(FAMILY_MODULES[name]).FAMILY
         return record
     if name in _REGISTERED_FAMILIES:
         return _REGISTERED_FAMILIES[name]
     for offer in entry_point_plugins.offers():
         if offer.name == name:
-            return entry_point_plugins.record_of(offer, FAMILIES)
+            return entry_point_plugins.record_of(offer, FAMILY_MODULES)
     near = get_close_matches(name, names(), n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
@@ -139,7 +143,7 @@ def examine_families() -> tuple[tuple[entry_point_plugins.InstalledFamily | None
     tuple of (InstalledFamily or None, Family or str)
         Those of this package and of this process come first, without an offer. All others are imported.
     """
-    own = tuple((None, family(name)) for name in (*FAMILIES, *_REGISTERED_FAMILIES))
+    own = tuple((None, family(name)) for name in (*FAMILY_MODULES, *_REGISTERED_FAMILIES))
     return own + tuple((offer, _try_family(offer)) for offer in entry_point_plugins.offers())
 
 
@@ -155,7 +159,7 @@ def list_skipped() -> tuple[str, ...]:
 
 def _try_family(offer: entry_point_plugins.InstalledFamily) -> Family | str:
     try:
-        return entry_point_plugins.record_of(offer, FAMILIES)
+        return entry_point_plugins.record_of(offer, FAMILY_MODULES)
     except Unusable as problem:
         return str(problem)
 
@@ -174,7 +178,7 @@ def origin(name: str) -> dict[str, str]:
 
 
 def _package_of(name: str) -> dict[str, str]:
-    if name in FAMILIES or name in _REGISTERED_FAMILIES:
+    if name in FAMILY_MODULES or name in _REGISTERED_FAMILIES:
         return {}
     offers = entry_point_plugins.offers()
     return next((entry_point_plugins.code_of(offer) for offer in offers if offer.name == name), {})
@@ -182,13 +186,13 @@ def _package_of(name: str) -> dict[str, str]:
 
 def origins() -> dict[str, dict[str, str]]:
     """Return what computes each family of another package or of this process, and metrics of the user."""
-    computed = {one.name: origin(one.name) for one in entry_point_plugins.offers() if one.name not in FAMILIES}
+    computed = {one.name: origin(one.name) for one in entry_point_plugins.offers() if one.name not in FAMILY_MODULES}
     computed |= {name: origin(name) for name in _REGISTERED_FAMILIES}
     return computed | ({"metrics": {"registered": own_metrics.stamp()}} if own_metrics.stamp() else {})
 
 
 __all__ = [
-    "FAMILIES",
+    "FAMILY_MODULES",
     "Unusable",
     "clashing",
     "examine_families",

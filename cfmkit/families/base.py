@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from cfmkit.arrays import LazyMapping
 from cfmkit.errors import CfmError, UsageError
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
-from cfmkit.results import OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
+from cfmkit.results import OVERWRITTEN_FINDING, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
 from cfmkit.specs.own_metrics import own_metrics
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class MeasuredLoop:
     down: FloatArray
 
 
-INTERFACE = 1
+INTERFACE_VERSION = 1
 """Number of this record: changes when a family that was written for it would no longer work."""
 
 
@@ -102,7 +102,7 @@ def _call(name: str, /, *given: Any, **named: Any) -> Any:
     return function_named(name)(*given, **named)
 
 
-_SPELT = "aefhilmnorsx"
+_VOWEL_SOUND_LETTERS = "aefhilmnorsx"
 """Letters whose names begin with a vowel."""
 
 
@@ -116,17 +116,17 @@ def article(word: str) -> str:
     """
     first = word.lower().partition("-")[0]
     if len(first) == 1 or not set(first) & set("aeiouy"):
-        return "an" if first[:1] in tuple(_SPELT) else "a"
+        return "an" if first[:1] in tuple(_VOWEL_SOUND_LETTERS) else "a"
     if first.startswith(("uni", "use", "usu", "eu", "one")):
         return "a"
     return "an" if first[0] in "aeiou" else "a"
 
 
-SHARED = {
+SHARED_FINDINGS = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
     PART_NOT_DRAWN: "the designed part cannot be cut as it is: no drawing is written",
     THIN_WALL: "the part as drawn has walls that are thinner than its process can make",
-    OVERWRITTEN: "the design replaces a stated value with its own",
+    OVERWRITTEN_FINDING: "the design replaces a stated value with its own",
 }
 """Findings that are made of any family's result or design."""
 
@@ -163,7 +163,7 @@ class BoundingBox:
         return *self.drawn, self.depth
 
 
-ENVELOPE = {
+ENVELOPE_METRICS = {
     "envelope_x": ("length", "width of the box that everything stays in over the travel, along x of the drawings"),
     "envelope_y": ("length", "height of the same box, along y of the drawings"),
     "envelope_z": ("length", "depth of the same box, out of the plane, springs included"),
@@ -245,13 +245,15 @@ class Family:
     findings: dict[str, str] = field(default_factory=dict)
     references: tuple[str, ...] = ()  # the papers, in one line each
     bibliography: str = ""  # the same in BibTeX: a file of a package, ``"package/folder/file"``
-    interface: int | None = None  # the `INTERFACE` that a family of another package was written for, as a plain number
+    interface: int | None = (
+        None  # the `INTERFACE_VERSION` that a family of another package was written for, as a plain number
+    )
 
     def __post_init__(self) -> None:
         """Add the findings that every family has, and the values of those that know their box."""
-        object.__setattr__(self, "findings", {**self.findings, **SHARED})
+        object.__setattr__(self, "findings", {**self.findings, **SHARED_FINDINGS})
         if self.part:
-            object.__setattr__(self, "values", {**self.values, **ENVELOPE})
+            object.__setattr__(self, "values", {**self.values, **ENVELOPE_METRICS})
 
     @property
     def bibtex(self) -> str:
@@ -282,7 +284,7 @@ class Family:
 
     def with_envelope(self, result: Result, names: Collection[str]) -> Result:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
-        if ENVELOPE.keys().isdisjoint(names) or not self.part:
+        if ENVELOPE_METRICS.keys().isdisjoint(names) or not self.part:
             return result
         return add_size(result, self.envelope(result))
 
@@ -343,7 +345,7 @@ def add_size(result: Result, space: BoundingBox | None) -> Result:
     reason = (space.assumed if space else "") or "the box is not known"
     found = {
         name: Quantity(value, *about, "" if value is not None else reason)
-        for (name, about), value in zip(ENVELOPE.items(), sides, strict=True)
+        for (name, about), value in zip(ENVELOPE_METRICS.items(), sides, strict=True)
     }
     return replace(result, values=result.values | found)  # type: ignore[operator]
 

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Family
 
-SECTION = "[cfmkit.families]"
+ENTRY_POINT_SECTION = "[cfmkit.families]"
 """What stands above the entry points of the group."""
 
-_INFO = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
+_INFO_PATTERN = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
 """Folders in which an installer says what it has installed."""
 
 
@@ -80,7 +80,7 @@ def _installed_in(folder: str) -> Iterator[tuple[str, str, str]]:
     except OSError:  # not a folder: a zip file, or the hook of an editable install
         return
     for name in names:
-        if name.endswith("-info") and (known := _INFO.fullmatch(name)):
+        if name.endswith("-info") and (known := _INFO_PATTERN.fullmatch(name)):
             package = re.sub(r"[-_.]+", "-", known["package"]).lower()
             yield os.path.join(folder, name), package, known["version"] or ""
 
@@ -93,9 +93,9 @@ def _entries(info: str) -> Iterator[tuple[str, str]]:
     except OSError:
         return
     inside = False
-    for line in map(str.strip, text.splitlines() if SECTION in text else ()):
+    for line in map(str.strip, text.splitlines() if ENTRY_POINT_SECTION in text else ()):
         if line.startswith("["):
-            inside = line == SECTION
+            inside = line == ENTRY_POINT_SECTION
         elif inside and "=" in line and not line.startswith(("#", ";")):
             name, _, target = line.partition("=")
             yield name.strip(), target.partition("[")[0].strip()
@@ -190,11 +190,14 @@ def _fault_of(record: Any, offer: InstalledFamily) -> str:
 
 def fault_of_record(record: Family, needs_interface: bool = True) -> str:
     """Return why a record cannot be used; empty if it can. A record that is made now need not state its interface."""
-    from cfmkit.families.base import INTERFACE, Family, read_packaged
+    from cfmkit.families.base import INTERFACE_VERSION, Family, read_packaged
 
-    if record.interface != INTERFACE and (needs_interface or record.interface is not None):
+    if record.interface != INTERFACE_VERSION and (needs_interface or record.interface is not None):
         made = "does not state its interface" if record.interface is None else f"is for interface {record.interface}"
-        return f"its record {made}, this cfmkit has interface {INTERFACE}; another version of one of them is needed"
+        return (
+            f"its record {made}, this cfmkit has interface {INTERFACE_VERSION}; another version of one "
+            f"of them is needed"
+        )
     for one in fields(Family):
         if not _is_of_kind(getattr(record, one.name), str(one.type)):
             return f"the field {one.name!r} of its record must be of the type {one.type}"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.solid.stress_along_fillets import FilletArc
 
 
-DEFINITIONS = {
+FEM_DEFINITIONS = {
     "mesh_force_difference": (
         "ratio",
         "largest difference of the force on the first two meshes, relative to the largest force",
@@ -60,7 +60,7 @@ def unknown_to_beams() -> dict[str, Quantity]:
     """Return these scalar results without values, for models other than the solid."""
     return {
         name: Quantity(None, *about, "only the model of the part as a solid has it")
-        for name, about in DEFINITIONS.items()
+        for name, about in FEM_DEFINITIONS.items()
     }
 
 
@@ -91,7 +91,7 @@ def largest_concentration(rows: Sequence[FilletRow]) -> dict[str, Quantity]:
     """Return the largest stress concentration of some fillets by its name, without a value where none has one."""
     found = max((row.concentration for row in rows if not math.isnan(row.concentration)), default=None)
     name = "stress_concentration_max"
-    return {name: Quantity(found, *DEFINITIONS[name], "" if found else "beams have no stress at any fillet")}
+    return {name: Quantity(found, *FEM_DEFINITIONS[name], "" if found else "beams have no stress at any fillet")}
 
 
 def number_fillets(rows: Sequence[FilletRow], before: int = 0) -> dict[int, FilletArc]:

@@ -16,7 +16,7 @@ TOO_SOFT = 0.01
 """Share of the energy of bending above which wide beams that are solved as narrow ones are reported."""
 
 
-NARROW = 3.0
+MIN_PLANE_STRESS_RATIO = 3.0
 """Width over thickness up to which plane stress is within about 1 % of a solid in three dimensions (docs/solid.md)."""
 
 
@@ -125,7 +125,7 @@ def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bo
     >>> bracket(10e-3, 1e-3, 0.35, False)
     'the force is between plane stress, as solved, and plane strain, 14 % more (10 mm wide, 1 mm thick)'
     """
-    if not width > NARROW * thickness:
+    if not width > MIN_PLANE_STRESS_RATIO * thickness:
         return ""
     more = percent(1.0 / (1.0 - poisson_ratio**2) - 1.0)
     return (

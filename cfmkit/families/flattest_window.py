@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
 
-PLACES = 400
+N_WINDOWS = 400
 """Windows that are compared, evenly over the curve."""
 
-INSIDE = 1e-6
+WINDOW_EXTENSION_SHARE = 1e-6
 """A window is made longer by this share of its length: to write it down must not make it shorter."""
 
 
@@ -27,11 +27,11 @@ def flattest(result: Result, length: float) -> tuple[float, float] | None:
     curve = result.curve
     motion = np.asarray(curve.motion)
     low, high = float(motion.min()), float(motion.max())
-    length = length * (1.0 + INSIDE)
+    length = length * (1.0 + WINDOW_EXTENSION_SHARE)
     if not high - low >= length:
         return None
-    starts = np.linspace(low, high - length, PLACES)
-    worst = np.zeros(PLACES)
+    starts = np.linspace(low, high - length, N_WINDOWS)
+    worst = np.zeros(N_WINDOWS)
     for branch in curve.branches:
         part = curve.select_branch(branch)
         order = np.argsort(part.motion, kind="stable")

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.stock.material_and_part_spec import Guide
 
-ROUNDS = 60
+MAX_NEWTON_STEPS = 60
 """Newton steps at most; from the force without friction some five are taken, close to jamming more."""
 
 
@@ -64,7 +64,7 @@ class GuideFriction:
         force = still = free + way * self.drag
         if not np.any(self.friction):
             return force
-        for _ in range(ROUNDS):
+        for _ in range(MAX_NEWTON_STEPS):
             sums, slopes = np.zeros_like(force), np.zeros_like(force)
             for sign in (1.0, -1.0):
                 inside = across + sign * self.tilt * force
@@ -78,5 +78,5 @@ class GuideFriction:
         return force
 
 
-FREE = GuideFriction()
+FRICTIONLESS_GUIDE = GuideFriction()
 """A guide that takes nothing."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.specs.units import format_short
-from cfmkit.stock import MATERIALS
+from cfmkit.stock import MATERIALS_BY_NAME
 from cfmkit.stock.joint_strength import eye_that_bears, pin_that_bears, rod_that_guides
 from cfmkit.stock.parts_list import ListedPart
 from cfmkit.stock.stock_series import SOCKET_SCREWS, series_of
@@ -67,7 +67,7 @@ class PartStrength:
         safety = safety_factor if safety_factor > 1.0 else DEFAULT_SAFETY
         allowable = None if material is None else material.allowable(safety)
         if material is None or allowable is None:
-            reference = MATERIALS[DEFAULT_MATERIAL]
+            reference = MATERIALS_BY_NAME[DEFAULT_MATERIAL]
             strength = float(reference.yield_strength or 0.0)
             return cls(reference.name, reference.youngs_modulus, strength / safety, PIN_STRENGTH / safety, True)
         return cls(material.name or material.words, material.modulus, allowable, PIN_STRENGTH / safety, False)

@@ -42,7 +42,7 @@ def refusals_answered(design: Callable[Given, Design]) -> Callable[Given, Design
     """Return a design function whose answer is the reason where it raises `Infeasible` or `CannotBuild`."""
 
     @wraps(design)
-    def answered(*given: Given.args, **named: Given.kwargs) -> Design:
+    def answer(*given: Given.args, **named: Given.kwargs) -> Design:
         try:
             return design(*given, **named)
         except Infeasible as problem:
@@ -50,7 +50,7 @@ def refusals_answered(design: Callable[Given, Design]) -> Callable[Given, Design
         except CannotBuild as problem:
             return no_design(problem.finding)
 
-    return answered
+    return answer
 
 
 def no_result(spec: Spec, found: Finding) -> Result:

@@ -25,20 +25,20 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.beam_states import BeamSections as Sections
     from cfmkit.families.fem_results import FilletRow
 
-NEGLIGIBLE = 0.1
+MIN_STRESS_SHARE = 0.1
 """Nominal stresses below this part of the beams' largest at the same displacement are none: solid and beams differ by
 some hundredths of the largest for other reasons, which would make a third of such a ratio."""
 
-STEPS = 40
+N_PATH_STEPS = 40
 """Of the beams' path beside the requested displacements: as dense as curves are."""
 
-TOGETHER = 1e-6
+STEP_RTOL = 1e-6
 """Steps nearer to a requested displacement than this part of the largest are left out."""
 
-TOLERANCE = 1e-6
+PATH_TOLERANCE = 1e-6
 """Of the beams' path: far below what a mesh is off, and slender leaves reach it where they are pulled straight."""
 
-CHORDS = 0.02
+CHORD_TOLERANCE = 0.02
 """How far a fillet may end from the edge of its beam, in thicknesses: what lines between the places of a curved beam
 are off."""
 
@@ -88,19 +88,19 @@ def both_images(
     from cfmkit.elastica import Control, trace
 
     points = drive(with_steps(travel))
-    path = trace(network, points, Control(tolerance=TOLERANCE))
+    path = trace(network, points, Control(tolerance=PATH_TOLERANCE))
     yield path
     if any(event.kind == "bifurcation" for event in path.events):
-        yield trace(network, points, Control(tolerance=TOLERANCE, sign=-1))
+        yield trace(network, points, Control(tolerance=PATH_TOLERANCE, sign=-1))
 
 
 def with_steps(travel: FloatArray) -> FloatArray:
     """Return some travels of one sign, each once, with steps between them and rest, in the order from rest on."""
     end = float(travel[np.abs(travel).argmax()])
     wanted = np.unique(travel / end)
-    wanted = wanted[np.diff(wanted, prepend=-1.0) > TOGETHER]
-    steps = np.arange(1, STEPS + 1) / STEPS
-    apart = np.abs(steps[:, None] - wanted).min(axis=1) > TOGETHER
+    wanted = wanted[np.diff(wanted, prepend=-1.0) > STEP_RTOL]
+    steps = np.arange(1, N_PATH_STEPS + 1) / N_PATH_STEPS
+    apart = np.abs(steps[:, None] - wanted).min(axis=1) > STEP_RTOL
     return np.asarray(end * np.sort(np.concatenate([wanted, steps[apart]])))
 
 
@@ -141,13 +141,13 @@ class SolvedBeams:
             if (stress := self._evaluate_edge_stress(name, beam, place, point)) is not None
         ]
         worst = max(stresses, key=abs, default=0.0)
-        return worst if abs(worst) > NEGLIGIBLE * float(self.largest[point]) else float("nan")
+        return worst if abs(worst) > MIN_STRESS_SHARE * float(self.largest[point]) else float("nan")
 
     def _point(self, travel: float) -> int | None:
         """Return the point of the path at a travel; None if there is none that is accurate."""
         known = self.path.at_requested
         off = np.abs(self.path.drive[known] - travel)
-        if not len(known) or off.min() > TOGETHER * float(np.abs(self.path.drive).max()):
+        if not len(known) or off.min() > STEP_RTOL * float(np.abs(self.path.drive).max()):
             return None
         point = int(known[off.argmin()])
         return point if self.path.accurate[point] else None
@@ -161,7 +161,7 @@ class SolvedBeams:
         middle = 0.5 * float(found.place[point, k] + found.place[point, k + 1])
         at = found.place[point, k] + share * (found.place[point, k + 1] - found.place[point, k])
         thickness = float(np.real(beam.section.thickness_at(at, middle)))
-        allowed = CHORDS * thickness
+        allowed = CHORD_TOLERANCE * thickness
         if abs(along) > allowed or abs(abs(aside) - 0.5 * thickness) > allowed:
             return None
         bending, axial = (

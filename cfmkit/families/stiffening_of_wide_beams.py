@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-WIDE = "mechanism.wide_beams"
+WIDE_BEAMS_KEY = "mechanism.wide_beams"
 
-WITHIN = 1.002
+BAND_MARGIN = 1.002
 """How far inside its band a force is aimed at: the next solution is that of a part a little wider."""
 
 
@@ -43,7 +43,9 @@ def is_too_wide(request: Request, width: float, thickness: float, strain: float)
 def stiffening(spec: Spec, model: Callable[[Any, Run], Result]) -> float:
     """Return by what share the mean force over the window rises, by a model of beams; 0 if that does not know it."""
     try:
-        means = [_mean(model(spec.replace({WIDE: wide, "requirements": ()}), Run())) for wide in (False, True)]
+        means = [
+            _mean(model(spec.replace({WIDE_BEAMS_KEY: wide, "requirements": ()}), Run())) for wide in (False, True)
+        ]
     except CfmError:
         return 0.0
     narrow, wide = means
@@ -53,7 +55,7 @@ def stiffening(spec: Spec, model: Callable[[Any, Run], Result]) -> float:
 def aim_below_stiffening(spec: Spec, request: Request, model: Callable[[Any, Run], Result]) -> Request:
     """Return a request whose force is in the band without and with the stiffening of a part, or as near as can be."""
     share = stiffening(spec, model)
-    lowest, highest = WITHIN * request.low, request.high / (WITHIN * (1.0 + share))
+    lowest, highest = BAND_MARGIN * request.low, request.high / (BAND_MARGIN * (1.0 + share))
     return replace(request, target=max(min(request.target / (1.0 + 0.5 * share), highest), lowest))
 
 

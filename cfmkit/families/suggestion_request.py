@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.processes import METAL
+from cfmkit.stock.processes import MIN_METAL_MODULUS
 
 if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
@@ -21,7 +21,7 @@ MaterialBlock = Mapping[str, Any]
 Springs = Literal["catalogue", "custom"]
 """Springs as they are sold, or made to a wire, a coil and a number of turns."""
 
-RESERVED = 0.8
+STRENGTH_SHARE = 0.8
 """Share of the strength that is used where made parts have to be good: sources scatter moduli by 10 % and more."""
 
 ASSUMED_STRAINS = {"plastic": (0.015, 0.04), "metal": (0.003, 0.006)}
@@ -65,7 +65,7 @@ class Request:
     @property
     def strength_used(self) -> float:
         """The share of the strength that designs may use: made parts are thicker and stiffer than drawn."""
-        return self.reserve * (1.0 if self.good_parts is None else RESERVED) / self.safety
+        return self.reserve * (1.0 if self.good_parts is None else STRENGTH_SHARE) / self.safety
 
     @property
     def with_strengths(self) -> tuple[Request, ...]:
@@ -84,7 +84,7 @@ def _with_strengths(block: MaterialBlock) -> tuple[MaterialBlock, MaterialBlock]
     material = MaterialSpec.model_validate(dict(block))
     if material.yield_strength is not None:
         return block, block
-    low, high = ASSUMED_STRAINS["metal" if material.modulus > METAL else "plastic"]
+    low, high = ASSUMED_STRAINS["metal" if material.modulus > MIN_METAL_MODULUS else "plastic"]
     return {**block, "yield_strength": low * material.modulus}, {**block, "yield_strength": high * material.modulus}
 
 

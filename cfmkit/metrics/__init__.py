@@ -9,7 +9,7 @@ from cfmkit.metrics.branch_views import Branch, MeasuringFrame
 from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window, restrict, traces
 from cfmkit.metrics.definition import Definition
 from cfmkit.metrics.metric_definitions import (
-    TABLE,
+    METRIC_TABLE,
     definition_of,
     definitions,
     known_metrics,
@@ -36,7 +36,7 @@ from cfmkit.metrics.requirements import Outcome, check, requirement_problems, va
 from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 __all__ = [
-    "TABLE",
+    "METRIC_TABLE",
     "Branch",
     "BranchTrace",
     "Cycle",

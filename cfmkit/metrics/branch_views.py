@@ -14,8 +14,8 @@ import numpy as np
 
 from cfmkit.metrics import continuous_means_and_extremes, winding_branches
 from cfmkit.metrics.branches_cut_to_window import (
-    ROUNDING,
-    TOLERANCE,
+    BAND_RTOL,
+    WINDOW_RTOL,
     BranchTrace,
     Undefined,
     Window,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-ZERO = 1e-9
+ZERO_EFFORT_SHARE = 1e-9
 """An effort at the reference below this share of the largest is rounding: a band in per cent of it has no width."""
 
 STATED_ERROR = 1e-12
@@ -185,12 +185,12 @@ class Branch:
         effort = part.effort.copy()
         effort[ends] = model.effort(self.name, part.motion[ends])
 
-        def at_ends(stress: FloatArray) -> FloatArray:
+        def replace_ends(stress: FloatArray) -> FloatArray:
             stress = stress.copy()
             stress[ends] = model.stress(self.name, part.motion[ends])
             return stress
 
-        return replace(part, effort=effort, read_stress=part.changed_stress(at_ends))
+        return replace(part, effort=effort, read_stress=part.changed_stress(replace_ends))
 
     def _apply_stated_ends(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends have effort and stress of the points that the model has there, if it has some."""
@@ -198,20 +198,20 @@ class Branch:
         if stated is None:
             return part
         effort, known = part.effort.copy(), dict[int, int]()
-        slack = TOLERANCE * (part.extent[1] - part.extent[0])
+        slack = WINDOW_RTOL * (part.extent[1] - part.extent[0])
         for end in (0, -1):
             there = np.flatnonzero((np.abs(stated.motion - part.motion[end]) <= slack) & (stated.branch == self.name))
             if len(there) == 1 and not (self.trace.motion == part.motion[end]).any():
                 known[end] = int(there[0])
         effort[list(known)] = stated.effort[list(known.values())]
 
-        def at_ends(stress: FloatArray) -> FloatArray:
+        def replace_ends(stress: FloatArray) -> FloatArray:
             if "max_stress" in stated.extra:
                 stress = stress.copy()
                 stress[list(known)] = stated.extra["max_stress"].values[list(known.values())]
             return stress
 
-        return replace(part, effort=effort, read_stress=part.changed_stress(at_ends))
+        return replace(part, effort=effort, read_stress=part.changed_stress(replace_ends))
 
     @cached_property
     def beside(self) -> tuple[BranchTrace, ...]:
@@ -249,7 +249,7 @@ class Branch:
             )
             motion, chosen = np.unique(motion, return_index=True)
             motion, values = motion[np.isfinite(values[chosen])], values[chosen][np.isfinite(values[chosen])]
-        uneven = bool(between.any()) and len(peaks) < continuous_means_and_extremes.FEW
+        uneven = bool(between.any()) and len(peaks) < continuous_means_and_extremes.FEW_SAMPLES
         top, bottom = continuous_means_and_extremes.extremes(function, motion[None, :], values[None, :], uneven)
         return float(top[0]), float(bottom[0])
 
@@ -344,7 +344,7 @@ class Branch:
         here = self.evaluate(place)
         if model is not None:  # an interpolated value may hide that there is no effort
             here = float(model.effort(self.name, np.array([place]))[0])
-        if abs(here) <= max(self.error, ZERO * float(np.nanmax(np.abs(self.function.effort)))):
+        if abs(here) <= max(self.error, ZERO_EFFORT_SHARE * float(np.nanmax(np.abs(self.function.effort)))):
             raise Undefined(f"the {self.kind} at the reference pose is zero within its numerical error")
         return here
 
@@ -378,7 +378,7 @@ class Branch:
         if (allowed := self.frame.allowable_stress) is not None:
 
             def excess(at: FloatArray, _rows: object) -> FloatArray:
-                return np.asarray(model.stress(self.name, at) / allowed - (1 + ROUNDING))
+                return np.asarray(model.stress(self.name, at) / allowed - (1 + BAND_RTOL))
 
         ends, pose = (np.array([low]), np.array([high])), np.array([self.reference])
         return ManyBranches(places, exact(places), *ends, exact, excess, pose)

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
 
-TOLERANCE = 1e-9
+WINDOW_RTOL = 1e-9
 """How far a sample may miss an end of the window and still count as on it, as a fraction of the window."""
 
-ROUNDING = 1e-12
+BAND_RTOL = 1e-12
 """A force on the edge of a band is inside it, whatever the last bits of the division say."""
 
 
@@ -119,19 +119,19 @@ def _trace(curve: Curve, name: str, where: slice | NDArray[np.intp]) -> BranchTr
 
 def covers(extent: tuple[float, float], window: Window) -> bool:
     """Return whether data from `extent[0]` to `extent[1]` reach both ends of the window."""
-    slack = TOLERANCE * (window.hi - window.lo)
+    slack = WINDOW_RTOL * (window.hi - window.lo)
     return extent[0] <= window.lo + slack and extent[1] >= window.hi - slack
 
 
 def find_between_ends(places: FloatArray, low: float, high: float) -> NDArray[np.bool_]:
     """Return which places lie between the ends of a window and are none of these, but for rounding."""
-    slack = TOLERANCE * (high - low)
+    slack = WINDOW_RTOL * (high - low)
     return (places > low + slack) & (places < high - slack)
 
 
 def restrict(trace: BranchTrace, window: Window) -> BranchTrace:
     """Return the part of a branch inside the window, with interpolated ends; the caller checks `covers`."""
-    slack = TOLERANCE * (window.hi - window.lo)
+    slack = WINDOW_RTOL * (window.hi - window.lo)
     if trace.extent[0] >= window.lo - slack and trace.extent[1] <= window.hi + slack:
         return trace
     return _straight(trace, window, slack) if trace.way else _cut_folded(trace, window, slack)

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     Measure = tuple[Callable[["Difference"], float], str]
     Metrics = Mapping[str, Mapping[str, Any]]
 
-PLACES = 1001
+N_COMPARED_PLACES = 1001
 """Where two curves are compared: so many places, evenly over the motion that they have in common."""
 
-TOLERANCE = 1e-6
+COMPARISON_RTOL = 1e-6
 """Relative change that is none: other versions of the libraries round in the last digits, and searches stop there."""
 
 NO_CHANGE = 1e-9
@@ -134,7 +134,7 @@ class Differences:
 
 
 def compare(
-    reference: Compared, other: Compared, over: Window | None = None, tolerance: float = TOLERANCE
+    reference: Compared, other: Compared, over: Window | None = None, tolerance: float = COMPARISON_RTOL
 ) -> Differences:
     """Return what something has more than its reference: its curve inside a window, and its metrics.
 
@@ -155,7 +155,7 @@ def compare(
     window = overlap([(float(part.motion.min()), float(part.motion.max())) for part in parts], over)
     if window is None:
         return Differences({"": Difference(nothing, "they have no travel in common")}, nothing, None, changes)
-    places = np.linspace(window.lo, window.hi, PLACES)
+    places = np.linspace(window.lo, window.hi, N_COMPARED_PLACES)
     curves = {name: _difference_between((fine, name), (coarse, its), places) for name, its in pairs.items()}
     return Differences(curves, places, window, changes)
 

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 """Of each step between two places: polynomials of degree seven are integrated exactly."""
 
 
-FEW = 100
+FEW_SAMPLES = 100
 """Samples below which a parabola through three of them is no more than a first guess."""
 
-ROUNDS, BESIDE = 3, np.array([-0.08, 0.0, 0.08])
+N_PARABOLAS, VERTEX_OFFSETS = 3, np.array([-0.08, 0.0, 0.08])
 """Parabolas for few samples, and where the model is asked next to the vertex, as shares of the way between the outer
 points. Vertices alone draw nearer from one side only, slowly where a curve is skew; with a place on either side the
 way is a sixth as long after each round: of a cam at 31 points the last extreme is right to 2e-8 of the force.
@@ -48,8 +48,8 @@ def mean(function: Callable[[FloatArray], FloatArray], places: FloatArray, low: 
     """
     ends = places_inside(places, low, high)
     middle, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
-    values = function(middle[:, None] + half[:, None] * _NODES)
-    return float((half * (values @ _WEIGHTS)).sum() / (high - low))
+    values = function(middle[:, None] + half[:, None] * _GAUSS_NODES)
+    return float((half * (values @ _GAUSS_WEIGHTS)).sum() / (high - low))
 
 
 def mean_of_rows(
@@ -58,8 +58,8 @@ def mean_of_rows(
     """Return `mean` of each row, (d,): of functions (d, m) -> (d, m) with places (d, n) and windows (d,)."""
     ends = np.hstack([low[:, None], np.clip(places, low[:, None], high[:, None]), high[:, None]])
     middle, half = 0.5 * (ends[:, 1:] + ends[:, :-1]), 0.5 * (ends[:, 1:] - ends[:, :-1])
-    at = (middle[..., None] + half[..., None] * _NODES).reshape(len(low), -1)
-    values = np.where(half > 0, function(at).reshape(*half.shape, -1) @ _WEIGHTS, 0.0)
+    at = (middle[..., None] + half[..., None] * _GAUSS_NODES).reshape(len(low), -1)
+    values = np.where(half > 0, function(at).reshape(*half.shape, -1) @ _GAUSS_WEIGHTS, 0.0)
     return np.asarray((half * values).sum(axis=1) / (high - low))
 
 
@@ -101,8 +101,8 @@ def extremes(
     rows = np.arange(len(effort))[:, None, None]
     x, y = np.broadcast_to(motion, effort.shape)[rows, near], sign[:, None] * effort[rows, near]
     best = sign * effort[rows[..., 0], highest]
-    few = (end < FEW) | uneven
-    rounds, beside = (ROUNDS, BESIDE) if few.any() else (1, np.zeros(1))
+    few = (end < FEW_SAMPLES) | uneven
+    rounds, beside = (N_PARABOLAS, VERTEX_OFFSETS) if few.any() else (1, np.zeros(1))
     beside = np.where(few[:, None, None], beside, 0.0)
     for number in range(rounds):
         places = _next(x, y, beside)

@@ -22,7 +22,7 @@ import numpy as np
 
 from cfmkit.metrics.branches_cut_to_window import Undefined
 
-FIRST = 1e-9
+FIRST_TIME = 1e-9
 """In place of a first point at 0, which log t does not have [s]: so early that most of the fall to the next point is
 over long before that one, where the force is hardly more than at it, which is conservative."""
 
@@ -99,7 +99,7 @@ class RelaxationLaw:
             raise Undefined(f"the points of the relaxation end at {hold_text(float(times[-1]))}")
         if time <= times[0]:
             return 1.0
-        return float(np.interp(math.log(time), np.log(np.maximum(times, FIRST)), moduli) / moduli[0])
+        return float(np.interp(math.log(time), np.log(np.maximum(times, FIRST_TIME)), moduli) / moduli[0])
 
 
 @dataclass(frozen=True)

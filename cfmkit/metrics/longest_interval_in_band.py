@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
     Levels = list[tuple[FloatArray, FloatArray]]
 
-ZOOMS, CLOSER, AROUND = 11, 4.0, np.linspace(-2.0, 2.0, 17)
+N_ZOOMS, ZOOM_FACTOR, ZOOM_STEPS = 11, 4.0, np.linspace(-2.0, 2.0, 17)
 """How often it is looked more closely, how much more each time, and where around a place, in steps."""
 
-WHOLE = 4
+N_WHOLE_ZOOMS = 4
 """The first looks, which keep the samples elsewhere: of two windows of nearly one length the other may be longer."""
 
-LOOKS, FINE, FINER = 6, np.linspace(-2.0, 2.0, 65), 16.0
+N_MODEL_ZOOMS, MODEL_ZOOM_STEPS, MODEL_ZOOM_FACTOR = 6, np.linspace(-2.0, 2.0, 65), 16.0
 """The same where a call of the model is what takes the time: more places in half as many calls."""
 
 
@@ -51,9 +51,9 @@ def extremes(
         Within which it is looked for.
     """
     (low, high), rows = span, np.arange(len(place))
-    for _ in range(LOOKS):
-        near = np.clip(place[:, None] + FINE * step, low[:, None], high[:, None])
-        place, step = near[rows, function(near).argmax(axis=1)], step / FINER
+    for _ in range(N_MODEL_ZOOMS):
+        near = np.clip(place[:, None] + MODEL_ZOOM_STEPS * step, low[:, None], high[:, None])
+        place, step = near[rows, function(near).argmax(axis=1)], step / MODEL_ZOOM_FACTOR
     return place
 
 
@@ -104,20 +104,20 @@ def flat_window(
     force = np.where(np.isfinite(force), force, -1.0)
     step = np.diff(places, axis=1).max(axis=1)
     low, high = places[:, :1].copy(), places[:, -1:].copy()
-    for zoom in range(ZOOMS + 1):
+    for zoom in range(N_ZOOMS + 1):
         start, end, top, bottom = _longest(places, force, flatness)
-        if zoom == ZOOMS:
+        if zoom == N_ZOOMS:
             break
         centres = np.stack([start, end, top, bottom], axis=1)
-        more = (centres[:, :, None] + AROUND * step[:, None, None]).reshape(len(force), -1)
+        more = (centres[:, :, None] + ZOOM_STEPS * step[:, None, None]).reshape(len(force), -1)
         more = np.clip(np.where(np.isfinite(more), more, low), low, high)
         known = force_at(more)
         known = np.where(np.isfinite(known), known, -1.0)
-        whole = zoom < WHOLE
+        whole = zoom < N_WHOLE_ZOOMS
         places, force = (np.hstack([places, more]), np.hstack([force, known])) if whole else (more, known)
         order = np.argsort(places, axis=1, kind="stable")
         places, force = np.take_along_axis(places, order, 1), np.take_along_axis(force, order, 1)
-        step = step / CLOSER
+        step = step / ZOOM_FACTOR
     return start, end
 
 

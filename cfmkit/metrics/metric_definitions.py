@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
 
 
-TABLE = (*window_metrics.IN_WINDOW, *ranges.TRAVELS, *window_metrics.LOADS, *window_metrics.LONG_TERM)
+METRIC_TABLE = (*window_metrics.IN_WINDOW, *ranges.TRAVELS, *window_metrics.LOADS, *window_metrics.LONG_TERM)
 """Every metric of the contract, in the order in which they are shown."""
 
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.of(kind), name=_name_in_words(item.name, kind)) for item in TABLE)
+    return tuple(replace(item.of(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
 
 
 def _name_in_words(name: str, kind: Kind) -> str:
@@ -90,7 +90,7 @@ def words(name: str) -> str:
     """
     metric, rest = split_name(name)
     after_kind = metric.partition("_")[2]
-    argument = any(one.argument and one.name.partition("_")[2] == after_kind for one in TABLE)
+    argument = any(one.argument and one.name.partition("_")[2] == after_kind for one in METRIC_TABLE)
     return metric.replace("_", " ") + (f" {'' if argument else 'on '}{rest}" if rest else "")
 
 
@@ -106,7 +106,9 @@ def unknown_metric(name: str, known: Iterable[str]) -> str:
     return f"there is no metric {name!r}; {hint}"
 
 
-_OTHER = {item.name: f"torque_{item.name.removeprefix('force_')}" for item in TABLE if item.name.startswith("force_")}
+_TORQUE_NAMES = {
+    item.name: f"torque_{item.name.removeprefix('force_')}" for item in METRIC_TABLE if item.name.startswith("force_")
+}
 
 
 @lru_cache(maxsize=32)
@@ -127,7 +129,7 @@ def known_metrics(kind: Kind | None, extra: tuple[Definition, ...] = ()) -> tupl
 def _others(listed: tuple[Definition, ...]) -> Iterator[Definition]:
     """Yield the metrics of torques under the names of forces, where those do not mean the same already."""
     taken = {(item.name, item.dimension) for item in listed}
-    names = {torque: force for force, torque in _OTHER.items()}
+    names = {torque: force for force, torque in _TORQUE_NAMES.items()}
     for item in listed:
         force = names.get(item.name)
         if force is not None and item.function is not None and (force, item.dimension) not in taken:
@@ -149,7 +151,7 @@ def other_name(name: str) -> str:
     ('torque_mean[load]', 'half_band')
     """
     plain, bracket, branch = name.partition("[")
-    return _OTHER.get(plain, plain) + bracket + branch
+    return _TORQUE_NAMES.get(plain, plain) + bracket + branch
 
 
 def definition_of(name: str, known: Mapping[str, Definition], branches: Sequence[str] = ()) -> Definition:

@@ -14,11 +14,11 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.metrics import ranges_many
-from cfmkit.metrics.branch_views import ZERO
-from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
-from cfmkit.metrics.continuous_means_and_extremes import FEW, extremes, mean_of_rows
+from cfmkit.metrics.branch_views import ZERO_EFFORT_SHARE
+from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, WINDOW_RTOL
+from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, mean_of_rows
 from cfmkit.metrics.metric_definitions import definitions
-from cfmkit.metrics.ranges_many import RANGES, ManyBranches
+from cfmkit.metrics.ranges_many import RANGE_FUNCTIONS, ManyBranches
 from cfmkit.metrics.spread import ManyWindows, static_balance
 from cfmkit.metrics.window_metrics import NO_STRESS
 
@@ -173,7 +173,7 @@ class RowsInWindow:
     def covered(self) -> NDArray[np.bool_]:
         """Which curves reach both ends."""
         (first, last), (low, high) = self.curves.extent, self.ends
-        slack = TOLERANCE * (high - low)
+        slack = WINDOW_RTOL * (high - low)
         return (first <= low + slack) & (last >= high - slack)
 
     @property
@@ -198,7 +198,7 @@ class RowsInWindow:
             return self.curves.samples
         low, high = self._cut
         at_ends = self.curves.all_at(np.stack([low, high], axis=1))
-        return self.curves.samples.with_ends((low, high), at_ends, TOLERANCE * (high - low))
+        return self.curves.samples.with_ends((low, high), at_ends, WINDOW_RTOL * (high - low))
 
     @cached_property
     def _peaks(self) -> tuple[FloatArray, FloatArray]:
@@ -213,7 +213,7 @@ class RowsInWindow:
     def _uneven(self) -> NDArray[np.bool_]:
         curves, places = self.curves, self._peaks[0]
         count = np.isfinite(curves.dense if curves.peaks is None else curves.peaks).sum(axis=1)
-        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (count < FEW))
+        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (count < FEW_SAMPLES))
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
         known = self.inside.merge(*self._peaks) if self._peaks[0].shape[1] else self.inside
@@ -235,7 +235,7 @@ class RowsInWindow:
 
             def excess(at: FloatArray, rows: Any) -> FloatArray:
                 allowable = stress.allowable[rows, None]
-                share = stress.at(at, rows) / allowable - (1 + ROUNDING)
+                share = stress.at(at, rows) / allowable - (1 + BAND_RTOL)
                 return np.where(np.isfinite(allowable), share, -np.inf)
 
         ends, error = self.ends, curves.error
@@ -262,7 +262,7 @@ class RowsInWindow:
             return np.full(len(low), np.nan)
         if stress.largest is not None:
             return stress.largest(low, high)
-        slack, ends = TOLERANCE * (high - low), np.stack([low, high], axis=1)
+        slack, ends = WINDOW_RTOL * (high - low), np.stack([low, high], axis=1)
         points, *beside = stress.samples
         at_point = (np.abs(points.motion[:, :, None] - ends[:, None]) <= slack[:, None, None]).any(axis=1)
         own = np.stack([_value_at(points, end) for end in (low, high)], axis=1)
@@ -287,14 +287,14 @@ class RowsInWindow:
     def range_of(self, name: str) -> FloatArray:
         """Return one of `RANGES`."""
         (first, last), many = self.curves.extent, self.branches
-        slack = TOLERANCE * (last - first)
+        slack = WINDOW_RTOL * (last - first)
         place = many.high if name.startswith("range_95") else many.reference
         reached = (place >= first - slack) & (place <= last + slack)
-        found = RANGES[name](many)
+        found = RANGE_FUNCTIONS[name](many)
         if not name.startswith("range_95"):
             here = np.abs(many.interpolate(many.reference[:, None])[:, 0])
             largest = np.nanmax(np.abs(self.curves.samples.values), axis=1)
-            reached &= here > np.maximum(self.curves.error, ZERO * largest)
+            reached &= here > np.maximum(self.curves.error, ZERO_EFFORT_SHARE * largest)
         return np.where(reached, found, np.nan)
 
     def rms_to_target(self) -> FloatArray:
@@ -354,7 +354,7 @@ def _loop_area(branches: Mapping[str, RowsInWindow]) -> FloatArray:
     return np.where(load.covered & unload.covered, load.many.work - unload.many.work, np.nan)
 
 
-CYCLE: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] = {
+CYCLE_METRICS: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] = {
     "usable_stroke": _usable_stroke,
     "usable_start": lambda branches: _usable(branches)[0],
     "usable_end": lambda branches: _usable(branches)[1],
@@ -385,11 +385,11 @@ def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mappi
     """
     kind = next(iter(branches.values())).curves.kind
     with np.errstate(all="ignore"):
-        if name in CYCLE:
-            return {"": CYCLE[name](branches)}
+        if name in CYCLE_METRICS:
+            return {"": CYCLE_METRICS[name](branches)}
         if name == "hysteresis_area":
             return {"": _loop_area(branches)}
-        if name in RANGES:
+        if name in RANGE_FUNCTIONS:
             return {branch: one.range_of(name) for branch, one in branches.items()}
         function = _functions(kind).get(name)
         if function is not None:

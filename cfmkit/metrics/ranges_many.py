@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.branches_cut_to_window import ROUNDING
+from cfmkit.metrics.branches_cut_to_window import BAND_RTOL
 from cfmkit.numerics.where_condition_ends import last_places
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def _rise(many: ManyBranches) -> tuple[FloatArray, NDArray[np.intp], Pair, Pair]
     motion, effort, rows = many.motion, many.effort, np.arange(len(many.motion))
     nominal = many.interpolate(many.high[:, None])[:, 0]
     before = (motion < many.high[:, None]).sum(axis=1)
-    reached = (effort / nominal[:, None] >= 0.95 - ROUNDING) & (np.arange(motion.shape[1]) < before[:, None])
+    reached = (effort / nominal[:, None] >= 0.95 - BAND_RTOL) & (np.arange(motion.shape[1]) < before[:, None])
     first = np.where(reached.any(axis=1), reached.argmax(axis=1), before)
     sample, earlier = np.minimum(first, motion.shape[1] - 1), np.maximum(first - 1, 0)
     place = np.where(first < before, motion[rows, sample], many.high)
@@ -143,7 +143,7 @@ def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
     motion, place = many.motion, many.reference
     here = many.interpolate(place[:, None])[:, 0]
     offset = many.effort / here[:, None] - 1
-    outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
+    outside = ~(np.abs(offset) <= tolerance * (1 + BAND_RTOL))
     index = (motion < place[:, None]).sum(axis=1)
     samples = np.arange(motion.shape[1])
     left, right = outside & (samples < index[:, None]), outside & (samples >= index[:, None])
@@ -185,14 +185,14 @@ def _solve_ends(many: ManyBranches, with_rise: bool = True, with_bands: bool = T
     start, stop = (start, stop) if with_rise else (start, start)
     here, inside, outside, ends = _bands(many)
     outside = outside if with_bands else inside
-    widths, effort = np.repeat(list(BAND_RANGES.values()), 2) * (1 + ROUNDING), many.exact
+    widths, effort = np.repeat(list(BAND_RANGES.values()), 2) * (1 + BAND_RTOL), many.exact
     if effort is None:
         raise ValueError("the branches are not known at every place")
 
     def excess(at: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
         rows, which = np.divmod(ends, 1 + len(widths))
         found, of_band = effort(at, rows), which > 0
-        risen = found / nominal[rows, None] - (0.95 - ROUNDING)
+        risen = found / nominal[rows, None] - (0.95 - BAND_RTOL)
         away = np.abs(found / here[rows] - 1) - widths[which - 1][:, None]
         # Where there is no effort, 95 % are not reached, and it is outside every band.
         return np.where(of_band[:, None], away, np.where(np.isnan(risen), -np.inf, risen))
@@ -212,7 +212,7 @@ def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
     index, samples = (motion < place[:, None]).sum(axis=1)[:, None], np.arange(motion.shape[1])
     inside, outside, ends = [], [], []
     for tolerance in BAND_RANGES.values():
-        bad = ~(offset <= tolerance * (1 + ROUNDING))
+        bad = ~(offset <= tolerance * (1 + BAND_RTOL))
         for there, inward in ((bad & (samples < index), 1), (bad & (samples >= index), -1)):
             worst = last - there[:, ::-1].argmax(axis=1) if inward > 0 else there.argmax(axis=1)
             worst = worst[:, None]
@@ -253,11 +253,11 @@ def usable_interval(
     else:  # the last place itself, but for rounding, is no limit
         until = np.where(until < last - 1e-9 * (last - motion[:, 0]), until, np.inf)
     if all(branch.exact is not None for branch in branches):
-        return _solved_interval(branches, target, band * (1 + ROUNDING), (valid, until))
+        return _solved_interval(branches, target, band * (1 + BAND_RTOL), (valid, until))
     # What is usable of each step between two samples, and whether a new interval begins there.
     steps = _Steps(motion[:, :-1].copy(), motion[:, 1:].copy(), np.zeros(motion[:, 1:].shape, dtype=bool))
     steps.begins[:, 0] = True
-    width = band * (1 + ROUNDING)
+    width = band * (1 + BAND_RTOL)
     for branch in branches:
         ratio = branch.effort / target[:, None] - 1
         for height in (ratio - width, -width - ratio):
@@ -371,7 +371,7 @@ def _narrow(motion: FloatArray, height: FloatArray, steps: _Steps) -> None:
 
 
 BAND_RANGES = {"band_range_05pct": 0.005, "band_range_1pct": 0.01, "band_range_5pct": 0.05}
-RANGES: dict[str, Callable[[ManyBranches], FloatArray]] = {
+RANGE_FUNCTIONS: dict[str, Callable[[ManyBranches], FloatArray]] = {
     "range_95": range_95,
     "range_95_fraction": range_95_fraction,
     "band_range_05pct": lambda many: band_range(many, BAND_RANGES["band_range_05pct"]),

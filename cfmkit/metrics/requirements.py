@@ -21,7 +21,15 @@ from cfmkit.metrics.metric_definitions import (
 )
 from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
-from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, meant_as_percent, read_one_of, to_border
+from cfmkit.specs.units import (
+    DIMENSIONS_BY_NAME,
+    SHARE_DIMENSION,
+    border_unit,
+    format_short,
+    meant_as_percent,
+    read_one_of,
+    to_border,
+)
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
@@ -37,7 +45,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Requirement, Spec
 
 
-ROUNDING = 1e-9
+BOUND_RTOL = 1e-9
 """A value on its bound is within it, whatever the conversion of units does to the last bits (relative)."""
 
 
@@ -74,8 +82,8 @@ class Bounds:
 
     def met_by(self, values: FloatArray) -> NDArray[np.bool_]:
         """Return which of many values keep both bounds; NaN does not."""
-        high = np.inf if self.max is None else self.max + ROUNDING * abs(self.max)
-        low = -np.inf if self.min is None else self.min - ROUNDING * abs(self.min)
+        high = np.inf if self.max is None else self.max + BOUND_RTOL * abs(self.max)
+        low = -np.inf if self.min is None else self.min - BOUND_RTOL * abs(self.min)
         return np.asarray((values <= high) & (values >= low))
 
     def margin(self, item: Value) -> float:
@@ -90,7 +98,10 @@ class Bounds:
         name = words(metric)
         if item.value is None:
             return f"{name}{over}: no value ({item.reason}), {self.text}: missed"
-        return f"{name} {self.format_value(item.value)}{over}, {self.text}: {'ok' if self.is_met(item.value) else 'missed'}"
+        return (
+            f"{name} {self.format_value(item.value)}{over}, {self.text}: "
+            f"{'ok' if self.is_met(item.value) else 'missed'}"
+        )
 
     def format_value(self, value: float) -> str:
         """Return a value rounded for reading, but never so far that it seems to be on the other side of a bound."""
@@ -103,7 +114,7 @@ class Bounds:
         return format_short(value, self.dimension, digits)
 
 
-_MOTION = {"force": "length", "torque": "angle"}
+_MOTION_DIMENSIONS = {"force": "length", "torque": "angle"}
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,7 +141,7 @@ class Outcome(ShortRepr):
     def as_json(self) -> dict[str, Any]:
         """Return a JSON-ready record in border units."""
         numbers = {key: self._border(getattr(self, key), self.dimension) for key in ("value", "min", "max")}
-        motion = _MOTION[self.kind]
+        motion = _MOTION_DIMENSIONS[self.kind]
         over = None if self.over is None else [self._border(end, motion) for end in self.over]
         window = {"over": over, "over_unit": None if over is None else border_unit(motion)}
         return {"metric": self.metric, **numbers, "unit": self.unit, **window, "ok": self.ok, "sentence": self.sentence}
@@ -232,11 +243,13 @@ def _window_faults(over: tuple[float, float], meant: Definition, kind: Kind | No
     if meant.scope == "value":
         yield "over", f"{meant.name!r} is not measured over a window; remove 'over'"
         return
-    given = {getattr(end, "dimension", _MOTION.get(kind or "", "length")) for end in over} - {SHARE}
+    given = {getattr(end, "dimension", _MOTION_DIMENSIONS.get(kind or "", "length")) for end in over} - {
+        SHARE_DIMENSION
+    }
     if len(given) > 1:
         yield "over", "one end is a length and the other an angle"
-    elif kind is not None and given - {_MOTION[kind]}:
-        right, wrong = DIMENSIONS[_MOTION[kind]].phrase, DIMENSIONS[given.pop()].phrase
+    elif kind is not None and given - {_MOTION_DIMENSIONS[kind]}:
+        right, wrong = DIMENSIONS_BY_NAME[_MOTION_DIMENSIONS[kind]].phrase, DIMENSIONS_BY_NAME[given.pop()].phrase
         yield "over", f"the curve is a {kind} curve: its window is {right}, not {wrong}"
 
 

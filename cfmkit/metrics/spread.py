@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Pair = tuple[FloatArray, FloatArray]
 
 
-ROUNDED = 1e-13
+MEAN_RTOL = 1e-13
 """A mean that is smaller than this part of the largest effort is rounding: sums of 10 000 points stay below it."""
 
 
@@ -42,11 +42,11 @@ class Spread(NamedTuple):
     def from_extremes(cls, mean: Number, largest: Number, smallest: Number, error: Number = 0.0) -> Spread:
         """Return the spread of efforts with this mean, these extremes and this numerical error."""
         if isinstance(mean, float):
-            mean = 0.0 if abs(mean) <= max(ROUNDED * max(abs(largest), abs(smallest)), error) else mean
+            mean = 0.0 if abs(mean) <= max(MEAN_RTOL * max(abs(largest), abs(smallest)), error) else mean
             down = (mean or largest + smallest) < 0
             high, low = (-smallest, -largest) if down else (largest, smallest)
             return cls(abs(mean), high, low, -1.0 if down else 1.0, error)
-        rounding = np.maximum(ROUNDED * np.maximum(np.abs(largest), np.abs(smallest)), error)
+        rounding = np.maximum(MEAN_RTOL * np.maximum(np.abs(largest), np.abs(smallest)), error)
         mean = np.where(np.abs(mean) <= rounding, 0.0, mean)
         down = np.where(mean == 0, largest + smallest, mean) < 0
         high, low = np.where(down, -smallest, largest), np.where(down, -largest, smallest)

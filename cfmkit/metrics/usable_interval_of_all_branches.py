@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.metrics import ranges_many, winding_branches
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
-from cfmkit.metrics.branches_cut_to_window import ROUNDING, BranchTrace, Undefined, Window, traces
+from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, BranchTrace, Undefined, Window, traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -141,12 +141,12 @@ def _bad(branch: Branch, reference: float, curve: TargetCurve | None) -> list[In
     if frame.winding is not None:
         return _bad_on_way(frame.winding, frame, reference, curve)
     ratio = trace.effort / reference - 1
-    band = frame.band * (1 + ROUNDING)
+    band = frame.band * (1 + BAND_RTOL)
     # two one-sided limits: the absolute value has a kink that linear interpolation would miss
     broken = _excess(trace, ratio - band) + _excess(trace, -band - ratio)
     for one in (trace, *branch.beside):
         if frame.allowable_stress is not None and one.stress is not None:
-            broken += _excess(one, one.stress - frame.allowable_stress * (1 + ROUNDING))
+            broken += _excess(one, one.stress - frame.allowable_stress * (1 + BAND_RTOL))
     return broken
 
 
@@ -154,16 +154,16 @@ def _bad_on_way(
     path: WindingPath, frame: MeasuringFrame, reference: float, curve: TargetCurve | None
 ) -> list[Interval]:
     """Return the same of a branch that is known at every place of its way."""
-    band, allowed = frame.band * (1 + ROUNDING), frame.allowable_stress
+    band, allowed = frame.band * (1 + BAND_RTOL), frame.allowable_stress
 
-    def above(ways: FloatArray) -> FloatArray:
+    def measure_excess(ways: FloatArray) -> FloatArray:
         motion, effort = path.states(ways)
         return np.asarray((effort if curve is None else effort - curve.evaluate(motion) + reference) / reference - 1)
 
-    bad = winding_branches.list_broken_intervals(path, lambda ways: above(ways) - band)
-    bad += winding_branches.list_broken_intervals(path, lambda ways: -band - above(ways))
+    bad = winding_branches.list_broken_intervals(path, lambda ways: measure_excess(ways) - band)
+    bad += winding_branches.list_broken_intervals(path, lambda ways: -band - measure_excess(ways))
     if allowed is not None:
-        bad += winding_branches.list_broken_intervals(path, lambda ways: path.stress(ways) / allowed - (1 + ROUNDING))
+        bad += winding_branches.list_broken_intervals(path, lambda ways: path.stress(ways) / allowed - (1 + BAND_RTOL))
     return bad
 
 

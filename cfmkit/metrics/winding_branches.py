@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     Interval = tuple[float, float]
 
 
-_INNER = 1.0 / np.sqrt(5.0)
-_NODES = np.array([-1.0, -_INNER, _INNER, 1.0])
-_WEIGHTS = np.array([1.0, 5.0, 5.0, 1.0]) / 6.0
+_LOBATTO_NODE = 1.0 / np.sqrt(5.0)
+_LOBATTO_NODES = np.array([-1.0, -_LOBATTO_NODE, _LOBATTO_NODE, 1.0])
+_LOBATTO_WEIGHTS = np.array([1.0, 5.0, 5.0, 1.0]) / 6.0
 """Lobatto's rule on each step of the way: its ends are known already."""
-_SLOPES = polynomial.polyder(np.linalg.inv(np.vander(_NODES, increasing=True)), axis=0)
-_RATES = np.vander(_NODES, 3, increasing=True) @ _SLOPES
+_SLOPE_COEFFICIENTS = polynomial.polyder(np.linalg.inv(np.vander(_LOBATTO_NODES, increasing=True)), axis=0)
+_NODE_DERIVATIVES = np.vander(_LOBATTO_NODES, 3, increasing=True) @ _SLOPE_COEFFICIENTS
 """Derivatives at the nodes of the cubic through values there, (node, value)."""
 
 
@@ -47,12 +47,12 @@ def places_inside(path: WindingPath, low: float, high: float) -> FloatArray:
         at = np.flatnonzero((motion[1:] - level) * (motion[:-1] - level) < 0)
         sense = np.sign(motion[at + 1] - motion[at])[:, None]
 
-        def beyond(
+        def measure_excess(
             places: FloatArray, ends: NDArray[np.intp], sense: FloatArray = sense, level: float = level
         ) -> FloatArray:
             return np.asarray(sense[ends] * (path.states(places)[0] - level) / (high - low))
 
-        found.append(last_places(beyond, ways[at][:, None], ways[at + 1][:, None]).ravel())
+        found.append(last_places(measure_excess, ways[at][:, None], ways[at + 1][:, None]).ravel())
     return distinct(np.concatenate(found))
 
 
@@ -60,10 +60,10 @@ def mean(path: WindingPath, low: float, high: float) -> float:
     """Return the mean effort over the way in a window, each bit of motion counted in whichever direction it goes."""
     ways = places_inside(path, low, high)
     middle, half = 0.5 * (ways[1:] + ways[:-1]), 0.5 * (ways[1:] - ways[:-1])
-    motion, effort = path.states(middle[:, None] + half[:, None] * _NODES)
+    motion, effort = path.states(middle[:, None] + half[:, None] * _LOBATTO_NODES)
     centre = 0.5 * (motion[:, 0] + motion[:, -1])
     within = (centre > low) & (centre < high)
-    moved = np.abs(motion @ _RATES.T)[within] * _WEIGHTS
+    moved = np.abs(motion @ _NODE_DERIVATIVES.T)[within] * _LOBATTO_WEIGHTS
     return float((effort[within] * moved).sum() / moved.sum())
 
 

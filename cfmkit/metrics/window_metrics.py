@@ -121,10 +121,10 @@ def deviation_from_curve(branch: Branch) -> float:
     top, bottom = offset.max(), offset.min()
     if model is not None:
 
-        def beside(places: FloatArray) -> FloatArray:
+        def measure_deviation(places: FloatArray) -> FloatArray:
             return np.asarray(model.effort(branch.name, places) - curve.evaluate(places))
 
-        top, bottom = (float(one[0]) for one in extremes(beside, part.motion[None, :], offset[None, :]))
+        top, bottom = (float(one[0]) for one in extremes(measure_deviation, part.motion[None, :], offset[None, :]))
     return float(max(top, -bottom)) / size
 
 

@@ -137,10 +137,10 @@ def _miss(z: ComplexArray, t: ComplexArray, fraction: FloatArray) -> tuple[Float
     return gap.imag * np.abs(along), np.angle(t[1:-1] / along)
 
 
-_SEARCH, _CHECK = 4, 16  # parts of each step between samples at which arcs are compared with the curve
-_TRIES = 25  # with less and less of the tolerance, before the fit is given up
+_SEARCH_PARTS, _CHECK_PARTS = 4, 16  # parts of each step between samples at which arcs are compared with the curve
+_MAX_TRIES = 25  # with less and less of the tolerance, before the fit is given up
 _MOST_TURN = 2.5  # of one piece [rad], so that no arc comes near a full turn
-_ROUNDING = 1e-3  # share of the tolerance kept back for rounding and for merging equal arcs
+_ROUNDING_SHARE = 1e-3  # share of the tolerance kept back for rounding and for merging equal arcs
 
 
 @dataclass(frozen=True)
@@ -209,8 +209,8 @@ def fit_arcs(points: FloatArray, tangents: FloatArray, tolerance: float, lean: f
     CoarseDataError
         If the samples are too far apart for the tolerance, or the curve has a corner.
     """
-    curve = _Curve.from_samples(points, tangents, (tolerance, lean), _SEARCH)
-    check = _Curve.from_samples(points, tangents, (tolerance, lean), _CHECK)
+    curve = _Curve.from_samples(points, tangents, (tolerance, lean), _SEARCH_PARTS)
+    check = _Curve.from_samples(points, tangents, (tolerance, lean), _CHECK_PARTS)
     for knots in curve.proposals():
         used = [check.usage(i, j) for i, j in pairwise(knots)]
         if max(used) <= 1:
@@ -252,7 +252,7 @@ class _Curve:
         ends = z[:-1], t[:-1], z[1:], t[1:]
         probes = np.arange(1, stride)[:, None] / stride
         slopes = slope(*ends, probes)
-        allowed = np.full((len(z), stride), tolerance * (1 - _ROUNDING))
+        allowed = np.full((len(z), stride), tolerance * (1 - _ROUNDING_SHARE))
         allowed[:-1, 1:] -= unsure[:, None]
         step = np.angle(t[1:] / t[:-1])
         return cls(
@@ -303,7 +303,7 @@ class _Curve:
     def proposals(self) -> Iterator[list[int]]:
         """Yield knots, the best ones first: spread evenly, or else as a sweep from the start leaves them."""
         for spread in (True, False):
-            for share in 0.9 ** np.arange(_TRIES):
+            for share in 0.9 ** np.arange(_MAX_TRIES):
                 forward, backward = self.swept(share)
                 yield _balance_knots(forward, backward, self.arclength) if spread else forward
 
@@ -342,7 +342,7 @@ class _Curve:
             if arcs is None:
                 raise too_coarse(i, len(self.points), "no two arcs join them")
             uneven = abs(arcs.curvatures[0] - arcs.curvatures[1]) * abs(self.points[j] - self.points[i]) ** 2
-            if uneven > _ROUNDING**2 * self.limits[0]:
+            if uneven > _ROUNDING_SHARE**2 * self.limits[0]:
                 nodes.append(arcs.joint)
                 bulges.extend(arcs.bulges)
             else:

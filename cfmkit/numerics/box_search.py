@@ -23,7 +23,7 @@ class BoxAxis:
     # low, high: bounds; of a logarithmic axis they have one sign, or one of them is zero
     low: float
     high: float
-    log: bool = False  # whether steps are ratios. From a bound of zero it starts at `SMALLEST` of the other
+    log: bool = False  # whether steps are ratios. From a bound of zero it starts at `ZERO_END_RATIO` of the other
 
     def value(self, share: float) -> float:
         """Return the value at a share of the way, 0 to 1; the bounds exactly."""
@@ -32,12 +32,14 @@ class BoxAxis:
         if not self.log:
             return self.low + share * (self.high - self.low)
         far = max(abs(self.low), abs(self.high))
-        ends = (math.copysign(max(abs(end), SMALLEST * far), self.low + self.high) for end in (self.low, self.high))
+        ends = (
+            math.copysign(max(abs(end), ZERO_END_RATIO * far), self.low + self.high) for end in (self.low, self.high)
+        )
         first, last = ends
         return float(first * (last / first) ** share)
 
 
-SMALLEST = 1e-6
+ZERO_END_RATIO = 1e-6
 """A logarithmic axis that ends at zero goes on to this fraction of its other end, and then to zero itself."""
 
 
@@ -76,7 +78,7 @@ def lowest(
     return _lowest(_BoxSearch(function, axes, grid, fine), ())
 
 
-HOPELESS = 10.0
+MAX_VALUE_RATIO = 10.0
 """On the grid of the first variable the others are not refined where they are so many times worse than the best."""
 
 
@@ -95,7 +97,7 @@ class _BoxSearch:
         """Return whether to look closer around a value found on a grid."""
         if depth == 0:
             self.rough = False
-        return math.isfinite(height) and (not self.rough or height <= HOPELESS * self.best)
+        return math.isfinite(height) and (not self.rough or height <= MAX_VALUE_RATIO * self.best)
 
 
 def _lowest(search: _BoxSearch, outer: tuple[float, ...]) -> Lowest:
@@ -105,16 +107,16 @@ def _lowest(search: _BoxSearch, outer: tuple[float, ...]) -> Lowest:
         return Lowest(outer, value)
     axis, seen = search.axes[len(outer)], dict[float, Lowest]()
 
-    def along(share: float) -> float:
+    def search_share(share: float) -> float:
         seen[share] = _lowest(search, (*outer, axis.value(share)))
         return seen[share].value
 
     shares = np.linspace(0.0, 1.0, search.grid).tolist()
-    heights = [along(share) for share in shares]
+    heights = [search_share(share) for share in shares]
     grid = [seen[share] for share in shares]
     best = int(np.argmin(heights))
     if search.worthwhile(len(outer), heights[best]):
-        _refine(along, (shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)]), search.fine)
+        _refine(search_share, (shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)]), search.fine)
     found = min(seen.values(), key=lambda item: item.value)
     return Lowest(found.place, found.value, tuple((item.place, item.value) for item in grid))
 

@@ -25,15 +25,18 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-NODES = 16
+N_PANEL_NODES = 16
 """Of a panel."""
 
-MOST = 1000
+MAX_PLACES = 1000
 """Places at which functions are requested at once, after which halving ends: strips and flexures need some hundreds,
 and a force that is rounding alone, as that of a leg 100 m long, would never be resolved."""
 
-_UNIT = chebyshev.chebpts1(NODES)
-_TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODES), 2.0, 1.0) / NODES)[:, None]
+_UNIT_NODES = chebyshev.chebpts1(N_PANEL_NODES)
+_COEFFICIENT_TRANSFORM = (
+    chebyshev.chebvander(_UNIT_NODES, N_PANEL_NODES - 1).T
+    * (np.where(np.arange(N_PANEL_NODES), 2.0, 1.0) / N_PANEL_NODES)[:, None]
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -43,7 +46,7 @@ class ChebyshevPanels(ShortRepr):
     ends: FloatArray  # (k + 1,) of the panels, increasing
     # (k, 2) what each polynomial was made over: its panel, or the most of it where no value could be had at an end
     spans: FloatArray
-    coefficients: FloatArray  # (k, NODES) of the Chebyshev polynomials; NaN where a node is not known
+    coefficients: FloatArray  # (k, N_PANEL_NODES) of the Chebyshev polynomials; NaN where a node is not known
 
     def evaluate(self, x: FloatArray) -> FloatArray:
         """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""
@@ -51,7 +54,7 @@ class ChebyshevPanels(ShortRepr):
         low, high = self.spans[panel].T
         t = (2.0 * x - low - high) / (high - low)
         c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
-        for k in range(NODES - 1, 0, -1):
+        for k in range(N_PANEL_NODES - 1, 0, -1):
             one, two = c[..., k] + 2.0 * t * one - two, one
         found: FloatArray = c[..., 0] + t * one - two
         return found
@@ -60,7 +63,7 @@ class ChebyshevPanels(ShortRepr):
 def nodes_of(panel: tuple[float, float]) -> FloatArray:
     """Return the nodes of a panel between two ends, increasing."""
     low, high = panel
-    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _UNIT)
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _UNIT_NODES)
 
 
 def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) -> FloatArray:
@@ -74,7 +77,7 @@ def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) 
     """
     nodes = nodes_of(panel)
     at = np.minimum(np.searchsorted(x, nodes), len(x) - 1)
-    found: FloatArray = _TRANSFORM @ np.where(x[at] == nodes, values[at], np.nan)
+    found: FloatArray = _COEFFICIENT_TRANSFORM @ np.where(x[at] == nodes, values[at], np.nan)
     return found
 
 
@@ -92,7 +95,7 @@ def resolve_panels(
     close : sequence of float
         Size of the last coefficients of each function, relative to the largest value seen, at which it has converged.
     halvings : int
-        At most so many of a panel, for functions with corners; none follows a round of more than `MOST` places.
+        At most so many of a panel, for functions with corners; none follows a round of more than `MAX_PLACES` places.
 
     Examples
     --------
@@ -115,7 +118,7 @@ def resolve_panels(
         for panel in wanted:
             found = [coefficients(panel, places, row) for row in values]
             tails = np.array([np.abs(one[-3:]).max() for one in found])
-            (rough if left and len(places) <= MOST and (tails > close * largest).any() else done)[panel] = found
+            (rough if left and len(places) <= MAX_PLACES and (tails > close * largest).any() else done)[panel] = found
         if not rough:
             break
         middles = {panel: 0.5 * (panel[0] + panel[1]) for panel in rough}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-_HALVINGS = 60
+_N_HALVINGS = 60
 
 
 def value_at(x: FloatArray, y: FloatArray, place: float) -> float:
@@ -50,7 +50,7 @@ def values_at(x: FloatArray, y: FloatArray, places: FloatArray) -> FloatArray:
     return _cubics(x[nodes], y[nodes], places)
 
 
-BESIDE = 1e-10
+EXTREME_RTOL = 1e-10
 """Height of an extreme over the samples around it, in parts of the largest, below which it is rounding."""
 
 
@@ -94,7 +94,7 @@ def inner_extremes_of_rows(rows: Sequence[tuple[FloatArray, FloatArray]]) -> lis
     step, which = np.nonzero(inside)
     found = x[left[step]] + places[step, which]
     heights = _cubics(near[step], values[step], found)
-    least = (BESIDE * np.maximum.reduceat(np.abs(y), ends - counts))[row[step]]
+    least = (EXTREME_RTOL * np.maximum.reduceat(np.abs(y), ends - counts))[row[step]]
     before, behind = y[left[step]], y[left[step] + 1]
     turns = (heights > np.maximum(before, behind) + least) | (heights < np.minimum(before, behind) - least)
     found, row = found[turns], row[step][turns]
@@ -136,16 +136,16 @@ def crossings(x: FloatArray, y: FloatArray, level: float) -> list[float]:
     """
     above = y >= level
 
-    def passed(place: float, up: bool) -> bool:
+    def has_passed(place: float, up: bool) -> bool:
         return (value_at(x, y, place) >= level) == up
 
     steps = np.flatnonzero(above[1:] != above[:-1])
-    return [bisect(partial(passed, up=bool(above[k + 1])), float(x[k]), float(x[k + 1])) for k in steps.tolist()]
+    return [bisect(partial(has_passed, up=bool(above[k + 1])), float(x[k]), float(x[k + 1])) for k in steps.tolist()]
 
 
 def bisect(holds: Callable[[float], bool], low: float, high: float) -> float:
     """Return the place between `low`, where a condition fails, and `high`, where it holds, from which on it holds."""
-    for _ in range(_HALVINGS):
+    for _ in range(_N_HALVINGS):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
@@ -169,7 +169,7 @@ def first_extreme(
         return float(x[index]), float(y[index])
     low, high = float(x[index - 1]), float(x[index + 1])
     ratio = 0.5 * (np.sqrt(5.0) - 1)
-    for _ in range(_HALVINGS):
+    for _ in range(_N_HALVINGS):
         one, other = high - ratio * (high - low), low + ratio * (high - low)
         if sign * value_at(x, y, one) > sign * value_at(x, y, other):
             high = other

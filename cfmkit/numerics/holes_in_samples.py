@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 LARGEST_HOLE = 0.02
 """Part of the window: with a larger hole in it no number over the window can be known."""
 
-STEPS = 3.0
+HOLE_STEP_RATIO = 3.0
 """Samples that are farther apart than so many usual steps leave a hole: a spike or two that are left out do not."""
 
-NEIGHBOURS = 10
+N_NEIGHBOUR_STEPS = 10
 """Steps to either side of one that say what is usual there: recorders change their step on the way."""
 
-USUAL = 80.0
+STEP_PERCENTILE = 80.0
 """Percentile of those: of 21 steps four may be larger, as where single samples stand in a hole."""
 
 
@@ -34,9 +34,9 @@ def usual_steps(places: FloatArray) -> FloatArray:
     from scipy.ndimage import percentile_filter
 
     steps = np.diff(places)
-    if len(steps) <= 2 * NEIGHBOURS:
-        return np.full(len(steps), np.percentile(steps, USUAL) if len(steps) else 0.0)
-    found: FloatArray = percentile_filter(steps, USUAL, 2 * NEIGHBOURS + 1, mode="reflect")
+    if len(steps) <= 2 * N_NEIGHBOUR_STEPS:
+        return np.full(len(steps), np.percentile(steps, STEP_PERCENTILE) if len(steps) else 0.0)
+    found: FloatArray = percentile_filter(steps, STEP_PERCENTILE, 2 * N_NEIGHBOUR_STEPS + 1, mode="reflect")
     return found
 
 
@@ -45,7 +45,7 @@ def is_hole_after(places: FloatArray) -> NDArray[np.bool_]:
     distinct, last = np.unique(places[::-1], return_index=True)
     found = np.zeros(max(len(places) - 1, 0), dtype=bool)
     steps = np.diff(distinct)
-    found[len(places) - 1 - last[:-1]] = steps > STEPS * usual_steps(distinct)
+    found[len(places) - 1 - last[:-1]] = steps > HOLE_STEP_RATIO * usual_steps(distinct)
     return found
 
 

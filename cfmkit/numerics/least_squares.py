@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
-LOSSES: tuple[Loss, ...] = ("linear", "soft_l1", "huber", "cauchy")
+LOSS_NAMES: tuple[Loss, ...] = ("linear", "soft_l1", "huber", "cauchy")
 
-STEP = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Of finite differences, in sizes of the parameter."""
 
 NO_EFFECT = 1e-9
 """A parameter has no effect if changing it by its size changes no value by more than this part of the data."""
 
-SINGULAR = 1e-5
+SINGULAR_RTOL = 1e-5
 """Unit columns of the Jacobian are dependent where a singular value is below this."""
 
 
@@ -66,7 +66,7 @@ class LeastSquares:
         ends = []
         for way in (1.0, -1.0):
             moved = np.array(values)
-            moved[k] = np.clip(values[k] + way * STEP * self.size[k], self.low[k], self.high[k])
+            moved[k] = np.clip(values[k] + way * DIFFERENCE_STEP * self.size[k], self.low[k], self.high[k])
             found = self.residuals(moved) if moved[k] != values[k] else here
             good = bool(np.isfinite(found).all())
             ends.append((moved[k], found) if good else (values[k], here))
@@ -144,7 +144,7 @@ def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ..
     if len(alive) > 1:
         unit = jacobian[:, alive] / np.linalg.norm(jacobian[:, alive], axis=0)
         _, singular, right = np.linalg.svd(unit, full_matrices=False)
-        for direction in right[singular < SINGULAR]:
+        for direction in right[singular < SINGULAR_RTOL]:
             groups.append(tuple(int(alive[k]) for k in np.flatnonzero(np.abs(direction) > 0.05)))
     return tuple(dict.fromkeys(groups))
 
@@ -235,7 +235,7 @@ class LackOfFit:
     chance: float  # probability that noise alone makes means of neighbours as large
 
 
-BLOCKS = 24
+MAX_BLOCKS = 24
 """Means of so many stretches of each branch are compared with the noise inside them, at most."""
 
 _SAMPLES_A_BLOCK = 8
@@ -264,7 +264,7 @@ def lack_of_fit(branches: Sequence[FloatArray], fitted: int) -> LackOfFit:
     far = 5.0 * robust_scale(np.concatenate(list(branches)))
     blocks = []
     for residuals in branches:
-        count = min(BLOCKS, len(residuals) // _SAMPLES_A_BLOCK)
+        count = min(MAX_BLOCKS, len(residuals) // _SAMPLES_A_BLOCK)
         if count >= 2:
             blocks += np.array_split(np.clip(residuals, -far, far) if far else residuals, count)
     free = len(blocks) - fitted

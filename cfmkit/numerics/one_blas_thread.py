@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 R = TypeVar("R")
 
-CHOSEN = (
+THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
@@ -27,7 +27,7 @@ CHOSEN = (
 )
 """Variables of the environment that libraries read when they are loaded: who sets one has chosen how many threads."""
 
-ONE_THREAD = dict.fromkeys(CHOSEN, "1")
+ONE_THREAD = dict.fromkeys(THREAD_VARIABLES, "1")
 """What keeps the libraries of a process to one thread: processes share the cores, and sums come out the same."""
 
 
@@ -35,12 +35,12 @@ def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function with one thread for BLAS while it runs, unless the environment chooses how many."""
 
     @functools.wraps(function)
-    def limited(*arguments: P.args, **options: P.kwargs) -> R:
-        if any(name in os.environ for name in CHOSEN):
+    def call_limited(*arguments: P.args, **options: P.kwargs) -> R:
+        if any(name in os.environ for name in THREAD_VARIABLES):
             return function(*arguments, **options)
         from threadpoolctl import threadpool_limits
 
         with threadpool_limits(1, user_api="blas"):
             return function(*arguments, **options)
 
-    return limited
+    return call_limited

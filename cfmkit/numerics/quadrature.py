@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-ORDER = 8
+GAUSS_ORDER = 8
 FIRST_PANELS = 16
 
 
@@ -26,10 +26,10 @@ def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
     power first) of the antiderivative that vanishes at -1, the second the last four Legendre
     coefficients, whose decay says whether the panel is resolved.
     """
-    nodes, weights = legendre.leggauss(ORDER)
-    to_series = (np.arange(ORDER) + 0.5) * (legendre.legvander(nodes, ORDER - 1) * weights[:, None])
-    powers = [legendre.leg2poly(legendre.legint(row, lbnd=-1))[::-1] for row in np.eye(ORDER)]
-    padded = np.array([np.pad(row, (ORDER + 1 - len(row), 0)) for row in powers])
+    nodes, weights = legendre.leggauss(GAUSS_ORDER)
+    to_series = (np.arange(GAUSS_ORDER) + 0.5) * (legendre.legvander(nodes, GAUSS_ORDER - 1) * weights[:, None])
+    powers = [legendre.leg2poly(legendre.legint(row, lbnd=-1))[::-1] for row in np.eye(GAUSS_ORDER)]
+    padded = np.array([np.pad(row, (GAUSS_ORDER + 1 - len(row), 0)) for row in powers])
     return nodes, to_series @ padded, to_series[:, -4:]
 
 

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-_STEPS = 60
+_MAX_STEPS = 60
 """The measured flanks of `configs/cam_as_built.yaml` take 23, those of built cams in the tests up to 45."""
 
-_SAMPLES = 257
-_FEET = 12
+_N_SAMPLES = 257
+_N_FOOT_STEPS = 12
 
 
 @dataclass(frozen=True)
@@ -130,12 +130,12 @@ def feet(curve: SmoothCurve, points: FloatArray, guess: FloatArray | None = None
     """
     low, high = curve.ends
     if guess is None:
-        samples = np.linspace(low, high, _SAMPLES)
+        samples = np.linspace(low, high, _N_SAMPLES)
         along = curve.frame(samples).points
         gaps = (points[:, :1] - along[:, 0]) ** 2 + (points[:, 1:] - along[:, 1]) ** 2
         guess = samples[np.argmin(gaps, axis=1)]
     u = np.array(guess)
-    for _ in range(_FEET):
+    for _ in range(_N_FOOT_STEPS):
         at = curve.frame(u)
         gap = points - at.points
         # Beyond the centre of curvature Newton's step would turn round.
@@ -175,7 +175,7 @@ def register(
     size = float(np.sqrt(np.mean(np.concatenate([(item - item.mean(axis=0)) ** 2 for item in points]).sum(axis=1))))
     guess: list[FloatArray | None] = [None] * len(points)
     for weighted in (False, True) if robust else (False,):
-        for _ in range(_STEPS):
+        for _ in range(_MAX_STEPS):
             moved = [turn_points(item, state[0], state[1:3]) for item in points]
             found = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
             guess = [*found]
@@ -307,7 +307,7 @@ def gaps_across(curve: SmoothCurve, points: FloatArray, parameters: FloatArray, 
     """
     low, high = curve.ends
     u = np.array(parameters)
-    for _ in range(_FEET):
+    for _ in range(_N_FOOT_STEPS):
         at = curve.frame(u)
         u = np.clip(
             u + (points[:, 1 - axis] - at.points[:, 1 - axis]) / (at.speed * at.tangents[:, 1 - axis]), low, high

@@ -9,32 +9,32 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-TUKEY = 4.685
+TUKEY_CUTOFF = 4.685
 """Where Tukey's weight falls to zero, in standard deviations: 95 % efficient for normal values."""
 
-MAD = 1.4826
+MAD_FACTOR = 1.4826
 """Standard deviation of normal values over their median absolute deviation."""
 
-SPIKE = 8.0
+SPIKE_DEVIATIONS = 8.0
 """A sample is a spike where it is off the median of its neighbours by so many standard deviations of the noise."""
 
-_BESIDE = 3
+_MEDIAN_REACH = 3
 """Samples on either side that the median is of: spikes of up to three samples are seen."""
 
-_RARE = 0.05
+_MAX_SPIKE_SHARE = 0.05
 """Where more than this part of the samples look like spikes, that is how the signal is."""
 
 
 def robust_scale(values: FloatArray) -> float:
     """Return 1.4826 times the median absolute deviation from the median: the SD of normal values."""
-    return MAD * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+    return MAD_FACTOR * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
 def tukey(values: FloatArray, scale: float) -> FloatArray:
     """Return Tukey's weights of values with a robust standard deviation."""
     if scale == 0:
         return np.ones_like(values)
-    share = values / (TUKEY * scale)
+    share = values / (TUKEY_CUTOFF * scale)
     weights: FloatArray = np.where(np.abs(share) < 1, (1 - share**2) ** 2, 0.0)
     return weights
 
@@ -81,16 +81,16 @@ def spikes(values: FloatArray) -> FloatArray:
     """
     from scipy.ndimage import median_filter
 
-    height = values - median_filter(values, 2 * _BESIDE + 1, mode="nearest")
+    height = values - median_filter(values, 2 * _MEDIAN_REACH + 1, mode="nearest")
     off = np.abs(height)
     steps = np.abs(np.diff(values))
     low, high = np.percentile(values, (5, 95))
     limit = max(
-        SPIKE * MAD * float(np.median(off)),
+        SPIKE_DEVIATIONS * MAD_FACTOR * float(np.median(off)),
         5.0 * float(np.percentile(off, 90)),
         # Where a smooth signal turns or jumps the median is as many steps off as there are neighbours on a side.
-        2.0 * _BESIDE * float(np.percentile(steps, 75)),
+        2.0 * _MEDIAN_REACH * float(np.percentile(steps, 75)),
         0.005 * float(high - low),
     )
     found = off > max(limit, 1e-9 * float(np.abs(values).max()))
-    return np.where(found & (found.sum() <= _RARE * len(values)), height, 0.0)
+    return np.where(found & (found.sum() <= _MAX_SPIKE_SHARE * len(values)), height, 0.0)

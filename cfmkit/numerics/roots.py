@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.arrays import FloatArray
 
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-EPS = float(np.finfo(float).eps)
+FLOAT_EPS = float(np.finfo(float).eps)
 
 
 def invert_increasing(
@@ -55,8 +55,8 @@ def invert_increasing(
     """
     low, high = np.full(targets.shape, bracket[0]), np.full(targets.shape, bracket[1])
     x = np.minimum(np.maximum(guess, bracket[0]), bracket[1])
-    fine = 16.0 * EPS * np.maximum(np.abs(targets), np.abs(targets).max(initial=0.0))
-    tolerance = 16.0 * EPS * np.maximum(np.abs(bracket[0]), np.abs(bracket[1]))
+    fine = 16.0 * FLOAT_EPS * np.maximum(np.abs(targets), np.abs(targets).max(initial=0.0))
+    tolerance = 16.0 * FLOAT_EPS * np.maximum(np.abs(bracket[0]), np.abs(bracket[1]))
     before = np.zeros(targets.shape) if before is None else before
     for _ in range(iterations):
         value, slope = evaluate(x)
@@ -113,7 +113,7 @@ def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, 
             c, b, fc, fb = b, a, fb, fa
         a, fa = x, fx
         best = a if abs(fa) < abs(fb) else b
-        limit = 2.0 * EPS * abs(best) / abs(b - a) if b != a else 1.0
+        limit = 2.0 * FLOAT_EPS * abs(best) / abs(b - a) if b != a else 1.0
         if limit > 0.5 or fx == 0:
             return float(best if fx else a)
         share = _next_share(a, b, c, fa, fb, fc)

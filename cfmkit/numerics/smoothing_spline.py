@@ -14,10 +14,10 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-FEWEST = 5
+MIN_SPLINE_POINTS = 5
 """What scipy's smoothing spline needs."""
 
-_STIFFEST, _SOFTEST = 6.0, -14.0
+_MAX_LOG_LAMBDA, _MIN_LOG_LAMBDA = 6.0, -14.0
 """Decades of lambda, for data scaled to unit spacing, between which the spline is sought."""
 
 
@@ -38,7 +38,7 @@ class SmoothedFunction:
         return values if derivative == 0 else np.where(inside == places, values, 0.0)
 
 
-def smoothed(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFunction:
+def fit_smoothing_spline(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFunction:
     """Return the smoothest cubic spline that is as near to the points as their noise.
 
     Parameters
@@ -57,8 +57,8 @@ def smoothed(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFu
     """
     from scipy.interpolate import BSpline
 
-    if len(places) < FEWEST or np.diff(places).min() <= 0:
-        raise ValueError(f"at least {FEWEST} points in increasing order are needed")
+    if len(places) < MIN_SPLINE_POINTS or np.diff(places).min() <= 0:
+        raise ValueError(f"at least {MIN_SPLINE_POINTS} points in increasing order are needed")
     low, high = float(places[0]), float(places[-1])
     unit = (high - low) / (len(places) - 1)
     spline = _choose_spline((places - low) / unit, values, noise)
@@ -79,9 +79,9 @@ def _choose_spline(x: FloatArray, values: FloatArray, noise: float) -> Any:
     def excess(decade: float) -> float:
         return float(np.mean((make_smoothing_spline(x, scaled, lam=10.0**decade)(x) - scaled) ** 2)) - 1.0
 
-    if excess(_STIFFEST) <= 0:
-        decade = _STIFFEST
-    elif excess(_SOFTEST) >= 0:
+    if excess(_MAX_LOG_LAMBDA) <= 0:
+        decade = _MAX_LOG_LAMBDA
+    elif excess(_MIN_LOG_LAMBDA) >= 0:
         return make_interp_spline(x, values)
     else:
         decade = _crossing(excess)
@@ -92,7 +92,7 @@ def _choose_spline(x: FloatArray, values: FloatArray, noise: float) -> Any:
 
 def _crossing(excess: Any) -> float:
     """Return the decade at which the residuals are as large as the noise: they grow with lambda."""
-    low, high = _SOFTEST, _STIFFEST
+    low, high = _MIN_LOG_LAMBDA, _MAX_LOG_LAMBDA
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if excess(middle) > 0 else (middle, high)

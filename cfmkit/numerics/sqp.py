@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-_FAR = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
-_FALL = 1e-4  # share by which a violation falls in steps that get somewhere; where they are stuck it changes by 1e-9
+_MISSING_VALUE = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
+_MIN_VIOLATION_FALL = (
+    1e-4  # share by which a violation falls in steps that get somewhere; where they are stuck it changes by 1e-9
+)
 
 
 class SearchEnding(Enum):
@@ -64,7 +66,8 @@ class Effort:
     # is likely to be one that just counts as such, the last one has next to none if the steps converge
     last: bool = False
     # end where in so many evaluations no point without violation was seen and the worst violation has not fallen by
-    # `_FALL`: the constraints contradict each other there, and the steps are the rounding of a line search
+    # `_MIN_VIOLATION_FALL`: the constraints contradict each other there, and the steps are the rounding of a line
+    # search
     patience: int | None = None
 
 
@@ -140,10 +143,10 @@ def _run_solver(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[Flo
         constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
         options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
     )
-    return np.clip(found.x, *bounds.T), _ENDINGS.get(int(found.status), SearchEnding.STUCK)
+    return np.clip(found.x, *bounds.T), _ENDING_BY_MODE.get(int(found.status), SearchEnding.STUCK)
 
 
-_ENDINGS = {0: SearchEnding.OPTIMUM, 4: SearchEnding.INCOMPATIBLE, 9: SearchEnding.STEPS}
+_ENDING_BY_MODE = {0: SearchEnding.OPTIMUM, 4: SearchEnding.INCOMPATIBLE, 9: SearchEnding.STEPS}
 
 
 class _Enough(Exception):
@@ -187,7 +190,7 @@ class _Memory:
         patience = self.effort.patience
         if self.fell <= self.effort.violation or patience is None:
             return
-        if excess < (1.0 - _FALL) * self.fell:
+        if excess < (1.0 - _MIN_VIOLATION_FALL) * self.fell:
             self.fell, self.since = excess, self.evaluations
         elif self.evaluations - self.since >= patience:
             raise _Enough(SearchEnding.STUCK)
@@ -199,7 +202,7 @@ class _Memory:
 
     def objective(self, z: FloatArray) -> float:
         answer = self.evaluate(z)
-        return float(answer[0]) if answer is not None else self._worst() + _FAR
+        return float(answer[0]) if answer is not None else self._worst() + _MISSING_VALUE
 
     def constraints(self, z: FloatArray) -> FloatArray:
         answer = self.evaluate(z)

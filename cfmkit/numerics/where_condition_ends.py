@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
     Excess = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
 
-_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+_FLOAT_EPS, _FLOAT_TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 
-_GRID = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8.0)
-_GRID[0], _GRID[4], _GRID[8] = 0.0, 0.5, 1.0
-_EVEN = np.arange(1, 18) / 18.0
-_NEAR = np.array([3e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 0.1, 0.4])
-_AROUND = np.concatenate([-_NEAR[::-1], [0.0], _NEAR])
+_BRACKET_GRID = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8.0)
+_BRACKET_GRID[0], _BRACKET_GRID[4], _BRACKET_GRID[8] = 0.0, 0.5, 1.0
+_EVEN_GRID = np.arange(1, 18) / 18.0
+_NEAR_OFFSETS = np.array([3e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 0.1, 0.4])
+_OFFSETS_AROUND = np.concatenate([-_NEAR_OFFSETS[::-1], [0.0], _NEAR_OFFSETS])
 """Where an end is looked for, as shares of its bracket: first; where nothing is known of it; where it is expected."""
 
-_NEIGHBOURS = np.arange(-2, 2)
+_NEIGHBOUR_OFFSETS = np.arange(-2, 2)
 
-NARROW = 1e-12
+BRACKET_RTOL = 1e-12
 """Share of its first bracket to which an end is found: less is rounding wherever the bracket is a step of a grid."""
 
 
@@ -66,22 +66,22 @@ def last_places(excess: Excess, inside: FloatArray, outside: FloatArray, rounds:
     found = np.array(inside).ravel()
     ends = np.flatnonzero(inside != outside)
     near, far = found[ends, None], np.ravel(outside)[ends, None]
-    least = NARROW * np.abs(far - near) + 2.0 * _EPS * np.maximum(np.abs(near), np.abs(far))
-    places = near + (far - near) * _GRID
+    least = BRACKET_RTOL * np.abs(far - near) + 2.0 * _FLOAT_EPS * np.maximum(np.abs(near), np.abs(far))
+    places = near + (far - near) * _BRACKET_GRID
     places[:, -1:] = far
     heights = np.array(excess(places, ends)) if len(ends) else places
     # What is known of both ends holds, whatever the last bit is here.
     heights[:, 0] = np.where(heights[:, 0] <= 0.0, heights[:, 0], 0.0)
-    heights[:, -1] = np.where(heights[:, -1] <= 0.0, _TINY, heights[:, -1])
+    heights[:, -1] = np.where(heights[:, -1] <= 0.0, _FLOAT_TINY, heights[:, -1])
     expected = _inverse(places, heights)
     places, heights = (np.concatenate([one[:, :1], one, one[:, -1:]], axis=1) for one in (places, heights))
     for _ in range(rounds):
         # The last place that holds, the first that does not, and their neighbours outside of these.
-        first = (~(heights <= 0.0)).argmax(axis=1)[:, None] + _NEIGHBOURS
+        first = (~(heights <= 0.0)).argmax(axis=1)[:, None] + _NEIGHBOUR_OFFSETS
         places, heights = (np.take_along_axis(one, first, axis=1) for one in (places, heights))
         found[ends] = places[:, 1]
         way = places[:, 2:3] - places[:, 1:2]
-        going = ((np.abs(way) > least) & (heights[:, 1:2] < -4.0 * _EPS))[:, 0]
+        going = ((np.abs(way) > least) & (heights[:, 1:2] < -4.0 * _FLOAT_EPS))[:, 0]
         if not going.any():
             break
         ends, least, places, heights, way = (one[going] for one in (ends, least, places, heights, way))
@@ -89,7 +89,7 @@ def last_places(excess: Excess, inside: FloatArray, outside: FloatArray, rounds:
         share = np.where((share > 0.0) & (share < 1.0), share, _share(places, heights))
         # A step that is at least so long leads across the end, and so narrows the bracket from both sides.
         margin = np.minimum(0.5 * least / np.abs(way), 0.5)
-        share = np.where((share > 0.0) & (share < 1.0), share + _AROUND, _EVEN)
+        share = np.where((share > 0.0) & (share < 1.0), share + _OFFSETS_AROUND, _EVEN_GRID)
         more = places[:, 1:2] + way * np.minimum(np.maximum(share, margin), 1.0 - margin)
         known = excess(more, ends)
         places = np.concatenate([places[:, :2], more, places[:, 2:]], axis=1)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import UsageError
-from cfmkit.plots.style import GREY, LINES, NORMAL, TROUBLE, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import LINE_COLOURS, NORMAL_FONT, TEXT_GREY, TROUBLE_RED, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import border_unit, to_border
 
 if TYPE_CHECKING:
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from cfmkit.plots.poses_in_one_svg import Moving
     from cfmkit.results import Result
 
-WIDTH, HEIGHT = 240.0, 100.0
-"""Of a frame [mm]; with `DOTS` 960 x 400 dots, half a slide."""
+FRAME_WIDTH, FRAME_HEIGHT = 240.0, 100.0
+"""Of a frame [mm]; with `DOTS_PER_INCH` 960 x 400 dots, half a slide."""
 
-DOTS = 101.6
+DOTS_PER_INCH = 101.6
 """Dots per inch: a whole number of dots per millimetre, and even numbers of them in all, as films need."""
 
-MILLISECONDS = 90
+FRAME_DURATION = 90
 """Of each frame: 11 a second, so that there and back takes three seconds."""
 
 
 @apply_style
 def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     """Return the frames of one way, each (height, width, 3): the mechanism on the left, a cursor in the curve."""
-    figure = new_figure(WIDTH, HEIGHT)
-    figure.dpi = DOTS
+    figure = new_figure(FRAME_WIDTH, FRAME_HEIGHT)
+    figure.dpi = DOTS_PER_INCH
     left, bottom, right, top = moving.box
     scale = min(104.0 / (right - left), 88.0 / (top - bottom))
     size = ((right - left) * scale, (top - bottom) * scale)
@@ -49,7 +49,7 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     names = list(dict.fromkeys(curve.branches))
     for number, name in enumerate(names):
         on = curve.branch == name
-        diagram.plot(motion[on], effort[on], color=LINES[number % len(LINES)], label=name)
+        diagram.plot(motion[on], effort[on], color=LINE_COLOURS[number % len(LINE_COLOURS)], label=name)
     if len(names) > 1:
         diagram.legend(frameon=False)
     known = effort[np.isfinite(effort)]
@@ -58,9 +58,9 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     diagram.set_ylim(min(low, 0.0) - (room if low < 0 else 0.0), max(high, 0.0) + room)
     diagram.set_xlabel(f"{curve.motion_name} [{border_unit(curve.motion_dimension)}]")
     diagram.set_ylabel(f"{curve.kind} [{border_unit(curve.kind)}]")
-    figure.text(0.02, 0.97, result.spec.name, va="top", weight="bold", size=NORMAL + 2.0)
-    cursor = diagram.axvline(0.0, color=TROUBLE, linewidth=1.0, linestyle="--")
-    reported = diagram.text(0.98, 0.03, "", transform=diagram.transAxes, ha="right", color=GREY)
+    figure.text(0.02, 0.97, result.spec.name, va="top", weight="bold", size=NORMAL_FONT + 2.0)
+    cursor = diagram.axvline(0.0, color=TROUBLE_RED, linewidth=1.0, linestyle="--")
+    reported = diagram.text(0.98, 0.03, "", transform=diagram.transAxes, ha="right", color=TEXT_GREY)
     places = to_border(moving.motion, curve.motion_dimension)
     found = []
     for number, place in enumerate(places):
@@ -115,7 +115,7 @@ def _gif(whole: Sequence[NDArray[np.uint8]]) -> bytes:
 
     first, *more = (Image.fromarray(frame).quantize(64, dither=Image.Dither.NONE) for frame in whole)
     into = io.BytesIO()
-    first.save(into, "GIF", save_all=True, append_images=more, duration=MILLISECONDS, loop=0)
+    first.save(into, "GIF", save_all=True, append_images=more, duration=FRAME_DURATION, loop=0)
     return into.getvalue()
 
 
@@ -128,7 +128,7 @@ def _film(whole: Sequence[NDArray[np.uint8]]) -> bytes:
         out = Path(folder) / "film.mp4"  # the index of an mp4 is written last, which no pipe can do
         command = [
             *(require_ffmpeg(), "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
-            *("-s", f"{width}x{height}", "-r", f"{1000 / MILLISECONDS:.3f}", "-i", "-", "-an"),
+            *("-s", f"{width}x{height}", "-r", f"{1000 / FRAME_DURATION:.3f}", "-i", "-", "-an"),
             *("-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact", "-y", str(out)),
         ]
         done = subprocess.run(command, input=b"".join(map(bytes, whole)), capture_output=True, check=False)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
-from cfmkit.plots.parts import PLATE, STEEL, mm
-from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, apply_style, axes_mm, new_figure
+from cfmkit.plots.parts import PLATE_COLOUR, STEEL_COLOUR, mm
+from cfmkit.plots.style import SMALL_FONT, SPRING_OCHRE, TEXT_GREY, TEXT_INK, apply_style, axes_mm, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -64,8 +64,8 @@ def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[Lis
     _frame(ax, low, high)
     made = {part.body for part in parts if part.source == "make"}
     for body, outline in drawn:
-        fill = PLATE if body.name in made else OCHRE if body.name.startswith("spring") else STEEL
-        ax.fill(*outline.T, zorder=2, facecolor=fill, edgecolor=INK, linewidth=0.6, alpha=0.85, gid=body.name)
+        fill = PLATE_COLOUR if body.name in made else SPRING_OCHRE if body.name.startswith("spring") else STEEL_COLOUR
+        ax.fill(*outline.T, zorder=2, facecolor=fill, edgecolor=TEXT_INK, linewidth=0.6, alpha=0.85, gid=body.name)
     _balloons(ax, drawn, parts, low, high)
     _list(figure, parts)
     return figure
@@ -111,11 +111,11 @@ def _balloons(
         heights = _spread([anchors[number][1] for number in numbers], 2.6 * BALLOON_RADIUS * per_mm, (y0, y1))
         for number, height in zip(numbers, heights, strict=True):
             x, y = anchors[number]
-            ax.plot([x, side], [y, height], color=GREY, linewidth=0.5, zorder=5)
-            ax.plot([x], [y], marker=".", markersize=3, color=INK, zorder=6)
+            ax.plot([x, side], [y, height], color=TEXT_GREY, linewidth=0.5, zorder=5)
+            ax.plot([x], [y], marker=".", markersize=3, color=TEXT_INK, zorder=6)
             ax.text(
-                side, height, str(number), ha="center", va="center", fontsize=SMALL, color=INK, zorder=7,
-                gid=f"item-{number}", bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": INK},
+                side, height, str(number), ha="center", va="center", fontsize=SMALL_FONT, color=TEXT_INK, zorder=7,
+                gid=f"item-{number}", bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": TEXT_INK},
             )  # fmt: skip
 
 
@@ -160,9 +160,9 @@ def _list(figure: Figure, parts: Iterable[ListedPart]) -> None:
         where = f", {part.place}" if part.place != name else ""
         standard = f" ({part.standard})" if part.standard else ""
         said = f"{part.count} x {name}{where}" + (f": {part.size}" if part.size else "") + standard
-        ax.text(2.0, y, str(number), fontsize=SMALL, color=INK, va="top", fontweight="bold")
+        ax.text(2.0, y, str(number), fontsize=SMALL_FONT, color=TEXT_INK, va="top", fontweight="bold")
         for line in textwrap.wrap(said, LETTERS_PER_LINE):
-            ax.text(8.0, y, line, fontsize=SMALL, color=INK if part.source == "make" else GREY, va="top")
+            ax.text(8.0, y, line, fontsize=SMALL_FONT, color=TEXT_INK if part.source == "make" else TEXT_GREY, va="top")
             y -= 3.4
         y -= 1.0
-    ax.text(2.0, 1.0, "black: to make, grey: to buy", fontsize=SMALL, color=GREY)
+    ax.text(2.0, 1.0, "black: to make, grey: to buy", fontsize=SMALL_FONT, color=TEXT_GREY)

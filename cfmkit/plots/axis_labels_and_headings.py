@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, apply_style, has_titles, is_plain, size_mm
+from cfmkit.plots.style import (
+    INCHES_PER_MM,
+    NORMAL_FONT,
+    SMALL_FONT,
+    TEXT_GREY,
+    TROUBLE_RED,
+    apply_style,
+    has_titles,
+    is_plain,
+    size_mm,
+)
 from cfmkit.plots.tick_numbers import WholeNumbers, brief
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
@@ -22,10 +32,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
 
-POLE = 3.0
+POLE_PERCENTAGE = 3.0
 """Percentage of the points at each end of the values that may belong to a pole: three of a curve of 101 points."""
 
-LEFT = 3.0
+LEFT_MARGIN = 3.0
 """Distance of headings from the edge of the print [mm], about one letter."""
 
 LEAST_OF_NAME = 4
@@ -107,9 +117,9 @@ def write_heading(figure: Figure, heading: Heading) -> None:
     if is_plain():
         return
     if titles:
-        _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL + 0.5, "weight": "bold"})
+        _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL_FONT + 0.5, "weight": "bold"})
     if heading.note:  # what is wrong is said in any case
-        _write_line(figure, (6.4 if titles else 1.8), (heading.note, ""), {"size": SMALL, "color": TROUBLE})
+        _write_line(figure, (6.4 if titles else 1.8), (heading.note, ""), {"size": SMALL_FONT, "color": TROUBLE_RED})
 
 
 def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: dict[str, Any]) -> None:
@@ -118,8 +128,8 @@ def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: di
     Where too little of the first would be left to be recognised, the second stands alone, smaller if it must be.
     """
     width, height = size_mm(figure)
-    room = (width - 2.0 * LEFT) * MM * figure.dpi
-    text = figure.text(LEFT / width, 1.0 - down_mm / height, "", ha="left", va="top", **look)
+    room = (width - 2.0 * LEFT_MARGIN) * INCHES_PER_MM * figure.dpi
+    text = figure.text(LEFT_MARGIN / width, 1.0 - down_mm / height, "", ha="left", va="top", **look)
     first, last = (" ".join(part.split(" ")) for part in (" ".join(parts[0].split()), parts[1]))
     least = min(LEAST_OF_NAME, len(first)) if last else 1
     text.set_text(first + last)
@@ -141,13 +151,13 @@ def color_key(ax: Axes, entries: Sequence[tuple[str, str]]) -> None:
     """Write texts in their colours above axes side by side, on as many lines as the width of the print demands."""
     points = 72.0 / ax.figure.dpi
     start = ax.get_window_extent().x0 * points
-    reach = ax.figure.bbox.width * points - start - LEFT * MM * 72.0
+    reach = ax.figure.bbox.width * points - start - LEFT_MARGIN * INCHES_PER_MM * 72.0
     lines: list[list[Any]] = [[]]
     across = 0.0
     for text, color in entries:
         written = ax.annotate(
             text, (0.0, 1.0), xycoords="axes fraction", xytext=(across, 0.0), textcoords="offset points",
-            size=SMALL, color=color, ha="left", va="bottom",
+            size=SMALL_FONT, color=color, ha="left", va="bottom",
         )  # fmt: skip
         wide = written.get_window_extent().width * points
         if across + wide > reach and lines[-1]:
@@ -155,10 +165,10 @@ def color_key(ax: Axes, entries: Sequence[tuple[str, str]]) -> None:
             across = 0.0
         written.set_position((across, 0.0))
         lines[-1].append(written)
-        across += wide + KEY_GAP * MM * 72.0
+        across += wide + KEY_GAP * INCHES_PER_MM * 72.0
     for number, line in enumerate(reversed(lines)):
         for written in line:
-            written.set_position((written.get_position()[0], 2.0 + 1.4 * SMALL * number))
+            written.set_position((written.get_position()[0], 2.0 + 1.4 * SMALL_FONT * number))
 
 
 def plain_ticks(axis: Axis) -> None:
@@ -177,7 +187,7 @@ def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> N
     """Write a small grey remark at a place in fractions of the axes."""
     if is_plain():
         return
-    look: dict[str, Any] = {"size": SMALL, "color": GREY, "transform": ax.transAxes} | options
+    look: dict[str, Any] = {"size": SMALL_FONT, "color": TEXT_GREY, "transform": ax.transAxes} | options
     ax.text(*place, text, **look)
 
 
@@ -245,7 +255,9 @@ def shown_range(values: Any) -> tuple[float, float] | None:
     if whole is None:
         return None
     array = np.asarray(values, dtype=float)
-    low, high = (float(end) for end in np.percentile(array[np.isfinite(array)], (POLE, 100.0 - POLE)))
+    low, high = (
+        float(end) for end in np.percentile(array[np.isfinite(array)], (POLE_PERCENTAGE, 100.0 - POLE_PERCENTAGE))
+    )
     room = 3.0 * max(high - low, 0.2 * max(abs(low), abs(high)))
     return (whole[0] if whole[0] >= low - room else low - 0.3 * room), (
         whole[1] if whole[1] <= high + room else high + 0.3 * room

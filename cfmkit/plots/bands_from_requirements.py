@@ -46,7 +46,7 @@ def bands_of(result: Result) -> tuple[Band, ...]:
     if not result.curves:
         return ()
     kind = result.curves[0].kind
-    wanted = [item for item in result.spec.requirements if _plain(item.metric, kind) in _KINDS]
+    wanted = [item for item in result.spec.requirements if _plain(item.metric, kind) in _BAND_LABELS]
     found = (_band(outcome, result) for outcome in check(wanted, result))
     return tuple(band for band in found if band is not None)
 
@@ -76,7 +76,7 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
     chosen = [item for item in subjects if branch in (None, item.name)]
     if not chosen:
         return None
-    rule = _RULES.get(metric)
+    rule = _BAND_RULES.get(metric)
     worst = None
     if metric in ("min", "max"):
         bounds: Bounds | None = outcome.min, outcome.max
@@ -90,7 +90,7 @@ def _band(outcome: Outcome, result: Result) -> Band | None:
         return None
     which = f" ({worst})" if worst and len(subjects) > 1 else ""
     start, stop = chosen[0].ends
-    return Band(*bounds, start, stop, _sentence(outcome, _KINDS[metric].format(outcome.kind) + which), outcome.ok)
+    return Band(*bounds, start, stop, _sentence(outcome, _BAND_LABELS[metric].format(outcome.kind) + which), outcome.ok)
 
 
 def _ripple(spread: Spread, limit: float) -> tuple[float, float, float]:
@@ -107,7 +107,7 @@ def _band_about_mean(spread: Spread, limit: float) -> tuple[float, float, float]
     return (1.0 - limit) * spread.mean, (1.0 + limit) * spread.mean, away
 
 
-_KINDS = {
+_BAND_LABELS = {
     "min": "smallest {}",
     "max": "largest {}",
     "ripple": "ripple",
@@ -117,7 +117,7 @@ _KINDS = {
 }
 """Metrics that are bands, and what they are called on a picture."""
 
-_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
+_BAND_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _band_about_mean}
 """Bounds of the band, and what ranks the branches."""
 
 

@@ -15,7 +15,7 @@ from cfmkit.metrics.metric_values import window_of
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, write_heading
 from cfmkit.plots.bands_from_requirements import bands_of
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.style import GREY, apply_style, axes_mm, is_plain, new_figure
+from cfmkit.plots.style import TEXT_GREY, apply_style, axes_mm, is_plain, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ ENLARGE_BELOW = 0.45
 """The band gets a panel of its own if it takes less than this fraction of the whole picture's height: above it the
 panel would enlarge it to little more than twice."""
 
-LEAST = 0.002
+MIN_BAND_SHARE = 0.002
 """The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""
 
 
@@ -92,7 +92,7 @@ def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, In
         return None
     motion = min(start for start, _ in spans), max(stop for _, stop in spans)
     middle, half = 0.5 * (inside[0] + inside[1]), 0.65 * (inside[1] - inside[0])
-    half = max(half, LEAST * max(abs(inside[0]), abs(inside[1])))
+    half = max(half, MIN_BAND_SHARE * max(abs(inside[0]), abs(inside[1])))
     return motion, (middle - half, middle + half)
 
 
@@ -109,8 +109,8 @@ def _window(result: Result) -> Interval:
 def _frame_of_detail(ax: Axes, curve: Curve, detail: tuple[Interval, Interval]) -> None:
     """Draw the frame of what the lower panel enlarges."""
     low, high = (float(to_border(value, curve.kind)) for value in detail[1])
-    ax.axhspan(low, high, facecolor="none", edgecolor=GREY, linewidth=0.5, zorder=1, gid="no-obstacle")
+    ax.axhspan(low, high, facecolor="none", edgecolor=TEXT_GREY, linewidth=0.5, zorder=1, gid="no-obstacle")
     ax.annotate(
         "enlarged below", (0.995, low), xycoords=("axes fraction", "data"), xytext=(0, -2),
-        textcoords="offset points", ha="right", va="top", color=GREY, size=6.5,
+        textcoords="offset points", ha="right", va="top", color=TEXT_GREY, size=6.5,
     )  # fmt: skip

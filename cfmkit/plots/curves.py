@@ -19,7 +19,7 @@ from cfmkit.plots.axis_labels_and_headings import axis_label, finite_range, show
 from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, pad_limits, shade
-from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, apply_style, is_plain, overlay, size_mm
+from cfmkit.plots.style import BAND_GREEN, LINE_COLOURS, TEXT_GREY, TROUBLE_RED, apply_style, is_plain, overlay, size_mm
 from cfmkit.results import Result
 from cfmkit.specs.units import to_border
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
 
-SAME = 2e-3
+BRANCH_RTOL = 2e-3
 """Branches closer than this fraction of the axes are one line, with one name: 0.2 mm of a print of 100 mm is less
 than a line is thick."""
 
@@ -42,7 +42,7 @@ NAME_ROOM = 0.2
 chosen by eye on the shipped studies."""
 
 
-USUAL = 120.0
+USUAL_AXES_WIDTH = 120.0
 """Width of axes for which `NAME_ROOM` was chosen [mm]; in narrower ones names, whose letters keep their size, take a
 larger share."""
 
@@ -131,7 +131,7 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
 def _name_room(ax: Axes) -> float:
     """Return the share of the axes by which they are longer for the names at the ends of curves."""
     width = ax.get_position().width * size_mm(ax.figure)[0]
-    return NAME_ROOM * min(max(USUAL / width, 1.0), 2.0)
+    return NAME_ROOM * min(max(USUAL_AXES_WIDTH / width, 1.0), 2.0)
 
 
 def _curves(source: Result | Curve | Sequence[Curve]) -> tuple[Curve, ...]:
@@ -145,7 +145,10 @@ def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
     if len(curves) == 1:
         names = curves[0].branches
         several = len(names) > 1
-        return [_line(curves[0], name, LINES[i % len(LINES)], name if several else "") for i, name in enumerate(names)]
+        return [
+            _line(curves[0], name, LINE_COLOURS[i % len(LINE_COLOURS)], name if several else "")
+            for i, name in enumerate(names)
+        ]
     colors, named = _colors(len(curves)), _choose_named(len(curves))
     found = []
     for index, curve in enumerate(curves):
@@ -163,8 +166,8 @@ def _line(curve: Curve, branch: str, color: str, name: str, faint: bool = False)
 
 def _colors(count: int) -> list[str]:
     """Return one colour per curve: the palette, or a scale of lightness where there are more curves than colours."""
-    if count <= len(LINES):
-        return list(LINES[:count])
+    if count <= len(LINE_COLOURS):
+        return list(LINE_COLOURS[:count])
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -232,7 +235,7 @@ def _limit(ax: Axes, drawn: tuple[list[_Line], Sequence[Band]], look: CurveLook,
     up = finite_range([0.0, *(shown_range(points[:, 1]) or ()), *to_border(np.array(marks), kind)])
     ax.set_xlim(*pad_limits(across or (0.0, 1.0), 0.0, 0.02))
     if not np.isfinite(points[:, 1]).any():
-        ax.text(0.5, 0.5, "no point has a finite value", transform=ax.transAxes, ha="center", color=TROUBLE)
+        ax.text(0.5, 0.5, "no point has a finite value", transform=ax.transAxes, ha="center", color=TROUBLE_RED)
     low, high = up or (0.0, 1.0)
     ax.set_ylim(*pad_limits((low, high), 0.0 if low == 0 else 0.08, 0.14 if high else 0.0))
 
@@ -243,7 +246,7 @@ def _draw_band(ax: Axes, band: Band, curve: Curve) -> Label:
     floor, ceiling = ax.get_ylim()
     low, high = (None if value is None else float(to_border(value, curve.kind)) for value in (band.low, band.high))
     bottom, top = floor if low is None else low, ceiling if high is None else high
-    color = BAND if band.met else TROUBLE
+    color = BAND_GREEN if band.met else TROUBLE_RED
     ax.fill_between([left, right], bottom, top, color=color, alpha=0.10, linewidth=0, zorder=1, gid="band")
     for edge in (low, high):
         if edge is not None:
@@ -267,7 +270,7 @@ def _target_line(result: Result) -> _Line | None:
     places = np.linspace(low, high, 201)
     effort = to_border(target.evaluate(places), curve.kind)
     points = np.column_stack([to_border(places, curve.motion_dimension), effort])
-    return _Line(points, np.ones(len(places), dtype=np.bool_), GREY, "target")
+    return _Line(points, np.ones(len(places), dtype=np.bool_), TEXT_GREY, "target")
 
 
 def _earlier_lines(kind: Kind) -> list[_Line]:
@@ -277,7 +280,7 @@ def _earlier_lines(kind: Kind) -> list[_Line]:
         return []
     earlier.require(kind)
     name = f"earlier: {earlier.name}"
-    return [_Line(points, np.ones(len(points), dtype=np.bool_), GREY, name) for points in earlier.branches]
+    return [_Line(points, np.ones(len(points), dtype=np.bool_), TEXT_GREY, name) for points in earlier.branches]
 
 
 def _name_earlier(line: _Line) -> Label:
@@ -314,7 +317,7 @@ def _all_coincide(ax: Axes, lines: list[_Line]) -> bool:
 def _coincide(ax: Axes, one: _Line, other: _Line) -> bool:
     if one.points.shape != other.points.shape:
         return False
-    allowed = SAME * np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+    allowed = BRANCH_RTOL * np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     ways = (np.abs(one.points - points) for points in (other.points, other.points[::-1]))
     return any(bool((np.isnan(gap) | (gap < allowed)).all()) for gap in ways)
 

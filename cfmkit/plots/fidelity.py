@@ -11,7 +11,7 @@ from cfmkit.plots.axis_labels_and_headings import axis_label, remark, shown_rang
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import pad_limits
-from cfmkit.plots.style import GREY, LINES, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import LINE_COLOURS, TEXT_GREY, apply_style, axes_mm, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -66,11 +66,11 @@ def _draw_gaps(ax: Axes, curves: Sequence[Curve], gaps: Sequence[Gap]) -> None:
     labels, shown = [], [0.0]
     for gap in gaps:
         points = np.column_stack([to_border(gap.places, motion), to_border(gap.values, kind)])
-        color = LINES[gap.curve % len(LINES)]
+        color = LINE_COLOURS[gap.curve % len(LINE_COLOURS)]
         ax.plot(*points.T, color=color, linewidth=1.4 if gap.name else 0.8, zorder=3)
         shown += list(shown_range(points[:, 1]) or ())
         labels += [Label(gap.name, color, points, prefer=0.5)] if gap.name and np.isfinite(points).any() else []
-    ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
+    ax.axhline(0.0, color=TEXT_GREY, linewidth=0.7, zorder=2)
     ax.set_ylim(*pad_limits((min(shown), max(shown)), 0.15, 0.25))
     ax.set_xlabel(axis_label(curves[0].motion_name, motion))
     ax.set_ylabel(axis_label("difference", kind))

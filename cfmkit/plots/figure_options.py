@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from cfmkit.plots.overlay import EarlierCurve
 
-FORMATS = ("png", "svg", "pdf")
+FIGURE_FORMATS = ("png", "svg", "pdf")
 
-NARROWEST, WIDEST = 0.06, 0.6
+MIN_PRINT_WIDTH, MAX_PRINT_WIDTH = 0.06, 0.6
 """Widths of print that are allowed [m]: below, axes have no room beside their labels; above, no page is as wide."""
 
 
@@ -130,8 +130,10 @@ def form_of(
     """
     listed = ("png" if formats is None else formats).split(",")
     names = tuple(dict.fromkeys(name.strip().lower() for name in listed if name.strip()))
-    if unknown := [name for name in names if name not in FORMATS] or ([""] if not names else []):
-        raise UsageError(f"--figures: there is no format {visible(unknown[0])!r}; there are {', '.join(FORMATS)}")
+    if unknown := [name for name in names if name not in FIGURE_FORMATS] or ([""] if not names else []):
+        raise UsageError(
+            f"--figures: there is no format {visible(unknown[0])!r}; there are {', '.join(FIGURE_FORMATS)}"
+        )
     from cfmkit.plots.overlay import read_earlier
 
     earlier = None if overlay is None else read_earlier(overlay)
@@ -147,12 +149,12 @@ def _width(text: str) -> float:
         value = float(read_quantity(text, "length"))
     except QuantityError as error:
         raise UsageError(f"--figure-width: {error}") from None
-    if not NARROWEST <= value <= WIDEST:
+    if not MIN_PRINT_WIDTH <= value <= MAX_PRINT_WIDTH:
         raise UsageError(f"--figure-width: {visible(text)} is not allowed: must be 60 mm ... 600 mm")
     return value
 
 
-FIXED = ("backend", "svg.", "pdf.", "ps.", "savefig.format", "savefig.bbox", "text.usetex", "figure.figsize")
+FIXED_SETTINGS = ("backend", "svg.", "pdf.", "ps.", "savefig.format", "savefig.bbox", "text.usetex", "figure.figsize")
 """How the settings begin that a style file cannot change: they would undo what makes files whole and repeatable."""
 
 
@@ -166,7 +168,7 @@ def settings(path: str) -> tuple[tuple[str, Any], ...]:
     """
     found = _read_style(path)
     for name in found:
-        if name.startswith(FIXED):
+        if name.startswith(FIXED_SETTINGS):
             raise UsageError(f"--figure-style: {visible(path)}: {name} is not a style file's to change")
     return tuple(sorted(found.items()))
 

@@ -12,7 +12,7 @@ from cfmkit.store.private_cache_folder import private_folder
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-VARIABLE = "MPLCONFIGDIR"
+CACHE_VARIABLE = "MPLCONFIGDIR"
 
 
 def find_room() -> None:
@@ -20,10 +20,10 @@ def find_room() -> None:
 
     Nothing is done where the user has named a folder, or where matplotlib is there already.
     """
-    if VARIABLE in os.environ or "matplotlib" in sys.modules or all(map(_is_writable, _own_folders())):
+    if CACHE_VARIABLE in os.environ or "matplotlib" in sys.modules or all(map(_is_writable, _own_folders())):
         return
     if (folder := private_folder("fonts")) is not None:
-        os.environ[VARIABLE] = str(folder)
+        os.environ[CACHE_VARIABLE] = str(folder)
 
 
 def _own_folders() -> Iterator[Path]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.style import SMALL, apply_style
+from cfmkit.plots.style import SMALL_FONT, apply_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,37 +23,37 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-CELL = 1.5
+CELL_SIZE = 1.5
 """Size of a cell [pt]: a fifth of the size of the letters, which is as near to a line as a name may come."""
 
-GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
+LABEL_GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
 """Distances from the line that are tried [pt]: from a third of the size of the letters on, farther apart the farther
 away they are, where a place need not be found as exactly."""
 
-FINER = (1.0, 2.5, 4.0, 6.0, 8.5, 11.0, 14.0, 18.0, 23.0, 28.0, 36.0, 46.0, 58.0, 72.0)
+FINER_GAPS = (1.0, 2.5, 4.0, 6.0, 8.5, 11.0, 14.0, 18.0, 23.0, 28.0, 36.0, 46.0, 58.0, 72.0)
 """The same where every place of those covers a line, as in a narrow figure: nearer, closer together, and farther."""
 
-COVERING = 40.0
+COVERING_COST = 40.0
 """What it costs to cover a line over the height of a name [pt]: more than any distance that is tried."""
 
-MARGIN = 1.5
+EDGE_MARGIN = 1.5
 """Least distance of a name from the edge of the axes [pt]: one cell."""
 
-LEADER = 9.0
+MIN_LEADER_DISTANCE = 9.0
 """From this distance on a thin line leads from the name to its line [pt]: more than the height of the letters, another
 name could stand between them."""
 
-SIGHT = 12
+N_SIGHT_PLACES = 12
 """So many places between a name and its line are looked at: over the farthest distance they are 2.5 pt apart."""
 
-TOGETHER = 60.0
+CROWDING_COST = 60.0
 """What it costs to stand at a point where the lines of other names are within a cell or two: it would name any of them.
 As much as another name between the two."""
 
-APART = 6.0
+MIN_LINE_DISTANCE = 6.0
 """From this distance on lines are told apart [pt]: four cells, the height of small letters."""
 
-_SIDES = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
+_SIDE_DIRECTIONS = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Label:
 
 
 @apply_style
-def place_labels(ax: Axes, labels: list[Label], size: float = SMALL) -> list[Text]:
+def place_labels(ax: Axes, labels: list[Label], size: float = SMALL_FONT) -> list[Text]:
     """Write names on axes whose limits are final; return the texts.
 
     Parameters
@@ -104,11 +104,11 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
     center, cost = _best(ground, label, (points, together), box)
     covered = float(ground.count_covered(center[None, :], box)[0])
     if covered > 0:
-        chosen, cost = label.text, cost + 2.0 * COVERING * covered
+        chosen, cost = label.text, cost + 2.0 * COVERING_COST * covered
         for words in (label.text, _in_two_lines(label.text)):
             text.set_text(words)
             other = ground.size_of(text)
-            place, price = _best(ground, label, (points, together), other, FINER)
+            place, price = _best(ground, label, (points, together), other, FINER_GAPS)
             if price < cost:
                 center, cost, box, chosen = place, price, other, words
         text.set_text(chosen)
@@ -119,7 +119,7 @@ def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray])
         _clear(ground, center, box)
     gap = np.hypot(*np.maximum(np.abs(points - center) - box / 2, 0.0).T)
     anchor = points[int(np.argmin(gap))]
-    if gap.min() > LEADER:
+    if gap.min() > MIN_LEADER_DISTANCE:
         _lead(ground, (center, box, anchor), label.color)
     ground.occupy(center, box + 2.0)
     return text
@@ -155,7 +155,7 @@ def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]
     found = np.zeros(len(points), dtype=bool)
     for line in others:
         away = points[:, None, :] - _thin_points(line, 200)[None, :, :]
-        found |= (np.hypot(away[..., 0], away[..., 1]) < APART).any(axis=1)
+        found |= (np.hypot(away[..., 0], away[..., 1]) < MIN_LINE_DISTANCE).any(axis=1)
     return found
 
 
@@ -164,7 +164,7 @@ def _best(
     label: Label,
     named: tuple[FloatArray, NDArray[np.bool_]],
     box: FloatArray,
-    tried: tuple[float, ...] = GAPS,
+    tried: tuple[float, ...] = LABEL_GAPS,
 ) -> tuple[FloatArray, float]:
     """Return the cheapest centre for a box [pt] beside points, some together with other lines, and what it costs."""
     points, together = named
@@ -173,7 +173,7 @@ def _best(
     centers = (points[:, None, :] + offsets[None, :, :]).reshape(-1, 2)
     share = np.repeat(np.linspace(0.0, 1.0, len(points)) if len(points) > 1 else [label.prefer], len(offsets))
     slanted = np.tile(np.abs(sides).sum(axis=1) > 1, len(points))
-    weight = 3.0 * COVERING if tried is FINER else COVERING
+    weight = 3.0 * COVERING_COST if tried is FINER_GAPS else COVERING_COST
     covered = ground.count_covered(centers, box)
     near = ground.count_covered(centers, box + 5.0)
     cost = (
@@ -184,7 +184,7 @@ def _best(
         unit = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
         cost = cost + np.tile(25.0 * (1.0 - unit @ wanted), len(points))
     cost = cost + _cost_between(ground, centers, box, np.repeat(points, len(offsets), axis=0))
-    cost = cost + TOGETHER * np.repeat(together, len(offsets))
+    cost = cost + CROWDING_COST * np.repeat(together, len(offsets))
     cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
     cheapest = int(np.argmin(cost))
     center: FloatArray = centers[cheapest]
@@ -197,12 +197,15 @@ def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     In a narrow figure a corner of the name may also stand above or below the point, not on a diagonal alone.
     """
     away = np.array(tried)
-    sides, gaps = np.repeat(_SIDES, len(away), axis=0), np.tile(away, len(_SIDES))[:, None] * [1.0, 1.0]
-    if tried is not FINER:
+    sides, gaps = (
+        np.repeat(_SIDE_DIRECTIONS, len(away), axis=0),
+        np.tile(away, len(_SIDE_DIRECTIONS))[:, None] * [1.0, 1.0],
+    )
+    if tried is not FINER_GAPS:
         return sides, gaps
-    corners = np.repeat(_SIDES[4:], len(away), axis=0)
+    corners = np.repeat(_SIDE_DIRECTIONS[4:], len(away), axis=0)
     # a point on the edge of the axes, as where a curve begins, leaves the name its margin
-    upright = np.column_stack([np.full(len(corners), FINER[0] + MARGIN), np.tile(away, 4)])
+    upright = np.column_stack([np.full(len(corners), FINER_GAPS[0] + EDGE_MARGIN), np.tile(away, 4)])
     return np.concatenate([sides, corners]), np.concatenate([gaps, upright])
 
 
@@ -212,7 +215,10 @@ def _cost_between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors
     way = anchors - starts
     length = np.hypot(way[:, 0], way[:, 1])
     # the line that is named ends the way: its own cells are no obstacle
-    shares = np.linspace(0.0, 1.0, SIGHT) * np.maximum(1.0 - 2.0 * CELL / np.maximum(length, CELL), 0.0)[:, None]
+    shares = (
+        np.linspace(0.0, 1.0, N_SIGHT_PLACES)
+        * np.maximum(1.0 - 2.0 * CELL_SIZE / np.maximum(length, CELL_SIZE), 0.0)[:, None]
+    )
     places = starts[:, None, :] + shares[:, :, None] * way[:, None, :]
     cost: FloatArray = 15.0 * ground.any_at(places, ground.taken) + 60.0 * ground.any_at(places, ground.named)
     return cost
@@ -256,7 +262,7 @@ class _Ground:
         box = ax.get_window_extent()
         self.corner = np.array([box.x0, box.y0])
         self.extent = np.array([box.width, box.height]) * self.scale
-        self.shape = np.maximum(np.ceil(self.extent / CELL).astype(int), 1)
+        self.shape = np.maximum(np.ceil(self.extent / CELL_SIZE).astype(int), 1)
         self.taken = np.zeros(self.shape, dtype=np.int64)
         self.named = np.zeros(self.shape, dtype=np.int64)
         self._mark_artists()
@@ -307,18 +313,18 @@ class _Ground:
         )
         start, step = start[keep], step[keep]
         # of a segment that leaves the axes by far, as many cells; the limit comes first, or the integer overflows
-        count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL) + 1, 2000).astype(int)
+        count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL_SIZE) + 1, 2000).astype(int)
         if not len(count):
             return
         which = np.repeat(np.arange(len(count)), count)
         share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / count[which]
-        cells = np.floor((start[which] + share[:, None] * step[which]) / CELL).astype(int)
+        cells = np.floor((start[which] + share[:, None] * step[which]) / CELL_SIZE).astype(int)
         cells = cells[((cells >= 0) & (cells < self.shape)).all(axis=1)]
         self.taken[cells[:, 0], cells[:, 1]] = 1
 
     def _fill(self, low: FloatArray, high: FloatArray, name: bool = False) -> None:
-        a = np.clip(np.floor(low / CELL).astype(int), 0, self.shape)
-        b = np.clip(np.ceil(high / CELL).astype(int), 0, self.shape)
+        a = np.clip(np.floor(low / CELL_SIZE).astype(int), 0, self.shape)
+        b = np.clip(np.ceil(high / CELL_SIZE).astype(int), 0, self.shape)
         self.taken[a[0] : b[0], a[1] : b[1]] = 1
         if name:
             self.named[a[0] : b[0], a[1] : b[1]] = 1
@@ -333,21 +339,21 @@ class _Ground:
 
     def count_covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
         """Return how many taken cells a box covers at each centre, in units of its own height."""
-        a = np.clip(np.floor((centers - box / 2) / CELL).astype(int), 0, self.shape)
-        b = np.clip(np.ceil((centers + box / 2) / CELL).astype(int), 0, self.shape)
+        a = np.clip(np.floor((centers - box / 2) / CELL_SIZE).astype(int), 0, self.shape)
+        b = np.clip(np.ceil((centers + box / 2) / CELL_SIZE).astype(int), 0, self.shape)
         total = self.total
         count = total[b[:, 0], b[:, 1]] - total[a[:, 0], b[:, 1]] - total[b[:, 0], a[:, 1]] + total[a[:, 0], a[:, 1]]
-        share: FloatArray = count / max(float(box[1]) / CELL, 1.0)
+        share: FloatArray = count / max(float(box[1]) / CELL_SIZE, 1.0)
         return share
 
     def any_at(self, places: FloatArray, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return for each row of places (n, m, 2) whether one of them lies in a marked cell."""
-        at = np.clip(np.floor(places / CELL).astype(int), 0, np.array(self.shape) - 1)
+        at = np.clip(np.floor(places / CELL_SIZE).astype(int), 0, np.array(self.shape) - 1)
         found: NDArray[np.bool_] = cells[at[..., 0], at[..., 1]].any(axis=1)
         return found
 
     def holds(self, centers: FloatArray, box: FloatArray) -> NDArray[np.bool_]:
         """Return at which centres the box lies wholly in the axes."""
         low, high = centers - box / 2, centers + box / 2
-        holds: NDArray[np.bool_] = np.all((low >= MARGIN) & (high <= self.extent - MARGIN), axis=1)
+        holds: NDArray[np.bool_] = np.all((low >= EDGE_MARGIN) & (high <= self.extent - EDGE_MARGIN), axis=1)
         return holds

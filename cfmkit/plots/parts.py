@@ -16,7 +16,16 @@ from cfmkit.export.posed_part import arc
 from cfmkit.export.posed_part import box as box_of
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.label_placement import Label
-from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import (
+    LINE_VERMILLION,
+    SMALL_FONT,
+    SPRING_OCHRE,
+    TEXT_GREY,
+    TEXT_INK,
+    apply_style,
+    axes_mm,
+    new_figure,
+)
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -31,10 +40,10 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
-PLATE, STEEL, LINK = "#DADADA", "#F4F7FA", "#3D5A73"
+PLATE_COLOUR, STEEL_COLOUR, LINK_COLOUR = "#DADADA", "#F4F7FA", "#3D5A73"
 """Fill of what is cut from sheet, of rollers, and colour of links."""
 
-TITLE = 10.0
+TITLE_HEIGHT = 10.0
 """Room for a title of two lines above a panel [mm]."""
 
 
@@ -53,7 +62,7 @@ def plate(ax: Axes, outlines: Iterable[FloatArray], gid: str = "plate") -> None:
     paths = [Path(np.vstack([mm(points), mm(points[:1])]), closed=True) for points in outlines]
     if paths:
         shape = Path.make_compound_path(*paths)
-        ax.add_artist(PathPatch(shape, facecolor=PLATE, edgecolor=GREY, linewidth=0.7, zorder=1.2, gid=gid))
+        ax.add_artist(PathPatch(shape, facecolor=PLATE_COLOUR, edgecolor=TEXT_GREY, linewidth=0.7, zorder=1.2, gid=gid))
 
 
 def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
@@ -69,7 +78,7 @@ def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
 @apply_style
 def edge(ax: Axes, points: FloatArray, gid: str, **options: Any) -> None:
     """Draw a chain of points (n, 2) as a line: a flank, a path."""
-    look: dict[str, Any] = {"color": INK, "linewidth": 0.9, "zorder": 1.6} | options
+    look: dict[str, Any] = {"color": TEXT_INK, "linewidth": 0.9, "zorder": 1.6} | options
     _line(ax, *mm(points).T, gid=gid, **look)
 
 
@@ -79,18 +88,20 @@ def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: b
     from matplotlib.patches import Circle
 
     x, y = mm(center)
-    circle = Circle((x, y), float(mm(radius)), facecolor=STEEL, edgecolor=INK, linewidth=0.9, zorder=2.2, gid=gid)
+    circle = Circle(
+        (x, y), float(mm(radius)), facecolor=STEEL_COLOUR, edgecolor=TEXT_INK, linewidth=0.9, zorder=2.2, gid=gid
+    )
     if ghost:
-        circle.set(facecolor="none", edgecolor=GREY, linestyle="--")
+        circle.set(facecolor="none", edgecolor=TEXT_GREY, linestyle="--")
     ax.add_artist(circle)
-    _line(ax, [x], [y], marker="o", markersize=2.2, color=GREY if ghost else INK, zorder=4)
+    _line(ax, [x], [y], marker="o", markersize=2.2, color=TEXT_GREY if ghost else TEXT_INK, zorder=4)
 
 
 @apply_style
 def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     """Draw a rigid link between two pins."""
     _line(
-        ax, *mm([start, end]).T, color=LINK, linewidth=2.0, marker="o", markersize=3.0,
+        ax, *mm([start, end]).T, color=LINK_COLOUR, linewidth=2.0, marker="o", markersize=3.0,
         markerfacecolor="white", markeredgewidth=0.8, zorder=3, gid=gid,
     )  # fmt: skip
 
@@ -106,7 +117,7 @@ def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring"
     side = np.zeros(len(share))
     side[2:-2] = np.where(np.arange(len(share) - 4) % 2 == 0, 0.5, -0.5)
     points = a + np.outer(share, along) + np.outer(side, across)
-    _line(ax, *mm(points).T, color=OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
+    _line(ax, *mm(points).T, color=SPRING_OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
 @apply_style
@@ -116,19 +127,30 @@ def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
 
     (x, y), side = mm(center), float(mm(size))
     corner = (x - side / 2, y - side / 2)
-    ax.add_artist(Rectangle(corner, side, side, facecolor=LINK, edgecolor=INK, linewidth=0.6, zorder=3.4, gid=gid))
+    ax.add_artist(
+        Rectangle(corner, side, side, facecolor=LINK_COLOUR, edgecolor=TEXT_INK, linewidth=0.6, zorder=3.4, gid=gid)
+    )
 
 
 @apply_style
 def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:
     """Draw the vertical axis x = 0 as a dash-dotted line."""
-    _line(ax, [0.0, 0.0], mm([low, high]), color=GREY, linewidth=0.6, dashes=(9, 2.5, 1.5, 2.5), zorder=1.1, gid="axis")
+    _line(
+        ax,
+        [0.0, 0.0],
+        mm([low, high]),
+        color=TEXT_GREY,
+        linewidth=0.6,
+        dashes=(9, 2.5, 1.5, 2.5),
+        zorder=1.1,
+        gid="axis",
+    )
 
 
 @apply_style
 def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
     """Draw a force from `tail` to `tip`."""
-    look = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 1.4, "mutation_scale": 10}
+    look = {"arrowstyle": "-|>", "color": LINE_VERMILLION, "linewidth": 1.4, "mutation_scale": 10}
     arrow = ax.annotate("", mm(tip).tolist(), mm(tail).tolist(), arrowprops=look | {"shrinkA": 0, "shrinkB": 0})
     arrow.set(zorder=3.5, gid=gid, annotation_clip=False)
 
@@ -172,7 +194,16 @@ def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     """Mark a point of contact."""
     x, y = mm(point)
     _line(
-        ax, [x], [y], marker="o", markersize=3.2, color=VERMILLION, markeredgewidth=0, zorder=4.5, gid=gid, linestyle=""
+        ax,
+        [x],
+        [y],
+        marker="o",
+        markersize=3.2,
+        color=LINE_VERMILLION,
+        markeredgewidth=0,
+        zorder=4.5,
+        gid=gid,
+        linestyle="",
     )
 
 
@@ -209,15 +240,15 @@ def close_up(ax: Axes, center: Point, half_width: float) -> None:
 def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], stacked: bool = False) -> list[Axes]:
     """Return titled axes of equal size, spread over the width of the figure or `stacked` from top to bottom.
 
-    The lowest 12 mm stay free for the axis, and `TITLE` above every panel for its title.
+    The lowest 12 mm stay free for the axis, and `TITLE_HEIGHT` above every panel for its title.
     """
     left, bottom, free, last = 17.0, 12.0, 138.0, len(titles) - 1
     across = 0.0 if stacked else (free - size_mm[0]) / max(last, 1)
-    up = size_mm[1] + TITLE if stacked else 0.0
+    up = size_mm[1] + TITLE_HEIGHT if stacked else 0.0
     corners = [(left + number * across, bottom + (last - number) * up) for number in range(len(titles))]
     found = [axes_mm(figure, (*corner, *size_mm)) for corner in corners]
     for ax, title in zip(found, titles, strict=True):
-        ax.set_title(title, fontsize=SMALL)
+        ax.set_title(title, fontsize=SMALL_FONT)
         ax.locator_params("x", nbins=4)
     return found
 
@@ -227,7 +258,7 @@ def poses(heading: Heading, box: Box, titles: Sequence[str]) -> tuple[Figure, li
     """Return a figure with a titled panel for each of up to three poses, all showing one box [m] to scale."""
     slender = (box[3] - box[1]) / (box[2] - box[0])
     size = (min(43.5, 120.0 / slender), min(43.5 * slender, 120.0))
-    figure = new_figure(160.0, 10.0 + size[1] + TITLE + heading.height_mm)
+    figure = new_figure(160.0, 10.0 + size[1] + TITLE_HEIGHT + heading.height_mm)
     write_heading(figure, heading)
     found = panels(figure, size, titles)
     for ax in found:
@@ -237,7 +268,7 @@ def poses(heading: Heading, box: Box, titles: Sequence[str]) -> tuple[Figure, li
     return figure, found
 
 
-def part_name(text: str, points: Any, toward: Point, color: str = INK, prefer: float = 0.5) -> Label:
+def part_name(text: str, points: Any, toward: Point, color: str = TEXT_INK, prefer: float = 0.5) -> Label:
     """Return the name of a part at some points (n, 2) [m], to stand in a direction from it."""
     return Label(text, color, mm(points).reshape(-1, 2), prefer, toward, halo=False)
 

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-POSES = 17
+N_FILM_POSES = 17
 """Poses of a film: every sixteenth of the travel, which the eye joins; with 25 a cam's page took 1.6 times as long as
 its figures, and half as long again is what a page may cost."""
 
-WIDTH, HIGHEST = 150.0, 110.0
+MAX_DRAWING_WIDTH, MAX_DRAWING_HEIGHT = 150.0, 110.0
 """Largest width and height of the drawing [mm of print]."""
 
-_SVG = "http://www.w3.org/2000/svg"
-_LINK = "http://www.w3.org/1999/xlink"
+_SVG_NAMESPACE = "http://www.w3.org/2000/svg"
+_XLINK_NAMESPACE = "http://www.w3.org/1999/xlink"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Moving:
     draw_as_made: Callable[[Axes, int], Any] | None = None
 
 
-def choose_poses(count: int, poses: int = POSES) -> FloatArray:
+def choose_poses(count: int, poses: int = N_FILM_POSES) -> FloatArray:
     """Return which of so many points of a curve are shown as poses: evenly, the ends included."""
     return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
 
@@ -75,7 +75,7 @@ def still(moving: Moving, number: int, title: str) -> str:
 def poses(moving: Moving, numbers: Iterable[int]) -> list[ElementTree.Element]:
     """Return poses as SVG, all drawn on the same axes: to make axes takes as long as to draw on them."""
     left, bottom, right, top = moving.box
-    scale = min(WIDTH / (right - left), HIGHEST / (top - bottom))
+    scale = min(MAX_DRAWING_WIDTH / (right - left), MAX_DRAWING_HEIGHT / (top - bottom))
     figure = new_figure((right - left) * scale, (top - bottom) * scale)
     ax = axes_mm(figure, (0.0, 0.0, (right - left) * scale, (top - bottom) * scale))
     ax.set_axis_off()
@@ -91,8 +91,8 @@ def poses(moving: Moving, numbers: Iterable[int]) -> list[ElementTree.Element]:
 
 def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
     """Return poses as one: runs of what differs between pieces that all of them have, in the order of drawing."""
-    ElementTree.register_namespace("", _SVG)
-    ElementTree.register_namespace("xlink", _LINK)
+    ElementTree.register_namespace("", _SVG_NAMESPACE)
+    ElementTree.register_namespace("xlink", _XLINK_NAMESPACE)
     each = [[_plain(element) for element in _pieces(pose)] for pose in poses]
     common = _common(each)
     body: list[str] = []
@@ -110,21 +110,24 @@ def _merge_poses(poses: Sequence[ElementTree.Element], title: str) -> str:
         shared |= {_name_group(piece): _plain(piece) for piece in pose.iter() if piece.get("id") and _is_shared(piece)}
     box = poses[0].get("viewBox", "")
     return (
-        f'<svg xmlns="{_SVG}" xmlns:xlink="{_LINK}" viewBox="{box}" role="img" aria-label={quoteattr(title)}>'
+        f'<svg xmlns="{_SVG_NAMESPACE}" xmlns:xlink="{_XLINK_NAMESPACE}" viewBox="{box}" role="img" '
+        f"aria-label={quoteattr(title)}>"
         f"<defs>{''.join(shared.values())}</defs>{''.join(body)}</svg>"
     )
 
 
 def _pieces(pose: ElementTree.Element) -> list[ElementTree.Element]:
     """Return what is drawn, in order: paths, uses and texts that stand in no definition."""
-    hidden = {id(inner) for block in pose.iter(f"{{{_SVG}}}defs") for inner in block.iter()}
-    drawn = {f"{{{_SVG}}}{kind}" for kind in ("path", "use", "text", "image")}
+    hidden = {id(inner) for block in pose.iter(f"{{{_SVG_NAMESPACE}}}defs") for inner in block.iter()}
+    drawn = {f"{{{_SVG_NAMESPACE}}}{kind}" for kind in ("path", "use", "text", "image")}
     return [element for element in pose.iter() if element.tag in drawn and id(element) not in hidden]
 
 
 def _is_shared(piece: ElementTree.Element) -> bool:
     """Return whether a piece is a definition: a marker, or where something is cut off."""
-    return piece.tag == f"{{{_SVG}}}clipPath" or (piece.tag == f"{{{_SVG}}}path" and "m" in _name_group(piece)[5:6])
+    return piece.tag == f"{{{_SVG_NAMESPACE}}}clipPath" or (
+        piece.tag == f"{{{_SVG_NAMESPACE}}}path" and "m" in _name_group(piece)[5:6]
+    )
 
 
 def _name_group(piece: ElementTree.Element) -> str:

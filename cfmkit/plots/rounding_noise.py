@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-ROUNDING = 1e-9
+NOISE_SHARE = 1e-9
 """Share of the size of values below which a difference of them, or one of them, is rounding: far above what
 sums of a thousand terms lose (1e-13), and far below what a picture shows."""
 
@@ -17,7 +17,7 @@ sums of a thousand terms lose (1e-13), and far below what a picture shows."""
 def is_level(values: FloatArray) -> bool:
     """Return whether the finite ones of some values differ by rounding only, or there are none."""
     known = values[np.isfinite(values)]
-    return not len(known) or bool(np.ptp(known) <= ROUNDING * np.abs(known).max())
+    return not len(known) or bool(np.ptp(known) <= NOISE_SHARE * np.abs(known).max())
 
 
 def remove_rounding(values: FloatArray) -> FloatArray:
@@ -44,4 +44,4 @@ def vanishing(values: FloatArray, size: float) -> FloatArray:
     >>> vanishing(np.array([1e-12, -2.0]), 5.0).tolist()
     [0.0, -2.0]
     """
-    return np.where(np.abs(values) <= ROUNDING * size, 0.0, values)
+    return np.where(np.abs(values) <= NOISE_SHARE * size, 0.0, values)

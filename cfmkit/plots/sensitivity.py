@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, metric_label, metric_values, write_heading
+from cfmkit.plots.axis_labels_and_headings import LEFT_MARGIN, Heading, metric_label, metric_values, write_heading
 from cfmkit.plots.rounding_noise import is_level, remove_rounding
 from cfmkit.plots.style import (
-    BAND,
-    BLUE,
-    GREY,
-    INK,
-    LINES,
-    SMALL,
-    TROUBLE,
-    VERMILLION,
+    BAND_GREEN,
+    LINE_BLUE,
+    LINE_COLOURS,
+    LINE_VERMILLION,
+    SMALL_FONT,
+    TEXT_GREY,
+    TEXT_INK,
+    TROUBLE_RED,
     apply_style,
     axes_mm,
     has_titles,
@@ -67,25 +67,25 @@ def draw_histogram(found: Findings, number: int) -> Figure:
     title = f"{setup.study.spec.name}: {metric.label.replace('_', ' ')}"
     _head(figure, title)
     width, height = size_mm(figure)
-    place = (LEFT / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
+    place = (LEFT_MARGIN / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
     if not is_plain():
-        figure.text(*place, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL, color=INK)
+        figure.text(*place, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL_FONT, color=TEXT_INK)
     if len(known):
-        axes.hist(known, _edges(known).tolist(), color=BLUE, alpha=0.85)
+        axes.hist(known, _edges(known).tolist(), color=LINE_BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
     allowed = () if is_plain() else setup.limits(metric)
     limits = [limit for one in allowed for limit in _ends(one)]
     nominal = float(metric_values(setup.nominal.values[number], metric.dimension))
     _frame(axes, [*known.tolist(), *limits, nominal])
     _limits(axes, allowed)
-    axes.axvline(nominal, color=INK, linewidth=1.0, linestyle="--")
+    axes.axvline(nominal, color=TEXT_INK, linewidth=1.0, linestyle="--")
     axes.annotate(
         "nominal",
         (nominal, 1.0),
         (2, -2),
         xycoords=axes.get_xaxis_transform(),
         textcoords="offset points",
-        size=SMALL,
+        size=SMALL_FONT,
         va="top",
     )
     axes.set(xlabel=metric_label(metric.name, metric.dimension), ylabel="parts")
@@ -119,11 +119,11 @@ def _limits(axes: Axes, each: tuple[Bounds, ...]) -> None:
             None if end is None else float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max)
         ]
         inside = low if ends[0] is None else ends[0], high if ends[1] is None else ends[1]
-        axes.axvspan(*inside, color=BAND, alpha=0.10, linewidth=0, zorder=0)
+        axes.axvspan(*inside, color=BAND_GREEN, alpha=0.10, linewidth=0, zorder=0)
         for end, words, side in zip(ends, ("min", "max"), (3, -3), strict=True):
             if end is None:
                 continue
-            axes.axvline(end, color=TROUBLE, linewidth=1.2)
+            axes.axvline(end, color=TROUBLE_RED, linewidth=1.2)
             axes.annotate(
                 f"{words} {end:.6g}",
                 (end, 0.88),
@@ -131,8 +131,8 @@ def _limits(axes: Axes, each: tuple[Bounds, ...]) -> None:
                 xycoords=axes.get_xaxis_transform(),
                 textcoords="offset points",
                 ha="left" if side > 0 else "right",
-                size=SMALL,
-                color=TROUBLE,
+                size=SMALL_FONT,
+                color=TROUBLE_RED,
             )
 
 
@@ -153,8 +153,8 @@ def _summary(drawn: FloatArray, known: FloatArray, limits: tuple[Bounds, ...]) -
 MOST_SHOWN = 12
 """Parameters on a picture, those that do most; as many as there are markers. The tables have all."""
 
-MARKERS = "osD^v<>ph*XP"
-_LEFT, _ROW = 46.0, 8.0
+MARKER_SHAPES = "osD^v<>ph*XP"
+_LEFT_MARGIN, _ROW_HEIGHT = 46.0, 8.0
 
 
 @dataclass(frozen=True)
@@ -166,11 +166,11 @@ class Bars:
     colour: str
 
 
-BARS = {
-    "local": (Bars("normalised_slope", "relative change per relative change of the parameter", BLUE),),
+BAR_CHARTS = {
+    "local": (Bars("normalised_slope", "relative change per relative change of the parameter", LINE_BLUE),),
     "sobol": (
-        Bars("total_order", "total order: with all interactions", BLUE),
-        Bars("first_order", "first order: the parameter alone", VERMILLION),
+        Bars("total_order", "total order: with all interactions", LINE_BLUE),
+        Bars("first_order", "first order: the parameter alone", LINE_VERMILLION),
     ),
 }
 
@@ -221,11 +221,11 @@ def _rank_parameters(lines: Sequence[IndexLine]) -> list[int]:
 
 def _bar_axes(count: int, heading: str, legend: bool = False) -> tuple[Figure, Axes]:
     below, above = 14.0, 9.0 + 6.0 * legend
-    figure = new_figure(150, below + above + _ROW * count + 4.0)
-    axes = axes_mm(figure, (_LEFT, below, 150 - _LEFT - 6, _ROW * count + 4.0))
+    figure = new_figure(150, below + above + _ROW_HEIGHT * count + 4.0)
+    axes = axes_mm(figure, (_LEFT_MARGIN, below, 150 - _LEFT_MARGIN - 6, _ROW_HEIGHT * count + 4.0))
     _head(figure, heading)
     axes.grid(visible=False, axis="y")
-    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.axvline(0.0, color=TEXT_GREY, linewidth=0.8)
     return figure, axes
 
 
@@ -245,18 +245,20 @@ def _draw_bars(
         line = lines[k]
         if line.value is None:
             place = (0.0, row + shift)
-            axes.annotate("not stated", place, (3, 0), textcoords="offset points", va="center", size=SMALL)
+            axes.annotate("not stated", place, (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
             continue
         axes.barh(row + shift, line.value, height, color=colour, label=words)
         words = ""
         if line.low is not None and line.high is not None:
-            axes.plot((line.low, line.high), (row + shift,) * 2, color=INK, linewidth=1.0, marker="|", markersize=5)
+            axes.plot(
+                (line.low, line.high), (row + shift,) * 2, color=TEXT_INK, linewidth=1.0, marker="|", markersize=5
+            )
 
 
 @apply_style
 def draw_bars(found: Findings, number: int) -> Figure:
     """Return the indices of one metric as bars with their intervals."""
-    metric, kinds = found.setup.study.metrics[number], BARS[found.setup.method]
+    metric, kinds = found.setup.study.metrics[number], BAR_CHARTS[found.setup.method]
     each = [_lines(found, metric.label, kind.index) for kind in kinds]
     order = _rank_parameters(each[0])
     figure, axes = _bar_axes(len(order), _title(found, metric), len(kinds) > 1)
@@ -266,7 +268,7 @@ def draw_bars(found: Findings, number: int) -> Figure:
     _rows(axes, [each[0][k].parameter for k in order])
     axes.set_xlabel("share of the variance [1]" if len(kinds) > 1 else f"{kinds[0].words} [1]")
     if len(kinds) > 1 and axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=SMALL)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=SMALL_FONT)
     return figure
 
 
@@ -279,7 +281,7 @@ def draw_gains(found: Findings) -> Figure:
     stated = share is not None and share.value == share.value
     reported = f"yield {100 * share.value:.1f} %" if share is not None and stated else "yield not stated"
     figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {reported}; which tolerance to tighten first")
-    _draw_bars(axes, lines, order, (BLUE, "", 0.0, 0.6))
+    _draw_bars(axes, lines, order, (LINE_BLUE, "", 0.0, 0.6))
     _rows(axes, [lines[k].parameter for k in order])
     from matplotlib.ticker import PercentFormatter
 
@@ -298,23 +300,31 @@ def draw_oat(found: Findings, number: int) -> Figure:
     metric, setup = found.setup.study.metrics[number], found.setup
     swings = _lines(found, metric.label, "swing")
     order = _rank_parameters(swings)
-    room = max(60.0, _ROW * len(order) + 10.0)
+    room = max(60.0, _ROW_HEIGHT * len(order) + 10.0)
     figure = new_figure(190, room + 24)
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
     _head(figure, _title(found, metric))
     every_output = np.empty((len(swings), 0)) if found.outputs is None else found.outputs[:, :, number]
     shown = remove_rounding(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
     nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
-    bars.axvline(nominal, color=GREY, linewidth=0.8)
+    bars.axvline(nominal, color=TEXT_GREY, linewidth=0.8)
     for row, k in enumerate(order):
         values = outputs[k]
         where = np.linspace(0.0, 1.0, len(values))
-        colour = LINES[row % len(LINES)]
+        colour = LINE_COLOURS[row % len(LINE_COLOURS)]
         every = max(1, len(values) // 10)
-        curves.plot(where, values, color=colour, marker=MARKERS[row], markersize=3, linewidth=1.0, markevery=every)
+        curves.plot(
+            where, values, color=colour, marker=MARKER_SHAPES[row], markersize=3, linewidth=1.0, markevery=every
+        )
         _tornado(bars, row, swings[k], (nominal, float(values[0]), float(values[-1])))
         bars.plot(
-            -0.04, row, marker=MARKERS[row], color=colour, transform=bars.get_yaxis_transform(), clip_on=False, ms=4
+            -0.04,
+            row,
+            marker=MARKER_SHAPES[row],
+            color=colour,
+            transform=bars.get_yaxis_transform(),
+            clip_on=False,
+            ms=4,
         )
     _rows(bars, [swings[k].parameter for k in order])
     bars.tick_params(axis="y", pad=9)
@@ -327,14 +337,14 @@ def draw_oat(found: Findings, number: int) -> Figure:
 def _tornado(axes: Axes, row: int, swing: IndexLine, ends: tuple[float, float, float]) -> None:
     nominal, low, high = ends
     if swing.value is None:
-        axes.annotate("not stated", (nominal, row), (3, 0), textcoords="offset points", va="center", size=SMALL)
+        axes.annotate("not stated", (nominal, row), (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
         return
-    for value, colour, shift in ((low, BLUE, -0.18), (high, VERMILLION, 0.18)):
+    for value, colour, shift in ((low, LINE_BLUE, -0.18), (high, LINE_VERMILLION, 0.18)):
         if np.isfinite(value):
             axes.barh(row + shift, value - nominal, 0.34, left=nominal, color=colour)
         else:
             place = (nominal, row + shift)
-            axes.annotate("no result there", place, (3, 0), textcoords="offset points", va="center", size=SMALL)
+            axes.annotate("no result there", place, (3, 0), textcoords="offset points", va="center", size=SMALL_FONT)
 
 
 def _unit(metric: Metric) -> str:
@@ -356,15 +366,21 @@ def draw_morris(found: Findings, number: int) -> Figure:
         if size.value is None or scatter.value is None:
             axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
             continue
-        colour, ends, up = LINES[row % len(LINES)], [factor * end for end in _numbers(size)[2:]], factor * scatter.value
-        axes.plot(factor * size.value, up, MARKERS[row], label=label, linestyle="", color=colour, ms=5, clip_on=False)
+        colour, ends, up = (
+            LINE_COLOURS[row % len(LINE_COLOURS)],
+            [factor * end for end in _numbers(size)[2:]],
+            factor * scatter.value,
+        )
+        axes.plot(
+            factor * size.value, up, MARKER_SHAPES[row], label=label, linestyle="", color=colour, ms=5, clip_on=False
+        )
         axes.plot(ends, (up,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0, clip_on=False)
         top = max(top, factor * (size.high or 0.0), up)
     if top:
-        look = {"textcoords": "offset points", "ha": "right", "size": SMALL, "color": GREY}
-        axes.plot((0, top), (0, top), color=GREY, linewidth=0.6, linestyle="--")
+        look = {"textcoords": "offset points", "ha": "right", "size": SMALL_FONT, "color": TEXT_GREY}
+        axes.plot((0, top), (0, top), color=TEXT_GREY, linewidth=0.6, linestyle="--")
         axes.annotate("sigma = mu*", (0.5 * top, 0.5 * top), (-4, 2), **look)  # type: ignore[arg-type]
-    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL_FONT)
     unit = _unit(metric).rpartition(" ")[2]
     axes.set(xlabel=f"mu*: mean size of the effect of the whole range {unit}", ylabel=f"sigma: its scatter {unit}")
     axes.set(xlim=(0, None), ylim=(0, None))
@@ -387,16 +403,16 @@ def draw_convergence(found: Findings, number: int) -> Figure:
             continue
         sizes, values, low, high = own.T
         sizes = sizes * 1.03 ** (row - len(order) / 2)
-        colour = LINES[row % len(LINES)]
+        colour = LINE_COLOURS[row % len(LINE_COLOURS)]
         label = "\n".join(textwrap.wrap(short(path), 26))
-        axes.plot(sizes, values, color=colour, marker=MARKERS[row], markersize=4, label=label)
+        axes.plot(sizes, values, color=colour, marker=MARKER_SHAPES[row], markersize=4, label=label)
         axes.vlines(sizes, low, high, color=colour, linewidth=1.0)
     stages = sorted({line.samples for line in mine})
     axes.set_xscale("log", base=2)
     axes.set_xlim(stages[0] / 1.3, stages[-1] * 1.3)
     axes.set_xticks(stages, [str(size) for size in stages])
     axes.minorticks_off()
-    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL_FONT)
     axes.set(xlabel=f"base samples ({len(order) + 2} evaluations each)", ylabel="total order index [1]")
     return figure
 

@@ -16,7 +16,7 @@ from cfmkit.plots.axis_labels_and_headings import (
     write_heading,
 )
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.style import GREY, TROUBLE, apply_style, axes_mm, is_plain, new_figure
+from cfmkit.plots.style import TEXT_GREY, TROUBLE_RED, apply_style, axes_mm, is_plain, new_figure
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
     _scale(diagram, ax)
     for limit in diagram.limits:
         height = float(to_border(limit.value, diagram.y.dimension))
-        names.append(level(ax, height, limit.text, TROUBLE if limit.trouble else GREY))
+        names.append(level(ax, height, limit.text, TROUBLE_RED if limit.trouble else TEXT_GREY))
     names += [shade(ax, item, diagram.x.dimension) for item in diagram.regions]
     ax.set_xlabel(diagram.x.label)
     ax.set_ylabel(diagram.y.label)
@@ -159,7 +159,7 @@ def pad_limits(ends: tuple[float, float], below: float, above: float) -> tuple[f
     return ends[0] - below * width, ends[1] + above * width
 
 
-def level(ax: Axes, height: float, text: str, color: str = GREY) -> Label:
+def level(ax: Axes, height: float, text: str, color: str = TEXT_GREY) -> Label:
     """Draw a dashed horizontal line right across, in border units; return its name, still to be placed."""
     ax.axhline(height, color=color, linewidth=0.9, dashes=(6, 3), zorder=2)
     low, high = ax.get_xlim()
@@ -169,8 +169,8 @@ def level(ax: Axes, height: float, text: str, color: str = GREY) -> Label:
 def shade(ax: Axes, region: MarkedRange, dimension: str) -> Label:
     """Shade a part of the horizontal axis over the full height; return its name, still to be placed."""
     start, stop = (float(to_border(value, dimension)) for value in (region.start, region.stop))
-    ax.axvspan(start, stop, color=TROUBLE, alpha=0.12, linewidth=0, zorder=0.5, gid="no-obstacle")
+    ax.axvspan(start, stop, color=TROUBLE_RED, alpha=0.12, linewidth=0, zorder=0.5, gid="no-obstacle")
     low, high = ax.get_ylim()
     share = np.linspace(0.02, 0.98, 40)
     height = low * (high / low) ** share if ax.get_yscale() == "log" else low + (high - low) * share
-    return Label(region.text, TROUBLE, np.column_stack([np.full(40, 0.5 * (start + stop)), height]), prefer=0.15)
+    return Label(region.text, TROUBLE_RED, np.column_stack([np.full(40, 0.5 * (start + stop)), height]), prefer=0.15)

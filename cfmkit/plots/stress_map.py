@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.style import VERMILLION, apply_style, axes_mm, color_bar, new_figure
+from cfmkit.plots.style import LINE_VERMILLION, apply_style, axes_mm, color_bar, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from cfmkit.solid.meshed_part import MeshSolution
     from cfmkit.solid.stress_along_fillets import FilletArc
 
-WIDE, BESIDE, ABOVE = 140.0, 110.0, 62.0
+PARTS_WIDTH, HEIGHT_BESIDE, HEIGHT_ABOVE = 140.0, 110.0, 62.0
 """Room for the parts: across, and in height where they stand beside or above each other [mm]."""
-GAP = 7.0
+VIEW_GAP = 7.0
 """Between views, for what stands above each [mm]."""
-NUMBERS = 6.0
+NUMBER_SIZE = 6.0
 """Size of the numbers of fillets [pt]."""
-NEAREST = 8
+N_NEAREST_NODES = 8
 """Nodes around the middle of a fillet that tell how far it has turned: enough to lie around it on any mesh."""
 
 
@@ -66,7 +66,7 @@ class StressView:
         """Yield the numbers of fillets, to stand beside them on the side of the waste; moved: nodes (n, 2) [m]."""
         nodes = self.solved.problem.elements.mesh.nodes
         for number, arc in self.fillets.items():
-            near = np.hypot(*(nodes - arc.middle).T).argsort()[:NEAREST]
+            near = np.hypot(*(nodes - arc.middle).T).argsort()[:N_NEAREST_NODES]
             before, after = ((places[near] - places[near].mean(axis=0)) @ [1.0, 1.0j] for places in (nodes, moved))
             turned = complex(*(arc.center - arc.middle)) * complex(np.vdot(before, after))
             yield parts.part_name(str(number), moved[near[0]], (turned.real, turned.imag))
@@ -105,10 +105,13 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
     sizes = np.array([np.ptp(places, axis=0) for places in moved]) * 1.05
     width, height = sizes.max(axis=0)
     beside = bool(height > width)
-    scale = min((WIDE / len(views) if beside else WIDE) / width, (BESIDE if beside else ABOVE) / height)
-    step = np.array([width * scale + 3.0, 0.0]) if beside else np.array([0.0, height * scale + GAP])
+    scale = min(
+        (PARTS_WIDTH / len(views) if beside else PARTS_WIDTH) / width,
+        (HEIGHT_BESIDE if beside else HEIGHT_ABOVE) / height,
+    )
+    step = np.array([width * scale + 3.0, 0.0]) if beside else np.array([0.0, height * scale + VIEW_GAP])
     heading = Heading.from_result(result, f"{subject}; peaks marked")
-    tall = (1 if beside else len(views)) * (height * scale + GAP)
+    tall = (1 if beside else len(views)) * (height * scale + VIEW_GAP)
     figure = new_figure(160.0, tall + 18.0 + heading.height_mm)
     write_heading(figure, heading)
     top = max(*(view.peak for view in views), 1e-6) / 1e6
@@ -120,7 +123,7 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
         ax.set_ylim(1e3 * low[number][1], 1e3 * (low[number][1] + height))
         ax.set_aspect("equal", anchor="SW")
         ax.set_axis_off()
-        place_labels(ax, list(view.numbers(moved[number])), NUMBERS)
+        place_labels(ax, list(view.numbers(moved[number])), NUMBER_SIZE)
     bar = axes_mm(figure, (30.0, 10.0, 100.0, 3.0))
     color_bar(shades, bar, orientation="horizontal").set_label("stress [MPa]", labelpad=1)
     return figure
@@ -153,7 +156,13 @@ def _draw_part(ax: Axes, view: StressView, places: FloatArray, top: float) -> An
     parts.plate(ax, [places[nodes] for nodes in boundary_nodes(grid)])
     start = int(np.hypot(*(grid.nodes - view.solved.peaks[1][view.pose]).T).argmin())
     ax.plot(
-        *(1e3 * places[start]), marker="o", markersize=6, color=VERMILLION, fillstyle="none", linestyle="", zorder=4
+        *(1e3 * places[start]),
+        marker="o",
+        markersize=6,
+        color=LINE_VERMILLION,
+        fillstyle="none",
+        linestyle="",
+        zorder=4,
     )
     numbers = "; fillets numbered as in fillets.csv" if view.fillets else ""
     ax.set_title(f"{view.name}: {value_text(view.peak, 'stress')}{numbers}", fontsize=7, loc="left", pad=1.0)

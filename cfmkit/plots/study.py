@@ -17,14 +17,24 @@ from cfmkit.plots.axis_labels_and_headings import finite_range
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.rounding_noise import is_level, remove_rounding
 from cfmkit.plots.stacked_line_diagrams import pad_limits
-from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
+from cfmkit.plots.study_marks import (
+    COLOUR_MAP,
+    EMPTY_COLOUR,
+    HEAD_HEIGHT,
+    MISSED_HATCH,
+    edges,
+    head,
+    key_of,
+    star,
+    ticks,
+)
 from cfmkit.plots.style import (
-    BLUE,
-    GREY,
-    INK,
-    LINES,
-    SMALL,
-    VERMILLION,
+    LINE_BLUE,
+    LINE_COLOURS,
+    LINE_VERMILLION,
+    SMALL_FONT,
+    TEXT_GREY,
+    TEXT_INK,
     apply_style,
     axes_mm,
     color_bar,
@@ -52,7 +62,7 @@ MOST_PANELS = 8
 def fit_panels(found: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
     """Return whether the curves of a study can be told apart in panels."""
     panels, named = ({line.panel for line in lines}, {line.parameter for line in lines})
-    return len(found.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINES)
+    return len(found.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINE_COLOURS)
 
 
 @apply_style
@@ -66,7 +76,7 @@ def draw_panels(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
         row, column = divmod(number, 2)
         ax = axes_mm(figure, (17.0 + 74.0 * column, 14.0 + 52.0 * (rows - 1 - row), 62.0, 42.0))
         _draw_panel(ax, [line for line in lines if line.panel == value], second)
-        ax.set_title(f"{first.plain}: {first.text(value)}", fontsize=SMALL, loc="left")
+        ax.set_title(f"{first.plain}: {first.text(value)}", fontsize=SMALL_FONT, loc="left")
         ax.set(xlabel=labels[0] if number + 2 >= len(panels) else "", ylabel=labels[1] if column == 0 else "")
     head(figure, found, f"curves by {first.plain}, each line a value of {second.plain}")
     return figure
@@ -77,7 +87,7 @@ def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> No
     names = []
     for line in lines:
         number = order.index(line.parameter)
-        color, style = LINES[number], DASHES[number % len(DASHES)] if len(order) > 2 else "-"
+        color, style = LINE_COLOURS[number], DASH_STYLES[number % len(DASH_STYLES)] if len(order) > 2 else "-"
         for motion, effort in line.branches.values():
             ax.plot(motion, effort, color=color, linewidth=1.2, linestyle=style)
         motion, effort = next(iter(line.branches.values()))
@@ -91,7 +101,7 @@ def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> No
 MOST_LINES = 1500
 """Lines of a picture with parallel axes; more are thinned out evenly, as they cover each other."""
 
-MISSED = "#D5D5D5"
+MISSED_COLOUR = "#D5D5D5"
 """Colour of points that miss a requirement, where lines show them."""
 
 
@@ -140,15 +150,15 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     given = [line.parameter for line in lines]
     if len(given) <= MOST_NAMED:
         return _draw_named(found, lines, labels)
-    figure = new_figure(160.0, 100.0 + HEAD)
+    figure = new_figure(160.0, 100.0 + HEAD_HEIGHT)
     axes = axes_mm(figure, (16, 14, 112, 82))
     scale = Normalize(min(given), max(given) if max(given) > min(given) else min(given) + 1)
     for line in lines:
         for motion, effort in line.branches.values():
-            axes.plot(motion, effort, color=colormaps[COLOURS](scale(line.parameter)), linewidth=1.0)
+            axes.plot(motion, effort, color=colormaps[COLOUR_MAP](scale(line.parameter)), linewidth=1.0)
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, lines)
-    bar = color_bar(ScalarMappable(scale, COLOURS), axes_mm(figure, (133, 14, 4, 82)), parameter.axis)
+    bar = color_bar(ScalarMappable(scale, COLOUR_MAP), axes_mm(figure, (133, 14, 4, 82)), parameter.axis)
     if parameter.words:
         bar.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
     head(figure, found, f"curves, coloured by {parameter.plain}")
@@ -158,7 +168,7 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
 MOST_NAMED = 8
 """Curves that have their names beside them; of more, colours tell the values."""
 
-DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (8, 2, 2, 2)))
+DASH_STYLES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (8, 2, 2, 2)))
 """Line styles in turn, so that curves differ without their colours, too."""
 
 
@@ -166,15 +176,15 @@ def _draw_named(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     """Return a few curves of a study of one parameter, each with its value beside it."""
     from matplotlib import colormaps
 
-    figure = new_figure(160.0, 100.0 + HEAD - 6.0)
+    figure = new_figure(160.0, 100.0 + HEAD_HEIGHT - 6.0)
     axes = axes_mm(figure, (16, 14, 138, 82))
     (parameter,) = found.varied
     ordered = sorted(lines, key=lambda line: line.parameter)
     names = []
     for number, line in enumerate(ordered):
         # the light end of the scale cannot be read as text
-        color = colormaps[COLOURS](0.72 * number / max(len(ordered) - 1, 1))
-        style = DASHES[number % len(DASHES)] if len(ordered) > 2 else "-"
+        color = colormaps[COLOUR_MAP](0.72 * number / max(len(ordered) - 1, 1))
+        style = DASH_STYLES[number % len(DASH_STYLES)] if len(ordered) > 2 else "-"
         for motion, effort in line.branches.values():
             axes.plot(motion, effort, color=color, linewidth=1.3, linestyle=style)
         motion, effort = next(iter(line.branches.values()))
@@ -201,12 +211,12 @@ def _clear_of_poles(axes: Axes, lines: Sequence[StudyCurve]) -> None:
 @apply_style
 def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over the only parameter."""
-    figure = new_figure(120, 75 + HEAD)
+    figure = new_figure(120, 75 + HEAD_HEIGHT)
     axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (20, 13, 94, 56))
     (parameter,) = found.varied
     order = np.argsort(parameter.values, kind="stable")
     x, y = parameter.values[order], remove_rounding(metric.values)[order]
-    axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
+    axes.plot(x, y, color=LINE_BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
     axes.set(xlabel=parameter.axis, ylabel="" if metric.words else metric.label)
     widen(axes, y)
@@ -221,7 +231,9 @@ def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
 def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
     ends = edges(x)
     for k in np.flatnonzero(~meets) if not is_plain() else ():
-        axes.axvspan(ends[k], ends[k + 1], facecolor=EMPTY, edgecolor=GREY, hatch=HATCH, linewidth=0, zorder=0)
+        axes.axvspan(
+            ends[k], ends[k + 1], facecolor=EMPTY_COLOUR, edgecolor=TEXT_GREY, hatch=MISSED_HATCH, linewidth=0, zorder=0
+        )
     axes.set_xlim(ends[0], ends[-1])
 
 
@@ -232,7 +244,7 @@ def draw_parallel(found: StudyMarks) -> Figure:
 
     scales = (*found.varied, *found.metrics)
     width = max(120.0, 26.0 * len(scales) + 30)
-    figure = new_figure(width, 100 + HEAD)
+    figure = new_figure(width, 100 + HEAD_HEIGHT)
     axes = axes_mm(figure, (14, 22, width - 28, 66))
     heights = np.column_stack([_share(scale) for scale in scales])
     chosen = np.flatnonzero(np.isfinite(heights[:, len(found.varied)]))
@@ -240,10 +252,10 @@ def draw_parallel(found: StudyMarks) -> Figure:
         chosen[np.linspace(0, len(chosen) - 1, min(len(chosen), MOST_LINES)).astype(int)] if len(chosen) else chosen
     )
     for k in sorted(thinned.tolist(), key=lambda k: bool(found.meets[k])):
-        colour = colormaps[COLOURS](heights[k, len(found.varied)]) if found.meets[k] else MISSED
+        colour = colormaps[COLOUR_MAP](heights[k, len(found.varied)]) if found.meets[k] else MISSED_COLOUR
         axes.plot(heights[k], color=colour, linewidth=0.6, alpha=0.7)
     if found.best is not None:
-        axes.plot(heights[found.best], color=VERMILLION, linewidth=2.0)
+        axes.plot(heights[found.best], color=LINE_VERMILLION, linewidth=2.0)
     _parallel_axes(axes, scales)
     head(figure, found, f"coloured by {found.metrics[0].plain}", _parallel_key(found))
     return figure
@@ -254,9 +266,9 @@ def _parallel_key(found: StudyMarks) -> list[Artist]:
 
     entries: list[Artist] = []
     if found.best is not None:
-        entries.append(Line2D([], [], color=VERMILLION, linewidth=2.0, label=found.best_words or "best point"))
+        entries.append(Line2D([], [], color=LINE_VERMILLION, linewidth=2.0, label=found.best_words or "best point"))
     if not found.meets.all():
-        entries.append(Line2D([], [], color=MISSED, label="requirement missed, or not solved"))
+        entries.append(Line2D([], [], color=MISSED_COLOUR, label="requirement missed, or not solved"))
     return entries
 
 
@@ -271,7 +283,7 @@ def _share(scale: DrawnScale) -> FloatArray:
 
 def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
     for k, scale in enumerate(scales):
-        axes.axvline(k, color=INK, linewidth=0.8)
+        axes.axvline(k, color=TEXT_INK, linewidth=0.8)
         known = scale.values[np.isfinite(scale.values)]
         if not len(known):
             continue
@@ -282,9 +294,9 @@ def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
             below = height == 0.0
             place = (k, -0.02 if below else 1.02)
             axes.annotate(
-                text, place, ha="center", va="top" if below else "bottom", fontsize=SMALL, annotation_clip=False
+                text, place, ha="center", va="top" if below else "bottom", fontsize=SMALL_FONT, annotation_clip=False
             )
-    axes.set_xticks(range(len(scales)), [scale.label.replace(" [", "\n[") for scale in scales], fontsize=SMALL)
+    axes.set_xticks(range(len(scales)), [scale.label.replace(" [", "\n[") for scale in scales], fontsize=SMALL_FONT)
     axes.tick_params(axis="x", length=0, pad=12)
     axes.set(ylim=(0, 1), xlim=(-0.05, len(scales) - 0.95), yticks=[])
     axes.grid(False)
@@ -294,27 +306,27 @@ def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
 MOST_TICKS = 8
 """Values of a parameter that have a tick each: with more their numbers come close to each other (by eye)."""
 
-FINE = 80
+N_LEVEL_LINE_PLACES = 80
 """Places along an axis that level lines are drawn through: about 1 mm of print apart, where no corner shows."""
 
 
 @apply_style
 def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over two parameters: colours and level lines."""
-    figure = new_figure(140, 100 + HEAD)
+    figure = new_figure(140, 100 + HEAD_HEIGHT)
     axes = axes_mm(figure, (18, 14, 92, 80))
     down, across = found.varied
     up, along = _places(down, found.shape[0], found.shape[1]), _places(across, found.shape[1], 1)
     values = remove_rounding(metric.values).reshape(found.shape)[np.ix_(up.order, along.order)]
     meets = found.meets.reshape(found.shape)[np.ix_(up.order, along.order)]
     x, y = along.borders, up.borders
-    axes.set_facecolor(EMPTY)
+    axes.set_facecolor(EMPTY_COLOUR)
     axes.grid(False)
     box = (114, 14, 4, 80)
     if metric.words:
         _classes(axes, (x, y, values), metric, axes_mm(figure, box))
     else:
-        mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=COLOURS, rasterized=True)
+        mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=COLOUR_MAP, rasterized=True)
         _level_lines(axes, up, along, values)
         color_bar(mesh, axes_mm(figure, box), metric.label)
     if not meets.all() and not is_plain():
@@ -339,7 +351,7 @@ def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric
     index = np.full(len(metric.words), -1.0)
     index[there] = np.arange(len(there))
     shown = np.where(np.isfinite(values), index[np.where(np.isfinite(values), values, 0).astype(int)], np.nan)
-    colours = ListedColormap([colormaps[COLOURS](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in there])
+    colours = ListedColormap([colormaps[COLOUR_MAP](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in there])
     last = len(there) - 0.5
     mesh = axes.pcolormesh(across, up, np.ma.masked_invalid(shown), cmap=colours, vmin=-0.5, vmax=last, rasterized=True)
     bar = color_bar(mesh, key)
@@ -420,9 +432,9 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
     from matplotlib import patheffects
 
     # white is read on the dark end of the colours only; a dark outline carries it over the light end
-    outline: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=1.6, foreground=INK)]
+    outline: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=1.6, foreground=TEXT_INK)]
     lines.set_path_effects(outline)
-    for label in axes.clabel(lines, fontsize=SMALL, fmt=f"%.{digits_that_differ(low, high)}g"):
+    for label in axes.clabel(lines, fontsize=SMALL_FONT, fmt=f"%.{digits_that_differ(low, high)}g"):
         label.set_path_effects(outline)
 
 
@@ -438,7 +450,7 @@ def _round_values_between(low: float, high: float) -> FloatArray:
 
 def _finer(places: FloatArray, values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
     """Return a grid with more places along one axis, through the same values, without new ups and downs."""
-    steps = FINE // len(places)
+    steps = N_LEVEL_LINE_PLACES // len(places)
     if steps < 2:
         return places, values
     from scipy.interpolate import PchipInterpolator
@@ -460,4 +472,6 @@ def _hatch_cells(axes: Axes, x: FloatArray, y: FloatArray, cells: NDArray[np.boo
             left, right, low, high = x[start], x[stop], y[row], y[row + 1]
             corners += [(left, low), (right, low), (right, high), (left, high), (left, low)]
     codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY] * (len(corners) // 5)
-    axes.add_patch(PathPatch(Path(corners, codes), facecolor="none", edgecolor="#A8A8A8", hatch=HATCH, linewidth=0))
+    axes.add_patch(
+        PathPatch(Path(corners, codes), facecolor="none", edgecolor="#A8A8A8", hatch=MISSED_HATCH, linewidth=0)
+    )

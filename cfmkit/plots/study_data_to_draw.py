@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-PERCENT = "percent"
+PERCENT_DIMENSION = "percent"
 """Dimension of shares that are drawn in per cent."""
 
 
-LONGEST = 64
+MAX_LABEL_LENGTH = 64
 """Characters of an axis label: so many of 8 pt fit on 92 mm of print, the axis of a map."""
 
 
@@ -40,7 +40,7 @@ class DrawnScale:
     def label(self) -> str:
         """Label of the axis: the short name, with its unit."""
         short = self.short or self.name.rpartition(".")[2]
-        if self.dimension == PERCENT:
+        if self.dimension == PERCENT_DIMENSION:
             return f"{short.replace('_', ' ')} [%]"
         known = self.dimension not in ("text", "count")
         return axis_label(short, self.dimension) if known else short.replace("_", " ")
@@ -51,7 +51,7 @@ class DrawnScale:
         short, bracket, unit = self.label.partition(" [")
         path = self.name.removeprefix("mechanism.").replace("_", " ")
         reported = f"{path}: {self.about}{bracket}{unit}"
-        return reported if self.about and len(reported) <= LONGEST else f"{short}{bracket}{unit}"
+        return reported if self.about and len(reported) <= MAX_LABEL_LENGTH else f"{short}{bracket}{unit}"
 
     @property
     def plain(self) -> str:

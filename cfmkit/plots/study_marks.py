@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, write_heading
-from cfmkit.plots.style import GREY, SMALL, VERMILLION, apply_style, has_titles, is_plain, size_mm
+from cfmkit.plots.axis_labels_and_headings import LEFT_MARGIN, Heading, write_heading
+from cfmkit.plots.style import LINE_VERMILLION, SMALL_FONT, TEXT_GREY, apply_style, has_titles, is_plain, size_mm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
 
-COLOURS = "viridis"
-EMPTY = "#EFEFEF"
+COLOUR_MAP = "viridis"
+EMPTY_COLOUR = "#EFEFEF"
 """The ground where nothing was solved."""
 
-HATCH = "////"
+MISSED_HATCH = "////"
 """Where a requirement is missed."""
 
 
-HEAD = 12.0
+HEAD_HEIGHT = 12.0
 """Room at the top of a picture of a study for its heading and its key [mm]."""
 
 
@@ -48,10 +48,10 @@ def _key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
     return figure.legend(
         handles=list(entries),
         loc="upper left",
-        bbox_to_anchor=((LEFT - 1.0) / width, 1.0 - down / height),
+        bbox_to_anchor=((LEFT_MARGIN - 1.0) / width, 1.0 - down / height),
         ncols=columns,
         frameon=False,
-        fontsize=SMALL,
+        fontsize=SMALL_FONT,
         borderpad=0.0,
         borderaxespad=0.0,
         handletextpad=0.4,
@@ -66,14 +66,20 @@ def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False)
 
     entries: list[Artist] = []
     if starred:
-        look = {"marker": "*", "markersize": 9, "color": VERMILLION, "markeredgecolor": "white", "linestyle": ""}
+        look = {"marker": "*", "markersize": 9, "color": LINE_VERMILLION, "markeredgecolor": "white", "linestyle": ""}
         entries.append(Line2D([], [], label=found.best_words or "best point", **look))  # type: ignore[arg-type]
     if hatched:
         entries.append(
-            Patch(facecolor=EMPTY, edgecolor=GREY, hatch=HATCH, linewidth=0, label="requirement missed, or not solved")
+            Patch(
+                facecolor=EMPTY_COLOUR,
+                edgecolor=TEXT_GREY,
+                hatch=MISSED_HATCH,
+                linewidth=0,
+                label="requirement missed, or not solved",
+            )
         )
     if empty:
-        entries.append(Patch(facecolor=EMPTY, label="no value"))
+        entries.append(Patch(facecolor=EMPTY_COLOUR, label="no value"))
     return entries
 
 
@@ -101,6 +107,6 @@ def star(axes: Axes, x: float, y: float) -> bool:
     has_place = bool(np.isfinite([x, y]).all()) and not is_plain()
     if has_place:
         axes.plot(
-            [x], [y], marker="*", markersize=12, color=VERMILLION, markeredgecolor="white", clip_on=False, zorder=5
+            [x], [y], marker="*", markersize=12, color=LINE_VERMILLION, markeredgecolor="white", clip_on=False, zorder=5
         )
     return has_place

@@ -45,36 +45,43 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 T = TypeVar("T")
 
-MM = 1.0 / 25.4
+INCHES_PER_MM = 1.0 / 25.4
 """Inches in a millimetre."""
 
-DPI = 200
+PNG_DPI = 200
 """Dots per inch of every PNG: 160 x 100 mm become 1260 x 787 pixels, which a screen shows whole and where a line of
 0.5 pt is more than one pixel wide."""
 
-BLUE, VERMILLION, BLACK, PURPLE, TAN, BROWN = "#0072B2", "#D55E00", "#1A1A1A", "#9933FF", "#C28570", "#663300"
-LINES = (BLUE, VERMILLION, BLACK, PURPLE, TAN, BROWN)
+LINE_BLUE, LINE_VERMILLION, LINE_BLACK, LINE_PURPLE, LINE_TAN, LINE_BROWN = (
+    "#0072B2",
+    "#D55E00",
+    "#1A1A1A",
+    "#9933FF",
+    "#C28570",
+    "#663300",
+)
+LINE_COLOURS = (LINE_BLUE, LINE_VERMILLION, LINE_BLACK, LINE_PURPLE, LINE_TAN, LINE_BROWN)
 """Colours of lines, in this order; as dark as they must be to be read as text, too."""
 
-OCHRE = "#B78C66"
+SPRING_OCHRE = "#B78C66"
 """Springs. It stands beside every line but TAN, and beside GREY."""
 
-INK, GREY = "#262626", "#6B6B6B"
-BAND, TROUBLE = "#00855F", "#A50F15"
+TEXT_INK, TEXT_GREY = "#262626", "#6B6B6B"
+BAND_GREEN, TROUBLE_RED = "#00855F", "#A50F15"
 """Where the force should be, and where something is wrong."""
 
-SMALL, NORMAL = 7.0, 8.0
+SMALL_FONT, NORMAL_FONT = 7.0, 8.0
 """Font sizes [pt]: 7 is the smallest that Elsevier's journals print."""
 
-_SETTINGS: dict[str, Any] = {
+_STYLE_SETTINGS: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib, so every machine has the same
-    "font.size": NORMAL,
-    "text.color": INK,
+    "font.size": NORMAL_FONT,
+    "text.color": TEXT_INK,
     # A name such as "$5 spring" is not a formula.
     "text.parse_math": False,
-    "axes.labelsize": NORMAL,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": GREY,
+    "axes.labelsize": NORMAL_FONT,
+    "axes.labelcolor": TEXT_INK,
+    "axes.edgecolor": TEXT_GREY,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -82,12 +89,12 @@ _SETTINGS: dict[str, Any] = {
     "axes.axisbelow": True,
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
+    "xtick.labelsize": SMALL_FONT,
+    "ytick.labelsize": SMALL_FONT,
+    "xtick.color": TEXT_GREY,
+    "ytick.color": TEXT_GREY,
+    "xtick.labelcolor": TEXT_INK,
+    "ytick.labelcolor": TEXT_INK,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "xtick.major.size": 3.0,
@@ -96,8 +103,8 @@ _SETTINGS: dict[str, Any] = {
     "lines.solid_capstyle": "round",
     "lines.dashed_pattern": (4.0, 2.0),
     "hatch.linewidth": 0.5,
-    "figure.dpi": DPI,
-    "savefig.dpi": DPI,
+    "figure.dpi": PNG_DPI,
+    "savefig.dpi": PNG_DPI,
 }
 
 
@@ -106,41 +113,41 @@ def _parameters() -> Any:
     """Return matplotlib's defaults with our settings on top; the backend is not ours to choose."""
     fixed = ("backend", "backend_fallback", "interactive")
     defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if name not in fixed}
-    return defaults | _SETTINGS
+    return defaults | _STYLE_SETTINGS
 
 
-_INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
+_INSIDE_STYLE: ContextVar[bool] = ContextVar("inside", default=False)
 _SETTINGS_OF_USER: ContextVar[tuple[tuple[str, Any], ...]] = ContextVar("settings", default=())
-_TITLES: ContextVar[bool] = ContextVar("titles", default=True)
-_PLAIN: ContextVar[bool] = ContextVar("plain", default=False)
-_OVERLAY: ContextVar[EarlierCurve | None] = ContextVar("overlay", default=None)
+_SHOW_TITLES: ContextVar[bool] = ContextVar("titles", default=True)
+_PLAIN_STYLE: ContextVar[bool] = ContextVar("plain", default=False)
+_STYLE_OVERLAY: ContextVar[EarlierCurve | None] = ContextVar("overlay", default=None)
 
 
 @contextmanager
 def style() -> Iterator[None]:
     """Apply the look inside a ``with`` block; outside, everything stays as it was."""
-    if _INSIDE.get():
+    if _INSIDE_STYLE.get():
         yield
         return
-    mark = _INSIDE.set(True)
+    mark = _INSIDE_STYLE.set(True)
     try:
         with matplotlib.rc_context(_parameters() | dict(_SETTINGS_OF_USER.get())), warnings.catch_warnings():
             # a name in letters that the font lacks is drawn as boxes; that is no reason to alarm anyone
             warnings.filterwarnings("ignore", message="Glyph .* missing from font")
             yield
     finally:
-        _INSIDE.reset(mark)
+        _INSIDE_STYLE.reset(mark)
 
 
 def apply_style(function: Callable[P, T]) -> Callable[P, T]:
     """Return a drawing function that works in our look, whoever calls it."""
 
     @wraps(function)
-    def inside(*args: P.args, **kwargs: P.kwargs) -> T:
+    def call_styled(*args: P.args, **kwargs: P.kwargs) -> T:
         with style():
             return function(*args, **kwargs)
 
-    return inside
+    return call_styled
 
 
 @apply_style
@@ -149,7 +156,7 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     layout = active_layout()
     if layout is not None:
         width_mm, height_mm = layout.record_size(width_mm, height_mm)
-    figure = Figure(figsize=(width_mm * MM, height_mm * MM))
+    figure = Figure(figsize=(width_mm * INCHES_PER_MM, height_mm * INCHES_PER_MM))
     FigureCanvasAgg(figure)
     return figure
 
@@ -159,29 +166,29 @@ def new_axes() -> Axes:
     """Return axes that fill a new figure of `matplotlib.pyplot` (160 x 100 mm), which notebooks show."""
     from matplotlib import pyplot
 
-    figure = pyplot.figure(figsize=(160.0 * MM, 100.0 * MM))
+    figure = pyplot.figure(figsize=(160.0 * INCHES_PER_MM, 100.0 * INCHES_PER_MM))
     return axes_mm(figure, (17.0, 12.0, 138.0, 84.0))
 
 
 def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
     """Return width and height of a figure [mm of print]."""
-    dots = figure.dpi * MM
+    dots = figure.dpi * INCHES_PER_MM
     return float(figure.bbox.width) / dots, float(figure.bbox.height) / dots
 
 
 def has_titles() -> bool:
     """Return whether headings are to be written."""
-    return _TITLES.get() and not is_plain()
+    return _SHOW_TITLES.get() and not is_plain()
 
 
 def is_plain() -> bool:
     """Return whether lines, their names and axes are all: no bands, no notes, no marks, no headings."""
-    return _PLAIN.get()
+    return _PLAIN_STYLE.get()
 
 
 def overlay() -> EarlierCurve | None:
     """Return the curve of an earlier run that is drawn beside the nominal one; None if there is none."""
-    return _OVERLAY.get()
+    return _STYLE_OVERLAY.get()
 
 
 @contextmanager
@@ -193,7 +200,12 @@ def with_settings(
 ) -> Iterator[None]:
     """Apply settings of matplotlib, whether headings and notes are written, and an overlay, inside a ``with`` block."""
     with ExitStack() as stack:
-        for variable, value in ((_SETTINGS_OF_USER, settings), (_TITLES, titles), (_PLAIN, plain), (_OVERLAY, overlay)):
+        for variable, value in (
+            (_SETTINGS_OF_USER, settings),
+            (_SHOW_TITLES, titles),
+            (_PLAIN_STYLE, plain),
+            (_STYLE_OVERLAY, overlay),
+        ):
             stack.callback(variable.reset, variable.set(value))  # type: ignore[arg-type]
         yield
 

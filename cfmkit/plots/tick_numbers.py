@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-WIDEST = 6.5
+MAX_NUMBER_WIDTH = 6.5
 """Width of a number at a tick, in digits: what the margins of the figures have room for."""
 
-NARROWEST = 2e-5
+MIN_RANGE_SHARE = 2e-5
 """Share of the size of its values that an axis shows at least: below it their ticks would need more than seven
 digits."""
 
@@ -32,7 +32,7 @@ class WholeNumbers(ScalarFormatter):
         """Return the texts of all ticks of an axis."""
         texts = super().format_ticks(values)
         short = [self.fix_minus(brief(value)) for value in values]
-        too_long = max(map(_width, texts), default=0.0) > WIDEST
+        too_long = max(map(_width, texts), default=0.0) > MAX_NUMBER_WIDTH
         return short if too_long and len(set(short)) >= len(set(texts)) else texts
 
 
@@ -71,7 +71,7 @@ def widen(axes: Axes, values: FloatArray) -> None:
     if not len(known):
         return
     low, high = float(known.min()), float(known.max())
-    least = NARROWEST * max(abs(low), abs(high))
+    least = MIN_RANGE_SHARE * max(abs(low), abs(high))
     if 0.0 < high - low < least:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)

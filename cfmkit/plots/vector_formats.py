@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-_WRITERS: Any = {
+_WRITER_SETTINGS: Any = {
     "svg.fonttype": "none",  # letters, not their outlines
     "svg.hashsalt": "cfmkit",  # names of markers and clips by content, not at random
     "pdf.fonttype": 42,  # TrueType: Type 3 is refused by journals, and cannot be searched everywhere
     "pdf.compression": 6,
 }
-_FONTS = "'DejaVu Sans', Verdana, Geneva, sans-serif"
+_FONT_FALLBACKS = "'DejaVu Sans', Verdana, Geneva, sans-serif"
 """Where the font of the figures is missing: those of nearly the same widths."""
 
 
@@ -32,7 +32,7 @@ _FONTS = "'DejaVu Sans', Verdana, Geneva, sans-serif"
 def svg(figure: Figure) -> bytes:
     """Return a figure as SVG, with its text as text."""
     found = _write(figure, "svg", {"Date": None, "Creator": None, "Format": None, "Type": None})
-    text = found.decode().replace("'DejaVu Sans'", _FONTS)
+    text = found.decode().replace("'DejaVu Sans'", _FONT_FALLBACKS)
     return _each_id_once(text).encode()
 
 
@@ -61,7 +61,7 @@ def write_figure(figure: Figure, kind: str) -> bytes:
 
 def _write(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
     into = io.BytesIO()
-    with matplotlib.rc_context(_WRITERS):
+    with matplotlib.rc_context(_WRITER_SETTINGS):
         figure.savefig(into, format=kind, metadata=metadata)
     return into.getvalue()
 

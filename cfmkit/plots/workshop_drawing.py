@@ -13,10 +13,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import UNCUT, Arc, DrawnDimension, Line, Smooth
-from cfmkit.export.layers import HELD
+from cfmkit.export.contours import UNCUT_LAYERS, Arc, DrawnDimension, Line, Smooth
+from cfmkit.export.layers import HELD_LAYER
 from cfmkit.plots.parts import mm
-from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import (
+    LINE_VERMILLION,
+    NORMAL_FONT,
+    SMALL_FONT,
+    TEXT_GREY,
+    TEXT_INK,
+    apply_style,
+    axes_mm,
+    new_figure,
+)
 from cfmkit.stock.stock_series import SIZE_RTOL, screw_through
 
 if TYPE_CHECKING:
@@ -29,25 +38,25 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour, Drawing, Edge
 
-PAPER = (240.0, 165.0)
+PAPER_SIZE = (240.0, 165.0)
 """Of the figure [mm]: a landscape A4 sheet within its margins, less a caption."""
 
-COLUMN = 78.0
+COLUMN_WIDTH = 78.0
 """Width of the column of words [mm]."""
 
-STEP = 7.0
+DIMENSION_STEP = 7.0
 """Between dimension lines beside each other [mm of print]."""
 
-SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5.0, 2.0, 1.0))
+PAPER_SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5.0, 2.0, 1.0))
 """Scales that are used on paper (ISO 5455)."""
 
 ARC_POINTS = 91
 """Points of a full circle of the picture."""
 
-POINT = 25.4 / 72.0
+POINT_MM = 25.4 / 72.0
 """Of type [mm]."""
 
-SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+NUMBER_SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 """Of a hole, where its number may stand: right or left, above or below; the first one is preferred."""
 
 MOST_HOLES = 12
@@ -100,22 +109,22 @@ def drawing_figure(
         Without it there is none, and dimensions have three decimals.
     """
     decimals = block.decimals if block else TitleBlock.decimals
-    figure = new_figure(*PAPER)
+    figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
     overall = _overall(drawing)
     own = [one for one in drawing.dimensions if not any(_same(one, whole) for whole in overall)]
     dimensions = [*own, *overall]
-    below = STEP * (1 + sum(one.along == "x" for one in dimensions))
-    beside = STEP * (1 + sum(one.along == "y" for one in dimensions))
-    room = PAPER[0] - COLUMN - beside - 6.0, PAPER[1] - below - 12.0
+    below = DIMENSION_STEP * (1 + sum(one.along == "x" for one in dimensions))
+    beside = DIMENSION_STEP * (1 + sum(one.along == "y" for one in dimensions))
+    room = PAPER_SIZE[0] - COLUMN_WIDTH - beside - 6.0, PAPER_SIZE[1] - below - 12.0
     scale = _scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
     width, height = scale * (x1 - x0), scale * (y1 - y0)
     left = beside + 0.5 * (room[0] - width)
     bottom = below + 0.5 * (room[1] - height)
-    ax = axes_mm(figure, (0.0, 0.0, PAPER[0] - COLUMN, PAPER[1]))
+    ax = axes_mm(figure, (0.0, 0.0, PAPER_SIZE[0] - COLUMN_WIDTH, PAPER_SIZE[1]))
     # one unit of the axes is a millimetre of the part; its lower left corner stands at (left, bottom) of the paper
-    ax.set_xlim(x0 - left / scale, x0 + (PAPER[0] - COLUMN - left) / scale)
-    ax.set_ylim(y0 - bottom / scale, y0 + (PAPER[1] - bottom) / scale)
+    ax.set_xlim(x0 - left / scale, x0 + (PAPER_SIZE[0] - COLUMN_WIDTH - left) / scale)
+    ax.set_ylim(y0 - bottom / scale, y0 + (PAPER_SIZE[1] - bottom) / scale)
     ax.set_aspect("equal")
     ax.axis("off")
     for contour in drawing.contours:
@@ -125,7 +134,7 @@ def drawing_figure(
     for number, hole in enumerate(found[:MOST_HOLES], start=1):
         _hole(ax, hole, number, drawing, scale)
     if found:
-        ax.plot(x0, y0, marker="+", markersize=9, color=VERMILLION, zorder=6, gid="datum")
+        ax.plot(x0, y0, marker="+", markersize=9, color=LINE_VERMILLION, zorder=6, gid="datum")
     _dimensions(ax, dimensions, (x0, y0, x1, y1), scale, decimals)
     for section in thicknesses(drawing):
         _thickness(ax, section, scale, decimals)
@@ -163,7 +172,7 @@ def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> N
     if across[1] < 0:
         across = -across
     half = 0.5e3 * section.thickness * across
-    look = {"arrowstyle": "-|>", "linewidth": 0.5, "color": INK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
+    look = {"arrowstyle": "-|>", "linewidth": 0.5, "color": TEXT_INK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
     for side, far in ((1.0, STUB_LENGTH + LEADER_LENGTH), (-1.0, STUB_LENGTH)):
         tip = middle + side * half
         (x, y), (x_far, y_far) = tip.tolist(), (tip + side * far / scale * across).tolist()
@@ -175,8 +184,8 @@ def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> N
         f"t {length_in_words(section.thickness, decimals)}",
         ha="left" if across[0] >= 0 else "right",
         va="center",
-        fontsize=SMALL,
-        color=INK,
+        fontsize=SMALL_FONT,
+        color=TEXT_INK,
         zorder=7,
         gid="thickness",
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
@@ -213,7 +222,7 @@ def _same(one: DrawnDimension, other: DrawnDimension) -> bool:
 
 def _scale(largest: float) -> float:
     """Return the largest scale of paper that fits [mm of print for 1 mm]."""
-    found = [one for one in (*SCALES, *(1.0 / one for one in SCALES)) if one <= largest]
+    found = [one for one in (*PAPER_SCALES, *(1.0 / one for one in PAPER_SCALES)) if one <= largest]
     return max(found, default=largest)
 
 
@@ -235,12 +244,14 @@ def _chain(contour: Contour) -> FloatArray:
 def _contour(ax: Axes, contour: Contour) -> None:
     chain = _chain(contour)
     if contour.layer == "path":
-        ax.plot(*chain.T, color=GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
-    elif contour.layer in UNCUT:
-        hatch = "////" if contour.layer == HELD else "...."
-        ax.fill(*chain.T, facecolor="none", edgecolor=GREY, linewidth=0.0, hatch=hatch, zorder=1, gid=contour.layer)
+        ax.plot(*chain.T, color=TEXT_GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
+    elif contour.layer in UNCUT_LAYERS:
+        hatch = "////" if contour.layer == HELD_LAYER else "...."
+        ax.fill(
+            *chain.T, facecolor="none", edgecolor=TEXT_GREY, linewidth=0.0, hatch=hatch, zorder=1, gid=contour.layer
+        )
     else:
-        ax.plot(*chain.T, color=INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
+        ax.plot(*chain.T, color=TEXT_INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
 
 
 def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) -> None:
@@ -248,15 +259,17 @@ def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) ->
     corner = mm(drawing.extents).tolist()
     x, y, radius = corner[0] + hole.x * 1e3, corner[1] + hole.y * 1e3, 0.5e3 * hole.diameter
     arm = radius + 1.2 / scale
-    ax.plot([x - arm, x + arm], [y, y], color=GREY, linewidth=0.5, zorder=2)
-    ax.plot([x, x], [y - arm, y + arm], color=GREY, linewidth=0.5, zorder=2)
-    text = SMALL * POINT / scale * 0.6 * len(str(number)), SMALL * POINT / scale
+    ax.plot([x - arm, x + arm], [y, y], color=TEXT_GREY, linewidth=0.5, zorder=2)
+    ax.plot([x, x], [y - arm, y + arm], color=TEXT_GREY, linewidth=0.5, zorder=2)
+    text = SMALL_FONT * POINT_MM / scale * 0.6 * len(str(number)), SMALL_FONT * POINT_MM / scale
     # beside the hole, or beyond the line around it
-    spots = [(side, share * arm) for share in (0.75, 1.1, 1.5, 2.0) for side in SIDES]
+    spots = [(side, share * arm) for share in (0.75, 1.1, 1.5, 2.0) for side in NUMBER_SIDES]
     clear = (spot for spot in spots if _is_clear(drawing, (x, y), spot[0], spot[1], text))
     (right, up), near = next(clear, spots[0])
     ha, va = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
-    ax.text(x + right * near, y + up * near, str(number), fontsize=SMALL, color=VERMILLION, ha=ha, va=va, zorder=6)
+    ax.text(
+        x + right * near, y + up * near, str(number), fontsize=SMALL_FONT, color=LINE_VERMILLION, ha=ha, va=va, zorder=6
+    )
 
 
 def _is_clear(
@@ -269,7 +282,7 @@ def _is_clear(
     begin = [at + direction * near for at, direction in zip(centre, side, strict=True)]
     end = [at + direction * size for at, direction, size in zip(begin, side, text, strict=True)]
     box = Bbox([begin, end])
-    lines = (contour for contour in drawing.contours if contour.layer not in UNCUT)
+    lines = (contour for contour in drawing.contours if contour.layer not in UNCUT_LAYERS)
     return not any(Path(_chain(contour)).intersects_bbox(box, filled=False) for contour in lines)
 
 
@@ -280,12 +293,12 @@ def _dimensions(
     across = sorted((one for one in dimensions if one.along == "x"), key=lambda one: one.value)
     up = sorted((one for one in dimensions if one.along == "y"), key=lambda one: one.value)
     for number, one in enumerate(across, start=1):
-        y = box[1] - number * STEP / scale
+        y = box[1] - number * DIMENSION_STEP / scale
         (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
         _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(one, decimals), scale)
         _extension(ax, [(xa, ya), (xa, y)], [(xb, yb), (xb, y)])
     for number, one in enumerate(up, start=1):
-        x = box[0] - number * STEP / scale
+        x = box[0] - number * DIMENSION_STEP / scale
         (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
         _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(one, decimals), scale)
         _extension(ax, [(xa, ya), (x, ya)], [(xb, yb), (x, yb)])
@@ -301,14 +314,20 @@ def _text(one: DrawnDimension, decimals: int) -> str:
 
 def _extension(ax: Axes, *lines: list[tuple[float, float]]) -> None:
     for line in lines:
-        ax.plot(*np.array(line).T, color=GREY, linewidth=0.35, zorder=1)
+        ax.plot(*np.array(line).T, color=TEXT_GREY, linewidth=0.35, zorder=1)
 
 
 def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: str, scale: float) -> None:
     """Draw a dimension line with arrows, and its text above it, or beside it where it is short."""
     gap = np.subtract(end, start)
     length = float(np.hypot(*gap)) * scale
-    look = {"arrowstyle": "<|-|>" if length > 5 else "-", "linewidth": 0.5, "color": INK, "shrinkA": 0, "shrinkB": 0}
+    look = {
+        "arrowstyle": "<|-|>" if length > 5 else "-",
+        "linewidth": 0.5,
+        "color": TEXT_INK,
+        "shrinkA": 0,
+        "shrinkB": 0,
+    }
     look |= {"mutation_scale": 6}
     ax.annotate("", xy=end, xytext=start, arrowprops=look, zorder=4, annotation_clip=False)
     angle = float(np.degrees(np.arctan2(gap[1], gap[0])))
@@ -320,8 +339,8 @@ def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: 
         float(at[0]),
         float(at[1]),
         text,
-        fontsize=SMALL,
-        color=INK,
+        fontsize=SMALL_FONT,
+        color=TEXT_INK,
         ha="center",
         va="bottom",
         rotation=angle,
@@ -341,23 +360,23 @@ def _words(
     block: TitleBlock | None,
 ) -> None:
     """Write the column of words: title, what it is made of, dimensions that are no lines, holes, notes."""
-    ax = axes_mm(figure, (PAPER[0] - COLUMN, 0.0, COLUMN, PAPER[1]))
-    ax.set(xlim=(0.0, COLUMN), ylim=(0.0, PAPER[1]))
+    ax = axes_mm(figure, (PAPER_SIZE[0] - COLUMN_WIDTH, 0.0, COLUMN_WIDTH, PAPER_SIZE[1]))
+    ax.set(xlim=(0.0, COLUMN_WIDTH), ylim=(0.0, PAPER_SIZE[1]))
     ax.axis("off")
-    ax.plot([0, 0], [6, PAPER[1] - 6], color=GREY, linewidth=0.6)
+    ax.plot([0, 0], [6, PAPER_SIZE[1] - 6], color=TEXT_GREY, linewidth=0.6)
     title, ratio = about
     decimals = block.decimals if block else TitleBlock.decimals
     floor = 0.0 if block is None else TITLE_BLOCK + 15.0
     if block is not None:
         _title_block(ax, block, title, ratio)
     rows = [*drawing.facts, ("sheet", _sheet(drawing, decimals)), ("scale", ratio)]
-    y = PAPER[1] - 10.0
-    y = _write_text(ax, 4.0, y, title, NORMAL + 1.0, "bold") - 2.0
+    y = PAPER_SIZE[1] - 10.0
+    y = _write_text(ax, 4.0, y, title, NORMAL_FONT + 1.0, "bold") - 2.0
     for word, text in rows:
-        ax.text(4.0, y, word, fontsize=SMALL, color=GREY, va="top")
+        ax.text(4.0, y, word, fontsize=SMALL_FONT, color=TEXT_GREY, va="top")
         y = _write_text(ax, 24.0, y, text) - 0.6
     if found:
-        y = _write_text(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL)
+        y = _write_text(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL_FONT)
         for number, hole in enumerate(found[:MOST_HOLES], start=1):
             x, up, across = (length_in_words(size, decimals) for size in (hole.x, hole.y, hole.diameter))
             screw = screw_through(hole.diameter)
@@ -370,7 +389,7 @@ def _words(
         ("notes", (*drawing.notes, *(one.message for one in drawing.warnings))),
     ):
         if lines:
-            y = _write_text(ax, 4.0, y - 2.0, heading, NORMAL)
+            y = _write_text(ax, 4.0, y - 2.0, heading, NORMAL_FONT)
             for line in lines:
                 if y < floor:
                     _write_text(ax, 4.0, y, "more: in the page of the run")
@@ -380,26 +399,26 @@ def _words(
 
 def _title_block(ax: Axes, block: TitleBlock, title: str, ratio: str) -> None:
     """Draw the block at the foot of the column: name, revision, date to be filled in, weight, scale, projection."""
-    left, right, low = 4.0, COLUMN - 3.0, 5.0
+    left, right, low = 4.0, COLUMN_WIDTH - 3.0, 5.0
     rows = (("name", title), ("revision", block.revision), ("date", ""), ("weight", block.weight), ("scale", ratio))
     high = TITLE_BLOCK / (len(rows) + 1)
-    ax.plot([left, right, right, left, left], [low, low, *[low + TITLE_BLOCK] * 2, low], color=INK, linewidth=0.7)
+    ax.plot([left, right, right, left, left], [low, low, *[low + TITLE_BLOCK] * 2, low], color=TEXT_INK, linewidth=0.7)
     for number, (word, text) in enumerate(rows, start=1):
         y = low + TITLE_BLOCK - number * high
-        ax.plot([left, right], [y, y], color=GREY, linewidth=0.4)
-        ax.text(left + 1.5, y + 0.5 * high, word, fontsize=SMALL, color=GREY, va="center")
-        fit = int((right - left - 22.0) / (LETTERS * SMALL))
+        ax.plot([left, right], [y, y], color=TEXT_GREY, linewidth=0.4)
+        ax.text(left + 1.5, y + 0.5 * high, word, fontsize=SMALL_FONT, color=TEXT_GREY, va="center")
+        fit = int((right - left - 22.0) / (LETTER_WIDTH * SMALL_FONT))
         short = text if len(text) <= fit else f"{text[: fit - 3]}..."
-        ax.text(left + 20.0, y + 0.5 * high, short, fontsize=SMALL, color=INK, va="center")
+        ax.text(left + 20.0, y + 0.5 * high, short, fontsize=SMALL_FONT, color=TEXT_INK, va="center")
     y, radius = low + 0.5 * high, 0.32 * high
-    ax.text(left + 1.5, y, "projection", fontsize=SMALL, color=GREY, va="center")
+    ax.text(left + 1.5, y, "projection", fontsize=SMALL_FONT, color=TEXT_GREY, va="center")
     # first angle (ISO 5456-2): a truncated cone, and to its right how it looks from the left
     cone = np.array([[0.0, 0.5], [4.0, 1.0], [4.0, -1.0], [0.0, -0.5], [0.0, 0.5]]) * [1.0, radius] + [left + 20.5, y]
-    ax.plot(*cone.T, color=INK, linewidth=0.6, gid="first-angle")
+    ax.plot(*cone.T, color=TEXT_INK, linewidth=0.6, gid="first-angle")
     turn = np.linspace(0.0, 2.0 * np.pi, ARC_POINTS)
     for size in (radius, 0.5 * radius):
-        ax.plot(left + 29.0 + size * np.cos(turn), y + size * np.sin(turn), color=INK, linewidth=0.6)
-    ax.text(left + 33.0, y, "first angle", fontsize=SMALL, color=INK, va="center")
+        ax.plot(left + 29.0 + size * np.cos(turn), y + size * np.sin(turn), color=TEXT_INK, linewidth=0.6)
+    ax.text(left + 33.0, y, "first angle", fontsize=SMALL_FONT, color=TEXT_INK, va="center")
 
 
 def _sheet(drawing: Drawing, decimals: int) -> str:
@@ -412,16 +431,16 @@ def _sheet(drawing: Drawing, decimals: int) -> str:
     return found + (f"; in part {', '.join(more)}" if more else "")
 
 
-LETTERS = 0.235
+LETTER_WIDTH = 0.235
 """Mean width of a letter [mm] in points of its size, measured on the font of the figures."""
 
 
-def _write_text(ax: Axes, x: float, y: float, text: str, size: float = SMALL, weight: str = "normal") -> float:
+def _write_text(ax: Axes, x: float, y: float, text: str, size: float = SMALL_FONT, weight: str = "normal") -> float:
     """Write a text, broken into lines that fit, and return where the next one begins [mm]."""
     import textwrap
 
-    fit = max(int((COLUMN - x - 3.0) / (LETTERS * size)), 10)
+    fit = max(int((COLUMN_WIDTH - x - 3.0) / (LETTER_WIDTH * size)), 10)
     for line in textwrap.wrap(text, fit, break_long_words=False) or [""]:
-        ax.text(x, y, line, fontsize=size, color=INK, va="top", fontweight=weight)
+        ax.text(x, y, line, fontsize=size, color=TEXT_INK, va="top", fontweight=weight)
         y -= 0.50 * size
     return y

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from cfmkit.arrays import Several, shorten_values
 from cfmkit.documents.run_outcome import worst
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
-from cfmkit.metrics.compare import TOLERANCE
+from cfmkit.metrics.compare import COMPARISON_RTOL
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
 from cfmkit.runs.run import carry_out as carried_out
-from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
+from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, list_gone
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 
@@ -232,7 +232,7 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[En
         entry = outcome if isinstance(outcome, Entry) else lost_entry(job, outcome)
         crew.kept.keep(entry)
         note(job, entry)
-    reported = "not run: interrupted" if crew.progress.stopped else LEFT
+    reported = "not run: interrupted" if crew.progress.stopped else SKIPPED_MESSAGE
     return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=reported) for job in jobs)
 
 
@@ -427,7 +427,7 @@ def batch(
     executor = executor_for(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepare_file(junit)
     reported = None if summary is None else prepare_file(summary, "--summary")
-    tolerance = TOLERANCE if compare_tolerance is None else compare_tolerance
+    tolerance = COMPARISON_RTOL if compare_tolerance is None else compare_tolerance
     if not 0 <= tolerance < 1:
         meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
         raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")

@@ -54,7 +54,7 @@ def write(
         command = shlex.join(["cfmkit", *about["arguments"]])
         subject = f"a batch of {len(entries)} specifications"
         document = document_of(entries, ExitCode(about["exit_code"]), compared=compared)
-        folder.write(html.NAME, html.page(document, subject=subject, command=command))
+        folder.write(html.REPORT_NAME, html.page(document, subject=subject, command=command))
     return (*folder.commit(about).files, "manifest.json")
 
 

@@ -13,7 +13,7 @@ from cfmkit.errors import UsageError, visible
 if TYPE_CHECKING:
     from cfmkit.families.base import Family
 
-FORMATS = (".png", ".svg", ".pdf")
+DRAWING_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def find_drawn_family(name: str | None) -> Family:
@@ -36,11 +36,11 @@ def find_drawn_family(name: str | None) -> Family:
 
 
 def read_drawing(record: Family) -> dict[str, bytes]:
-    """Return the drawing of a family by the ending of its file: ``.svg``, and those of `FORMATS` that lie beside it."""
+    """Return the drawing of a family by the ending of its file: ``.svg``, and those of `DRAWING_SUFFIXES` there."""
     from cfmkit.families.base import package_file
 
     stem = record.dimension_drawing.removesuffix(".svg")
-    files = {ending: package_file(stem + ending) for ending in FORMATS}
+    files = {ending: package_file(stem + ending) for ending in DRAWING_SUFFIXES}
     return {ending: file.read_bytes() for ending, file in files.items() if file.is_file()}
 
 

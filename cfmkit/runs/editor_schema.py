@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Family
 
-LINE = "# yaml-language-server: $schema="
+SCHEMA_LINE_START = "# yaml-language-server: $schema="
 """How the line begins by which the YAML language server, and so most editors, finds a schema."""
 
 
@@ -86,9 +86,9 @@ def file_name(record: Family) -> str:
 
 def with_line(text: str, record: Family) -> str:
     """Return a specification that tells editors where its schema is."""
-    if text.startswith(LINE):
+    if text.startswith(SCHEMA_LINE_START):
         return text
-    return f"{LINE}{file_name(record)}\n{text}"
+    return f"{SCHEMA_LINE_START}{file_name(record)}\n{text}"
 
 
 def content(record: Family) -> bytes:

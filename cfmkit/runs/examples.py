@@ -46,7 +46,7 @@ class Example:
     searches: bool = False
 
 
-ABBREVIATED = ("sec.", "eqs.", "figs.")
+ABBREVIATED_WORDS = ("sec.", "eqs.", "figs.")
 
 
 def folder() -> Path:
@@ -95,7 +95,7 @@ def _first_sentence(text: str) -> str:
     """
     words = text.split()
     for at, word in enumerate(words[:-1]):
-        if word[-1] != "." or len(word) < 4 or word in ABBREVIATED:
+        if word[-1] != "." or len(word) < 4 or word in ABBREVIATED_WORDS:
             continue
         plain = word[:-1].isalpha() and word.islower()
         after_number = (word[-2].isdigit() or word[-2] == ")") and words[at + 1][0] in ascii_uppercase

@@ -23,7 +23,7 @@ from cfmkit.documents.run_outcome import report_on
 from cfmkit.errors import CfmError, OutputError, SpecError, UsageError, lines_of, visible
 from cfmkit.results import Status
 from cfmkit.runs.specfile import apply_options, bind, read_spec
-from cfmkit.specs.units.strict_decimal_number import NUMBER
+from cfmkit.specs.units.strict_decimal_number import NUMBER_PATTERN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -41,13 +41,13 @@ LEFT_OUT = ("cfmkit", "family", "name", "description", "design", "sweep", "sensi
 MOST_POINTS = 600
 """Points of a branch that the page draws: more than there are pixels across its diagram."""
 
-SPAN = 0.5
+SLIDER_SPAN = 0.5
 """Share of a value by which its slider goes down and up: far enough to see a trend, near enough to stay a mechanism."""
 
 RELATIVE_STEP = 0.01
 """Share of a value by which it is changed to find its influence: above the noise of solvers, and a small change."""
 
-PAIRS = {name: ("x", "y") for name in ("at", "mirror")} | {
+PAIR_LABELS = {name: ("x", "y") for name in ("at", "mirror")} | {
     name: ("from", "to") for name in ("window", "over", "travel")
 }
 """What the two numbers of a list are called."""
@@ -76,7 +76,7 @@ class Slider:
         *_, group, key = ("", *self.path.split("."))
         if not key.isdecimal():
             return key.replace("_", " ")
-        pair = PAIRS.get(group, ())
+        pair = PAIR_LABELS.get(group, ())
         return pair[int(key)] if int(key) < len(pair) else f"number {int(key) + 1}"
 
 
@@ -270,14 +270,14 @@ def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
     unit = ""
     number = value
     if isinstance(value, str):
-        match = NUMBER.match(value)
+        match = NUMBER_PATTERN.match(value)
         if match is None or not re.fullmatch(r" ?[^\s\d].*", value[match.end() :]):
             return None
         number, unit = float(match[0]), value[match.end() :].strip()
     number = float(number)
     if not np.isfinite(number):
         return None
-    low, high = sorted((number * (1 - SPAN), number * (1 + SPAN))) if number else (0.0, 1.0)
+    low, high = sorted((number * (1 - SLIDER_SPAN), number * (1 + SLIDER_SPAN))) if number else (0.0, 1.0)
     if whole:
         low, high = float(np.floor(low)), float(np.ceil(high)) + (not number)
     step = 1.0 if whole else 10.0 ** np.round(np.log10((high - low) / 200))

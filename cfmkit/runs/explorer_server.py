@@ -31,7 +31,7 @@ from cfmkit.runs.explorer import suggested_name as suggested_name
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-HOST = "127.0.0.1"
+SERVER_HOST = "127.0.0.1"
 MAX_BODY_BYTES = 200_000
 """Of a request: a thousand changes are a fifth of that."""
 
@@ -47,13 +47,13 @@ MAX_SEND_SECONDS = 30.0
 MAX_DRAIN_SECONDS = 0.3
 """Until a connection is closed whose client goes on sending after its answer."""
 
-POLICY = (
+CONTENT_POLICY = (
     "default-src 'none'; style-src 'nonce-{nonce}'; script-src 'nonce-{nonce}'; connect-src 'self'; img-src data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 NO_CONTENT_POLICY = "default-src 'none'; frame-ancestors 'none'"
 
-REDIRECT = """<!DOCTYPE html>
+REDIRECT_PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}"><title>cfmkit explore</title></head>
 <body><p><a href="{address}">cfmkit explore</a></p></body></html>
@@ -96,12 +96,12 @@ class ExplorerServer(ThreadingHTTPServer):
         self._redirect: Path | None = None
         self._connections: dict[socket.socket, float | None] = {}  # when each came; None: its request has arrived
         self._counting = threading.Lock()
-        super().__init__((HOST, port), _Handler)
+        super().__init__((SERVER_HOST, port), _Handler)
 
     @property
     def address(self) -> str:
         """Address of the page, with the token."""
-        return f"http://{HOST}:{self.server_port}/?token={self.token}"
+        return f"http://{SERVER_HOST}:{self.server_port}/?token={self.token}"
 
     def write_redirect(self) -> Path:
         """Write a page that leads to the address; its path is what a browser is started with.
@@ -117,7 +117,7 @@ class ExplorerServer(ThreadingHTTPServer):
         descriptor, name = tempfile.mkstemp(prefix="cfmkit-explore-", suffix=".html")  # of mode 600
         self._redirect = Path(name)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(REDIRECT.format(address=html.escape(self.address)))
+            file.write(REDIRECT_PAGE.format(address=html.escape(self.address)))
         return self._redirect
 
     def remove_redirect(self) -> None:
@@ -202,7 +202,7 @@ class _Handler(BaseHTTPRequestHandler):
             nonce = secrets.token_urlsafe(16)
             with self.server.turn:
                 page = self.server.explorer.page(self.server.token, nonce)
-            self._send(200, page, "text/html", POLICY.format(nonce=nonce))
+            self._send(200, page, "text/html", CONTENT_POLICY.format(nonce=nonce))
             self.server.remove_redirect()
 
     def do_POST(self) -> None:
@@ -264,7 +264,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _is_local(self) -> bool:
         """Return whether it was reached by a name of this computer, and from no page but its own."""
-        names = {f"{name}:{self.server.server_port}" for name in (HOST, "localhost")}
+        names = {f"{name}:{self.server.server_port}" for name in (SERVER_HOST, "localhost")}
         hosts, origins = self.headers.get_all("Host", []), self.headers.get_all("Origin", [])
         return (
             len(hosts) == 1

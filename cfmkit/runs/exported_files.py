@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
     from cfmkit.specs.spec import Spec
 
-DECK = "inp"
+DECK_FORMAT = "inp"
 """Format of a deck of a finite-element solver: of elastic parts, which the drawing alone does not tell."""
 
-PAPER = ("png", "pdf")
+DRAWING_FORMATS = ("png", "pdf")
 """Formats of the dimensioned drawing."""
 
 
@@ -45,7 +45,7 @@ def export_files(
     kerf, tolerance : str or float, optional
         Width of the cut, and largest distance from the exact curves: with a unit, or a number [m].
     formats : str or sequence of str, optional
-        Of `cfmkit.export.FORMATS`, `DECK` and `PAPER`; default: `cfmkit.export.USUAL`.
+        Of `cfmkit.export.FILE_FORMATS`, `DECK_FORMAT` and `DRAWING_FORMATS`; default: `cfmkit.export.DEFAULT_FORMATS`.
 
     Raises
     ------
@@ -56,22 +56,22 @@ def export_files(
     cfmkit.errors.GeometryError
         If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
     """
-    from cfmkit.export import USUAL, files
+    from cfmkit.export import DEFAULT_FORMATS, files
     from cfmkit.runs.values_with_units import read_length
 
-    wanted = _formats(formats, USUAL)
+    wanted = _formats(formats, DEFAULT_FORMATS)
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = read_length(kerf, "--kerf"), read_length(tolerance, "--tolerance")
     drawn = drawing_of(spec, family(spec.family), near)
-    found = files(drawn, width, near, [one for one in wanted if one in USUAL])
+    found = files(drawn, width, near, [one for one in wanted if one in DEFAULT_FORMATS])
     failed: dict[str, CfmError] = {}
-    for name in (one for one in wanted if one not in USUAL):
+    for name in (one for one in wanted if one not in DEFAULT_FORMATS):
         try:
-            if name in PAPER:
+            if name in DRAWING_FORMATS:
                 found |= _drawing_on_paper(drawn, spec, name)
             else:
-                found |= _decks(spec) if name == DECK else files(drawn, None, near, [name])
+                found |= _decks(spec) if name == DECK_FORMAT else files(drawn, None, near, [name])
         except CfmError as error:
             failed[name] = error
     if failed and not found:
@@ -91,7 +91,7 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
     return engrave_labels(drawn, spec.name)
 
 
-NAMED = 3
+MAX_NAMED_WALLS = 3
 """Thin walls that one line names."""
 
 
@@ -110,10 +110,10 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
         return
     first, *others = [
         f"{format_short(one.thickness, 'length', 3)}{{}} at ({', '.join(format_short(x, 'length') for x in one.at)})"
-        for one in walls[:NAMED]
+        for one in walls[:MAX_NAMED_WALLS]
     ]
     named = "; ".join([first.format(" thick"), *(one.format("") for one in others)])
-    more = len(walls) - NAMED
+    more = len(walls) - MAX_NAMED_WALLS
     beyond = f", and thin in {more} other place{'s' if more > 1 else ''}" if more > 0 else ""
     key = "process" if process.least_feature is None else "process.least_feature"
     yield Finding(
@@ -150,9 +150,9 @@ def _decks(spec: Spec) -> dict[str, bytes]:
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
     """Return the formats that are requested; of a text those between commas."""
-    from cfmkit.export import FORMATS as DRAWN
+    from cfmkit.export import FILE_FORMATS as DRAWN
 
-    known = (*DRAWN, DECK, *PAPER)
+    known = (*DRAWN, DECK_FORMAT, *DRAWING_FORMATS)
     words = usual if given is None else given.split(",") if isinstance(given, str) else given
     names = tuple(dict.fromkeys(word.strip().lower() for word in words))
     for name in names:

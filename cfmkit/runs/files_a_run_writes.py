@@ -89,7 +89,7 @@ def files(
         every = ("Input with every default and derived value", api.dumps(api.resolve(result.spec), complete=True))
         texts = [(heading, api.dumps(result.spec)), every]
         yield (
-            html_of_run.NAME,
+            html_of_run.REPORT_NAME,
             html_of_run.page(report, form.select_page_figures(makers, drawn), command, texts, started),
         )
 

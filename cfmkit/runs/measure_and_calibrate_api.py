@@ -203,10 +203,10 @@ def calibrate(
     """
     from cfmkit.experiment.calibration import calibrate as fitted
     from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
-    from cfmkit.numerics.least_squares import LOSSES
+    from cfmkit.numerics.least_squares import LOSS_NAMES
 
-    if loss not in LOSSES:
-        raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
+    if loss not in LOSS_NAMES:
+        raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSS_NAMES)}")
     start = resolve(spec)
     source = _read_curves(data, units, tare, zero, flip, cycles, group)
     given = bounds or {}

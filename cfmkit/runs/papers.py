@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.specs.spec import Spec
 
-VERDICTS: Mapping[str, str] = {
+VERDICT_MEANINGS: Mapping[str, str] = {
     "agrees": "computed here; equal to the last printed digit, or within a tolerance for which the row gives a reason",
     "arithmetic": "follows from other numbers that the paper prints: equal to the last digit, and no result of a model",
     "given": "an input: the example states it as printed, or the command of the row sets it",
@@ -51,7 +51,7 @@ class PrintedRow:
     place: str
     what: str
     printed: tuple[str, ...]  # as printed, with units; ``>``, ``<`` and ``~`` (about) may lead
-    verdict: str  # one of `VERDICTS`
+    verdict: str  # one of `VERDICT_MEANINGS`
     why: str = ""  # the reason, of every verdict that needs one
     spec: str = ""  # name of the example; empty where nothing is computed from one
     changes: tuple[str, ...] = ()  # as ``--set`` takes them
@@ -296,17 +296,17 @@ def _result(name: str, changes: tuple[str, ...], verb: str) -> AnalysisView:
     return api.analyze(_specification(name, changes, verb))
 
 
-_TWO: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+_BINARY_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+_MATH_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt")
 } | {"abs": abs, "min": min, "max": max, "count": len}
-_BLOCKS = ("mechanism", "analysis", "design")
+_SPEC_BLOCKS = ("mechanism", "analysis", "design")
 
 
 def _asks_model(text: str) -> bool:
@@ -318,7 +318,7 @@ def _asks_model(text: str) -> bool:
     (False, True)
     """
     names = {node.id for node in ast.walk(ast.parse(text.strip(), mode="eval")) if isinstance(node, ast.Name)}
-    return not names <= _FUNCTIONS.keys()
+    return not names <= _MATH_FUNCTIONS.keys()
 
 
 def _evaluate(text: str, scope: _Scope) -> Any:
@@ -338,14 +338,14 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
             return value
         case ast.UnaryOp(op=ast.USub(), operand=inner):
             return -_value(inner, scope)
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _TWO:
-            return _TWO[type(op)](_value(left, scope), _value(right, scope))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY_OPERATORS:
+            return _BINARY_OPERATORS[type(op)](_value(left, scope), _value(right, scope))
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
             return _value(inner, scope.add_change(change))
         case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
             return _varied_values(scope.specification(), path)
-        case ast.Call(func=ast.Name(id=name), args=args) if name in _FUNCTIONS:
-            return _FUNCTIONS[name](*(_value(one, scope) for one in args))
+        case ast.Call(func=ast.Name(id=name), args=args) if name in _MATH_FUNCTIONS:
+            return _MATH_FUNCTIONS[name](*(_value(one, scope) for one in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
             return _value_on_curve(
                 scope.result().curves[0], column, _value(place, scope), *map(ast.literal_eval, branch)
@@ -357,7 +357,7 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
 
 def _value_named(name: str, scope: _Scope) -> Any:
     """Return a value of the specification, or a metric."""
-    if name.startswith(tuple(f"{block}." for block in _BLOCKS)):
+    if name.startswith(tuple(f"{block}." for block in _SPEC_BLOCKS)):
         return scope.specification().get_value(name.replace("[", ".").replace("]", ""))
     metric = scope.result().metrics.get(name)
     if metric is None or metric.value is None:

@@ -50,11 +50,11 @@ def how_to_print(drawing: Drawing, spec: Spec) -> tuple[str, ...]:
 def weight_in_words(drawing: Drawing, spec: Spec) -> str:
     """Return the mass of what is cut, by the density of its named material, or what is missing to know it."""
     from cfmkit.export.extrusion import volume
-    from cfmkit.stock import MATERIALS
+    from cfmkit.stock import MATERIALS_BY_NAME
 
     mechanism: Any = getattr(spec, "mechanism", None)
     material = getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
-    reference = MATERIALS.get(getattr(material, "name", None) or "")
+    reference = MATERIALS_BY_NAME.get(getattr(material, "name", None) or "")
     if reference is None:
         return "not known: no named material"
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import SpecError
-from cfmkit.runs.specfile import STDIN, content, rename_source, standard_input
+from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
 from cfmkit.specs.yamlio import read_document
 from cfmkit.studies.suggest.spec import SuggestFile
 
@@ -33,7 +33,7 @@ def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
     if name is None:
         document = read_document("cfmkit: 1\nsuggest: {}\n", "options")
     else:
-        document = read_document(standard_input() if name == STDIN else content(name), name)
+        document = read_document(standard_input() if name == STDIN_PATH else content(name), name)
     for key, value in keys.items():
         document = document.set(f"suggest.{key}={value}")
     try:

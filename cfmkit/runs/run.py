@@ -18,7 +18,7 @@ from cfmkit.documents.run_document import RunCommand
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.run_control import Run
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
-from cfmkit.results import OVERWRITTEN, Finding, Status
+from cfmkit.results import OVERWRITTEN_FINDING, Finding, Status
 from cfmkit.runs.files_a_run_writes import files, warnings_of_part
 from cfmkit.runs.specfile import bind, place_problem, read_spec, rename_source
 from cfmkit.store import RunFolder, stable_hash
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     Noting = Callable[[RunFolder, bool], AbstractContextManager[Journal]]
 
-FIRST = ("metrics.json", "resolved.yaml", "curve.csv")
+COMMON_FILES = ("metrics.json", "resolved.yaml", "curve.csv")
 """Files that every run may write: what is in their way is found before anything is computed."""
 
 
@@ -146,7 +146,7 @@ def carry_out(
     document, spec = read(wanted)
     _make_ready(spec)
     with RunFolder(wanted.out) as folder:
-        folder.check(*FIRST, *(["report.html"] if wanted.page else []))
+        folder.check(*COMMON_FILES, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _options_judged(_compute(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
@@ -230,7 +230,7 @@ def _options_judged(found: Report, given: Spec, document: YamlDocument) -> Repor
     told = " ".join(warning.message for warning in found.warnings)
     warnings = [
         Finding(
-            OVERWRITTEN,
+            OVERWRITTEN_FINDING,
             f"'{path}' ({_text_at(stated, path)}), which --set states, is replaced by "
             f"{_text_at(written, path) or 'none'}: the design determines it",
         )

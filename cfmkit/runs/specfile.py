@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.specs.yamlio import YamlDocument
 
-STDIN = "-"
+STDIN_PATH = "-"
 
 
 def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> YamlDocument:
@@ -44,7 +44,7 @@ def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> 
     from cfmkit.specs.yamlio import read_document
     from cfmkit.specs.yamlio.base_file import with_base
 
-    if name == STDIN:
+    if name == STDIN_PATH:
         return apply_options(with_base(read_document(standard_input(), "stdin", Path.cwd())), changes, of_many)
     return apply_options(with_base(read_document(content(name), name, Path(name).absolute().parent)), changes, of_many)
 
@@ -84,7 +84,7 @@ def split_address(change: str) -> tuple[str | None, str]:
     """
     path = change.partition("=")[0]
     family, colon, _ = path.partition(":")
-    if not colon or not _FAMILY.fullmatch(family):
+    if not colon or not _FAMILY_PATTERN.fullmatch(family):
         return None, change
     from cfmkit import families
 
@@ -95,7 +95,7 @@ def split_address(change: str) -> tuple[str | None, str]:
     return family, change[len(family) + 1 :]
 
 
-_FAMILY = re.compile("[A-Za-z][A-Za-z0-9_-]*")
+_FAMILY_PATTERN = re.compile("[A-Za-z][A-Za-z0-9_-]*")
 """What may stand before the colon of an option for one family; a path with a colon has dots or quotes before it."""
 
 
@@ -112,11 +112,11 @@ def standard_input() -> bytes:
     cfmkit.errors.UsageError
         If nothing can come in.
     """
-    from cfmkit.specs.yamlio.text_decoding import LARGEST
+    from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
 
     if sys.stdin is None:
         raise UsageError("standard input is closed; name a file")
-    return sys.stdin.buffer.read(LARGEST + 1)
+    return sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
 
 
 def content(name: str) -> bytes:
@@ -127,7 +127,7 @@ def content(name: str) -> bytes:
     cfmkit.errors.UsageError
         In one sentence, if it is not there, a folder or not readable.
     """
-    from cfmkit.specs.yamlio.text_decoding import LARGEST
+    from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
 
     if not name or "\0" in name:
         raise UsageError(f"{name!r} is not the name of a file")
@@ -135,7 +135,7 @@ def content(name: str) -> bytes:
         if Path(name).is_dir():
             raise UsageError(f"{visible(name)} is a folder; name the specification in it{_path_inside(name)}")
         with open(name, "rb") as file:
-            return file.read(LARGEST + 1)
+            return file.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
         raise UsageError(f"{visible(name)}: there is no such file{_similar(name)}") from None
     except OSError as error:
@@ -170,8 +170,8 @@ def _known_families(named: str | None) -> Sequence[str]:
     """Return the families among which one is looked for; other packages are not searched for one that is here."""
     from cfmkit import families
 
-    if named in families.FAMILIES:
-        return tuple(families.FAMILIES)
+    if named in families.FAMILY_MODULES:
+        return tuple(families.FAMILY_MODULES)
     return (named,) if named in families.clashing() else families.names()
 
 

@@ -93,8 +93,8 @@ def suggest(
     from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as searched
 
-    def written(value: Any) -> str:
-        return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
+    def format_value(value: Any) -> str:
+        return "[" + ", ".join(map(format_value, value)) + "]" if isinstance(value, list | tuple) else str(value)
 
     keys = given_arguments(
         force=force,
@@ -114,6 +114,6 @@ def suggest(
     )
     keys |= {} if min_yield is None else {"yield": min_yield}
     name = None if request is None else os.fspath(request)
-    block = read_request(name, {key: written(value) for key, value in keys.items()})
+    block = read_request(name, {key: format_value(value) for key, value in keys.items()})
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
     return SuggestionsView.of(searched(block.request(), run, block.prefer), block)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.documents import html
 from cfmkit.documents.suggestion_document import document_of
-from cfmkit.runs.suggestion_record import COLUMNS, as_json, exit_code, folder_name, with_force
+from cfmkit.runs.suggestion_record import RECORD_COLUMNS, as_json, exit_code, folder_name, with_force
 from cfmkit.specs.units import format_short
 from cfmkit.studies.pool import give_up_at
 from cfmkit.tables.json_writing import json_bytes
@@ -64,7 +64,7 @@ def files(
             yield f"figures/{name}.png", png(figure)
     if command is not None:
         texts = {folder_name(number, one): one.text for number, one in enumerate(found.listed, 1)}
-        yield html.NAME, page(as_json(found, block), exit_code(found), texts, drawn, command)
+        yield html.REPORT_NAME, page(as_json(found, block), exit_code(found), texts, drawn, command)
     work = partial(_make_files, (plots, command is not None), deadlines, found.listed)
     made = dict(give_up_at(run.executor, deadlines.files.deadline)(work, iter(range(len(found.listed))), lambda: False))
     for index, one in enumerate(found.listed):
@@ -77,7 +77,7 @@ def _picture(found: Suggestions) -> Figure:
     """Return all proposals to one scale; on a page each leads to its report."""
     from cfmkit.studies.suggest.figures import to_one_scale
 
-    links = [f"{folder_name(number, one)}/{html.NAME}" for number, one in enumerate(found.listed, 1)]
+    links = [f"{folder_name(number, one)}/{html.REPORT_NAME}" for number, one in enumerate(found.listed, 1)]
     return to_one_scale(found.listed, found.request, links)
 
 
@@ -96,7 +96,9 @@ def _make_files(
     spec = proposal.spec
     design = Design(spec, Status.COMPLETE)
     left = deadlines.files.get_time_left()
-    if left is not None and left < SLOWER * proposal.seconds:  # its analysis would not end in time, its drawing does
+    if (
+        left is not None and left < MAX_SLOWDOWN * proposal.seconds
+    ):  # its analysis would not end in time, its drawing does
         return [
             ("design.yaml", proposal.text.encode()),
             *_draw_part(spec, plots=wanted[0] and not deadlines.figures.late()),
@@ -106,7 +108,7 @@ def _make_files(
     return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
 
 
-SLOWER = 2.0
+MAX_SLOWDOWN = 2.0
 """How much longer than before an analysis may take: others run beside it, and figures are drawn."""
 
 
@@ -138,7 +140,7 @@ def table(found: Suggestions) -> bytes:
         TableColumn("family", tuple(one.family for _, one in rows)),
         TableColumn("variant", tuple(one.variant for _, one in rows)),
     ]
-    for name, (dimension, border) in COLUMNS.items():
+    for name, (dimension, border) in RECORD_COLUMNS.items():
         head = f"{found.request.kind}_mean" if name == "mean" else name
         values = tuple(each.get(name) for each in numbers)
         columns.append(TableColumn(head, values, unit if name == "mean" else border if dimension != "count" else None))
@@ -188,16 +190,16 @@ def _list_in_words(pairs: Mapping[str, Any]) -> str:
     return ", ".join(f"{key.replace('_', ' ')} {_words(key, value)}" for key, value in pairs.items())
 
 
-SHARES = ("ripple", "hysteresis", "yield")
+SHARE_COLUMNS = ("ripple", "hysteresis", "yield")
 """Numbers of a proposal that are shares."""
 
-JOINED = {"envelope": " x ", "material": " or ", "prefer": ", "}
+LIST_SEPARATORS = {"envelope": " x ", "material": " or ", "prefer": ", "}
 """What stands between the values of a key that has several; else they are the two ends of a band."""
 
 
 def _words(key: str, value: Any) -> str:
     if isinstance(value, list | tuple):
-        return JOINED.get(key, " to ").join(_words(key, one) for one in value)
+        return LIST_SEPARATORS.get(key, " to ").join(_words(key, one) for one in value)
     if isinstance(value, dict):
         return str(value.get("name") or _list_in_words(value))
-    return format_short(value, "ratio", 3) if key in SHARES and isinstance(value, float | int) else str(value)
+    return format_short(value, "ratio", 3) if key in SHARE_COLUMNS and isinstance(value, float | int) else str(value)

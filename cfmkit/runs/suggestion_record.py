@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
 from cfmkit.specs.units import to_border
-from cfmkit.studies.serial_and_cluster_executors import BUG
+from cfmkit.studies.serial_and_cluster_executors import BUG_PREFIX
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.suggest.spec import SuggestBlock
 
 
-COLUMNS: Mapping[str, tuple[str, str]] = {
+RECORD_COLUMNS: Mapping[str, tuple[str, str]] = {
     "mean": ("", ""),
     "ripple": ("ratio", "1"),
     "hysteresis": ("ratio", "1"),
@@ -36,7 +36,7 @@ def numbers_in_border_units(proposal: Proposal) -> dict[str, Any]:
     """Return a proposal's numbers in border units, by the name of its column."""
     found: dict[str, Any] = {}
     for name, value in proposal.numbers.items():
-        dimension = COLUMNS[name][0] or "ratio"
+        dimension = RECORD_COLUMNS[name][0] or "ratio"
         found[name] = (
             None if value is None else float(to_border(value, dimension)) if dimension != "count" else int(value)
         )
@@ -51,7 +51,7 @@ def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
     }
 
 
-STATUSES = {
+STATUS_BY_CODE = {
     ExitCode.OK: "complete",
     ExitCode.PARTIAL: "partial",
     ExitCode.NO_SOLUTION: "infeasible",
@@ -66,7 +66,7 @@ def exit_code(found: Suggestions) -> ExitCode:
         return ExitCode.OK
     reasons = [one.offer.reason for one in found.answers if one.offer.reason]
     reasons += [reason for each in found.failed.values() for reason in each]
-    if found.bugs and not found.near and all(reason.startswith(BUG) for reason in reasons):
+    if found.bugs and not found.near and all(reason.startswith(BUG_PREFIX) for reason in reasons):
         return ExitCode.BUG
     return ExitCode.PARTIAL if found.late or found.unjudged else ExitCode.NO_SOLUTION
 
@@ -81,7 +81,7 @@ def as_json(found: Suggestions, block: SuggestBlock) -> dict[str, Any]:
     """Return what metrics.json and ``--json`` say."""
     code = exit_code(found)
     return {
-        "status": STATUSES[code],
+        "status": STATUS_BY_CODE[code],
         "message": message(found),
         "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "order": list(block.prefer),

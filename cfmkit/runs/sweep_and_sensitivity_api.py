@@ -186,11 +186,11 @@ def sensitivity(
     )
     if block:
         spec = spec.replace({"sensitivity": with_options(spec.sensitivity, block)})
-    found = carry_out(prepare(spec), partial(_computed, _executor(jobs)))
+    found = carry_out(prepare(spec), partial(_run_work, _executor(jobs)))
     return replace(_read(outputs(found)), spec=found.setup.study.spec, findings=found, document=document_of(found))
 
 
-def _computed(executor: Executor, work: Work) -> Records:
+def _run_work(executor: Executor, work: Work) -> Records:
     """Return the records of a piece of work."""
     from cfmkit.studies.engine import run
 

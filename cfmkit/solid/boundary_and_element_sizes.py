@@ -1,7 +1,8 @@
 """The boundary of a part as closed chains of points, and how finely it must be meshed where.
 
 The chains are so dense that the true edge lies within the outline's tolerance of their lines. A vertex at which the
-direction turns by more than `CORNER` is a corner and becomes a node; everything else is a smooth edge, whose radius is
+direction turns by more than `CORNER_TURN` is a corner and becomes a node; everything else is a smooth edge, whose
+radius is
 read off the turn between neighbouring lines.
 """
 
@@ -27,18 +28,18 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-CORNER = math.radians(25.0)
+CORNER_TURN = math.radians(25.0)
 """Turn of a true corner [rad]: lines that stand for arcs turn by a degree, sharp corners of parts are rounded by the
 cutter or stand at pads, square."""
 
-GRADING = 0.25
+SIZE_GRADING = 0.25
 """How fast element sizes may grow [m per m]: 0.2 to 0.3 keeps triangles near the boundary above 25 degrees."""
 
 
 MOST_PLACES = 20_000
 """Places round the boundary at which sizes are looked up; more take seconds."""
 
-TOGETHER = 128
+PLACES_AT_ONCE = 128
 """Places whose sizes are spread at once: more hide fewer that smaller neighbours have covered, fewer take calls."""
 
 MOST_REFINED = 1000.0
@@ -90,23 +91,23 @@ class Ring:
     @cached_property
     def corners(self) -> NDArray[np.int64]:
         """Indices of the vertices that are corners."""
-        return np.flatnonzero(np.abs(self.turns) > CORNER)
+        return np.flatnonzero(np.abs(self.turns) > CORNER_TURN)
 
     @cached_property
     def radii(self) -> FloatArray:
         """Radius of the edge at each vertex, (n,) [m]; infinite at corners and where the edge is straight."""
         reach = 0.5 * (self.lengths + np.roll(self.lengths, 1))
-        turn = np.where(np.abs(self.turns) > CORNER, 0.0, np.abs(self.turns))
+        turn = np.where(np.abs(self.turns) > CORNER_TURN, 0.0, np.abs(self.turns))
         with np.errstate(divide="ignore"):
             return np.asarray(np.where(turn > 1e-9, reach / np.maximum(turn, 1e-300), math.inf))
 
     @cached_property
     def curvature_jumps(self) -> FloatArray:
         """By how much the curvature of the lines behind and before each vertex differs, (n,) [1/m]; 0 at corners."""
-        turn = np.where(np.abs(self.turns) > CORNER, 0.0, self.turns)
+        turn = np.where(np.abs(self.turns) > CORNER_TURN, 0.0, self.turns)
         curvature = 0.5 * (turn + np.roll(turn, -1)) / self.lengths
         jumps = np.abs(curvature - np.roll(curvature, 1))
-        return np.asarray(np.where(np.abs(self.turns) > CORNER, 0.0, jumps))
+        return np.asarray(np.where(np.abs(self.turns) > CORNER_TURN, 0.0, jumps))
 
     def locate(self, arc: FloatArray) -> FloatArray:
         """Return the points (k, 2) [m] at arc lengths (k,) [m], taken round the ring."""
@@ -127,7 +128,7 @@ class Ring:
 def _merge_steps(ring: FloatArray, least: float) -> FloatArray:
     """Return a closed chain (n, 2) [m] with one vertex for the two of a step: opposite corners `least` [m] apart."""
     chain = Ring(ring)
-    corner, turns = np.abs(chain.turns) > CORNER, chain.turns
+    corner, turns = np.abs(chain.turns) > CORNER_TURN, chain.turns
     step = (chain.lengths <= least) & corner & np.roll(corner, -1) & (turns * np.roll(turns, -1) < 0.0)
     if not step.any():
         return ring
@@ -140,7 +141,7 @@ class Sizes:
     """Wanted lengths of the sides of elements [m], anywhere in the part."""
 
     places: FloatArray  # (m, 2) along the boundary [m]
-    sizes: FloatArray  # (m,) wanted there [m]; they grow from place to place by `GRADING` at most
+    sizes: FloatArray  # (m,) wanted there [m]; they grow from place to place by `SIZE_GRADING` at most
     largest: float  # [m]
 
     @cached_property
@@ -154,7 +155,7 @@ class Sizes:
     def looked_up(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the sizes (k,) at points (k, 2), and how far the boundary's nearest place is (k,) [m]."""
         distance, nearest = self._tree.query(points)
-        return np.minimum(self.sizes[nearest] + GRADING * distance, self.largest), np.asarray(distance)
+        return np.minimum(self.sizes[nearest] + SIZE_GRADING * distance, self.largest), np.asarray(distance)
 
 
 def sizes(rings: tuple[Ring, ...], largest: float, share: float, across: float) -> Sizes:
@@ -210,13 +211,15 @@ def _wanted_sizes(
     """Return places along the boundary (m, 2) no farther apart than a step, and what is wanted there (m,) [m]."""
     arcs = [_dense(ring, step) for ring in rings]
 
-    def joined(found: Iterable[FloatArray]) -> FloatArray:
+    def concatenate(found: Iterable[FloatArray]) -> FloatArray:
         return np.concatenate(list(found))
 
-    places = joined(ring.locate(arc) for ring, arc in zip(rings, arcs, strict=True))
-    wanted = joined(np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in zip(rings, arcs, strict=True))
+    places = concatenate(ring.locate(arc) for ring, arc in zip(rings, arcs, strict=True))
+    wanted = concatenate(
+        np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in zip(rings, arcs, strict=True)
+    )
     for behind in (False, True):
-        normals = joined(ring.normals(arc, behind) for ring, arc in zip(rings, arcs, strict=True))
+        normals = concatenate(ring.normals(arc, behind) for ring, arc in zip(rings, arcs, strict=True))
         wanted = np.minimum(wanted, _thickness(rings, places, normals, across * largest) / across)
     return places, wanted
 
@@ -251,20 +254,22 @@ def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray,
 
 
 def _grade_sizes(places: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return sizes that nowhere grow faster than `GRADING`: the smallest of (size there + grading x distance)."""
+    """Return sizes that nowhere grow faster than `SIZE_GRADING`: the smallest of (size there + grading x distance)."""
     order = np.argsort(wanted)
     sizes = wanted.copy()
     tree = cKDTree(places)
     top = float(wanted.max())
-    for start in range(0, len(order), TOGETHER):  # from the smallest size on, as in Dijkstra's way through a graph
-        some = order[start : start + TOGETHER]
+    for start in range(
+        0, len(order), PLACES_AT_ONCE
+    ):  # from the smallest size on, as in Dijkstra's way through a graph
+        some = order[start : start + PLACES_AT_ONCE]
         # where a smaller neighbour has been, its reach covers this one's
         some = some[(sizes[some] < top) & (sizes[some] >= wanted[some])]
         if not len(some):
             continue
-        met = tree.query_ball_point(places[some], (top - sizes[some]) / GRADING)
+        met = tree.query_ball_point(places[some], (top - sizes[some]) / SIZE_GRADING)
         source = np.repeat(some, [len(one) for one in met])
         near = np.concatenate([np.asarray(one, np.int64) for one in met])
         away = np.hypot(*(places[near] - places[source]).T)
-        np.minimum.at(sizes, near, wanted[source] + GRADING * away)
+        np.minimum.at(sizes, near, wanted[source] + SIZE_GRADING * away)
     return sizes

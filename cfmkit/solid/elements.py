@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 # Three points inside [Strang, Fix, 1973]: exact to degree two, which is that of the strain energy of a straight-sided
 # element where strains are small.
-POINTS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
-WEIGHTS = np.full(3, 1 / 6)
-CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+GAUSS_POINTS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
+GAUSS_WEIGHTS = np.full(3, 1 / 6)
+PARENT_NODES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 """Where the nodes stand in the parent triangle."""
-UPPER = np.argwhere(np.triu(np.ones((12, 12))))
+UPPER_ENTRIES = np.argwhere(np.triu(np.ones((12, 12))))
 """Rows and columns of an element's stiffness on and above the diagonal, (78, 2): it is symmetric."""
 
 
@@ -63,12 +63,12 @@ class Elements:
     @cached_property
     def _parent(self) -> tuple[FloatArray, FloatArray]:
         """Slopes of the shape functions in the plane, (6, 2, points x m) [1/m], and the volumes (points x m,) [m3]."""
-        return self._map_slopes(POINTS, WEIGHTS)
+        return self._map_slopes(GAUSS_POINTS, GAUSS_WEIGHTS)
 
     @cached_property
     def _at_nodes(self) -> FloatArray:
         """Slopes of the shape functions at the nodes of each element, (6, 2, 6 x m) [1/m]."""
-        return self._map_slopes(CORNERS, np.zeros(6))[0]
+        return self._map_slopes(PARENT_NODES, np.zeros(6))[0]
 
     def _map_slopes(self, at: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         x = self.mesh.nodes[self.mesh.triangles]  # (m, 6, 2)
@@ -126,11 +126,11 @@ class Elements:
         stress, modulus, _ = self.law(strain)
         s, d = volume * stress, volume * modulus
 
-        def changed(direction: FloatArray) -> FloatArray:
+        def apply_tangent(direction: FloatArray) -> FloatArray:
             df = self._evaluate_slopes(gradient, direction)
             return self._assemble_forces(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, _strain_change(f, df))))
 
-        return self._assemble_forces(_times(f, s)), changed
+        return self._assemble_forces(_times(f, s)), apply_tangent
 
     def tangent_energies(self, moved: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
         """Return first' K second of every element (m,) [N m], K its tangent at displacements; each (n, 2) [m]."""
@@ -140,12 +140,12 @@ class Elements:
         df, dg = self._evaluate_slopes(gradient, first), self._evaluate_slopes(gradient, second)
         energy = (df * _times(dg, stress)).sum((0, 1))
         energy += np.einsum("ik,ijk,jk->k", _strain_change(f, df), modulus, _strain_change(f, dg))
-        return np.asarray((volume * energy).reshape(len(POINTS), -1).sum(0))
+        return np.asarray((volume * energy).reshape(len(GAUSS_POINTS), -1).sum(0))
 
     def _assemble_forces(self, p: FloatArray) -> FloatArray:
         """Return nodal forces (n, 2) [N] from the first Piola-Kirchhoff stress times volume (2, 2, k) [N m]."""
         gradient, _ = self._parent
-        each = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(POINTS), -1).sum(2)
+        each = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(GAUSS_POINTS), -1).sum(2)
         nodes, count = self.mesh.triangles.T.ravel(), len(self.mesh.nodes)
         return np.column_stack([np.bincount(nodes, each[:, k].ravel(), count) for k in (0, 1)])
 
@@ -165,10 +165,10 @@ class Elements:
         )  # (3, 6, 2, k)
         db = np.stack([d[i, 0] * b[0] + d[i, 1] * b[1] + d[i, 2] * b[2] for i in range(3)])
         pg = np.stack([gradient[:, 0] * s[0] + gradient[:, 1] * s[2], gradient[:, 0] * s[2] + gradient[:, 1] * s[1]], 1)
-        points = (len(POINTS), len(self.mesh.triangles))
+        points = (len(GAUSS_POINTS), len(self.mesh.triangles))
         b, db = b.reshape(3, 6, 2, *points), db.reshape(3, 6, 2, *points)
         slope, pg = gradient.reshape(6, 2, *points), pg.reshape(6, 2, *points)
-        entries = np.empty((len(UPPER), points[1]))
+        entries = np.empty((len(UPPER_ENTRIES), points[1]))
         first = 0
         for a in range(6):
             spread = np.einsum("jpm,cjpm->cm", slope[a], pg[a:])
@@ -184,7 +184,7 @@ class Elements:
     def _pattern(self) -> Pattern:
         unknowns = (2 * self.mesh.triangles[:, :, None] + np.arange(2)).reshape(len(self.mesh.triangles), 12).T
         return Pattern.from_entries(
-            unknowns[UPPER[:, 0]].ravel(), unknowns[UPPER[:, 1]].ravel(), 2 * len(self.mesh.nodes)
+            unknowns[UPPER_ENTRIES[:, 0]].ravel(), unknowns[UPPER_ENTRIES[:, 1]].ravel(), 2 * len(self.mesh.nodes)
         )
 
     def stress(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:

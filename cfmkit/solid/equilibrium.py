@@ -18,25 +18,25 @@ if TYPE_CHECKING:
     from cfmkit.solid.elements import Elements
     from cfmkit.solid.rigid_groups import Supports
 
-CLOSE = 1e-9
+RESIDUAL_RTOL = 1e-9
 """Largest force out of balance, in parts of the largest nodal force: Newton's last step is then below 1e-9, too."""
-STILL = 1e-13
+CORRECTION_RTOL = 1e-13
 """Correction, in parts of the part's size, below which it is rounding. In a strip 400 times as long as thick forces
 are out of balance by 2e-9 at best, with corrections of 1e-15."""
-ROUGH, ROUNDED = 1e-8, 1e-11
+ROUGH_RESIDUAL, ROUGH_CORRECTION = 1e-8, 1e-11
 """Force out of balance and correction, in the same parts, at which both are rounding if the force falls no more: in
 that strip, bent to a large angle, corrections of 1e-12 are made over and over, while 1.5e-9 stays out of balance."""
-ROUNDS = 12
+MAX_NEWTON_STEPS = 12
 """Of Newton's method; steps that need more are too long: from a predictor three to five are usual."""
-CORRECTIONS, SHRINK = 10, 0.25
+MAX_CORRECTIONS, CORRECTION_RATIO = 10, 0.25
 """With the factors of one tangent, and how much smaller each must be: one costs a sixth of new factors."""
-REFINEMENTS, FINE = 6, 1e-5
+MAX_REFINEMENTS, REFINEMENT_RTOL = 6, 1e-5
 """Of the path's slope with factors of a tangent nearby, until the last changes it by less than this part. It predicts
 poses and motions between them; the stiffness is known more closely than it."""
-PANEL = 1
+PANEL_COLUMNS = 1
 """Columns that SuperLU updates together: in slender parts a column has few others beside it, and the 20 of the default
 take a third more time."""
-FAR = 0.5
+MAX_CORRECTION = 0.5
 """Largest correction in one round, in parts of the part's size: farther away the tangent says nothing."""
 
 
@@ -91,7 +91,11 @@ class LinearisedPart:
     def factors(self) -> Factors:
         """The tangent's factors; RuntimeError where it is singular."""
         found = splu(
-            self.matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, panel_size=PANEL, options={"SymmetricMode": True}
+            self.matrix,
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            panel_size=PANEL_COLUMNS,
+            options={"SymmetricMode": True},
         )
         return Factors(found, self.order)
 
@@ -173,7 +177,7 @@ class SolidProblem:
         """
         place, least, on_border = np.append(guess, travel), np.inf, border is None
         with np.errstate(all="ignore"):
-            for _ in range(ROUNDS):
+            for _ in range(MAX_NEWTON_STEPS):
                 try:
                     here = self.linearise(place[:-1], place[-1])
                     correct = _Correction.from_state(here, border)
@@ -183,11 +187,11 @@ class SolidProblem:
                 if not self._is_credible(here.forces, step):
                     return None
                 left = float(np.abs(here.residual).max(initial=0.0) / np.abs(here.forces).max())
-                rounded = 0.5 * least < left <= ROUGH and self._still(step, ROUNDED)
+                rounded = 0.5 * least < left <= ROUGH_RESIDUAL and self._still(step, ROUGH_CORRECTION)
                 if on_border and (self._is_balanced(here.residual, here.forces) or self._still(step) or rounded):
                     return self._balance(place, here.factors)
                 place, least, on_border = place - step, min(least, left), True
-                for _ in range(CORRECTIONS):
+                for _ in range(MAX_CORRECTIONS):
                     forces = self.elements.forces(self.supports.evaluate_displacements(place[:-1], place[-1]))
                     residual = self.supports.residual(place[:-1], place[-1], forces)
                     if self._is_balanced(residual, forces):
@@ -195,21 +199,21 @@ class SolidProblem:
                     more = correct(residual, place)
                     if self._still(more):
                         return self._balance(place, here.factors)
-                    if not np.abs(more[:-1]).max() <= SHRINK * np.abs(step[:-1]).max():
+                    if not np.abs(more[:-1]).max() <= CORRECTION_RATIO * np.abs(step[:-1]).max():
                         break
                     place, step = place - more, more
         return None
 
     def _is_balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
-        return bool(np.abs(residual).max(initial=0.0) <= CLOSE * np.abs(forces).max())
+        return bool(np.abs(residual).max(initial=0.0) <= RESIDUAL_RTOL * np.abs(forces).max())
 
-    def _still(self, step: FloatArray, part: float = STILL) -> bool:
+    def _still(self, step: FloatArray, part: float = CORRECTION_RTOL) -> bool:
         return bool(np.abs(step[:-1]).max(initial=0.0) <= part * self.size)
 
     def _is_credible(self, forces: FloatArray, step: FloatArray) -> bool:
         """Return True if a correction is small enough to be believed."""
         finite = np.isfinite(np.abs(forces).max())
-        return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self.size)
+        return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < MAX_CORRECTION * self.size)
 
     def _balance(self, place: FloatArray, factors: Factors) -> Balance:
         """Return the equilibrium, with factors of a tangent close to its own; with its own if they are not close."""
@@ -219,13 +223,13 @@ class SolidProblem:
         path = np.append(np.zeros(self.supports.size), 1.0)
         beside = carried.times(pull, path)
         path[:-1] = -factors.solve(beside[:-1])
-        for _ in range(REFINEMENTS):
+        for _ in range(MAX_REFINEMENTS):
             pulled = carried.times(pull, path)
             more = factors.solve(pulled[:-1])
             # of second order in what the slope was off before: far closer than what it is off now
             stiffness = float(path @ pulled - more @ pulled[:-1])
             path[:-1] -= more
-            if np.abs(more).max(initial=0.0) <= FINE * np.abs(path[:-1]).max(initial=0.0):
+            if np.abs(more).max(initial=0.0) <= REFINEMENT_RTOL * np.abs(path[:-1]).max(initial=0.0):
                 break
         else:
             factors = self.linearise(unknowns, travel).factors

@@ -32,10 +32,10 @@ CORRECTION_CHECKS = 2
 """Poses that must be as predicted, one after the other: those of Lan's part are predicted to 1e-6 from seven."""
 
 
-SEEN = 0.01
+MAX_CURVE_ERROR = 0.01
 """Part of the largest effort within which the solved poses must draw the coarse curve: what two meshes differ by, a
 thousandth of it, is then known to some 1e-5."""
-SHARP = 1.0 / 8.0
+CORNER_STEP_SHARE = 1.0 / 8.0
 """Part of the steps between stops: where steps are shorter, the path has nearly a corner, and all poses are solved."""
 
 
@@ -89,7 +89,7 @@ class PoseGuide:
     def travels(self) -> tuple[float, ...]:
         """Travels of the poses that are not close to a bifurcation [m or rad]: it is elsewhere on each mesh."""
         course = self.coarse.course
-        near = APART * abs(course.poses[-1].travel - course.poses[0].travel)
+        near = BIFURCATION_DISTANCE * abs(course.poses[-1].travel - course.poses[0].travel)
         return tuple(
             pose.travel
             for pose in course.poses
@@ -97,7 +97,7 @@ class PoseGuide:
         )
 
 
-APART = 0.01
+BIFURCATION_DISTANCE = 0.01
 """Distance from a bifurcation within which poses of a coarser mesh are not repeated, in parts of the travel."""
 
 
@@ -147,7 +147,7 @@ class Correction:
         """
         places = np.array([self._sense * pose.travel for pose in self.solved])
         missed = self._measure_coarse_error(travels)
-        if missed.max() > SEEN:
+        if missed.max() > MAX_CURVE_ERROR:
             return travels[int(missed.argmax())]
         for k in np.argsort(-missed_by_cubics(self.differences), kind="stable"):
             inside = [one for one in travels if places[k] < self._sense * one < places[k + 1]]
@@ -238,5 +238,5 @@ def is_sharp(travels: FloatArray, stops: FloatArray) -> bool:
     """Return True if two steps in a row had to be much shorter than those between stops; one may be what was left."""
     interval = np.clip(np.searchsorted(stops, travels[1:], side="left"), 1, len(stops) - 1)
     steps = np.diff(stops)[interval - 1]
-    short = np.diff(travels) < SHARP * (1.0 - 1e-9) * steps
+    short = np.diff(travels) < CORNER_STEP_SHARE * (1.0 - 1e-9) * steps
     return bool((short[:-1] & short[1:]).any())

@@ -20,7 +20,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
-from cfmkit.solid.boundary_and_element_sizes import GRADING, Ring, Sizes, place_text, sizes
+from cfmkit.solid.boundary_and_element_sizes import SIZE_GRADING, Ring, Sizes, place_text, sizes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
     IntArray = NDArray[np.int64]
 
-ROUNDS, MOVES = 14, 3
+N_RELAXATIONS, MOVES_PER_ROUND = 14, 3
 """Of relaxation, and moves in each with the same bars; after 30 to 60 moves the smallest angle stays what it is."""
-PUSH = 1.2
+BAR_LENGTH_FACTOR = 1.2
 """Bars want to be so much longer than the sizes [PS, sec. 4]: under pressure points spread everywhere."""
-STEP = 0.2
+PUSH_SHARE = 0.2
 """Of the way that the bars push, a round [PS, sec. 4]."""
-ROOM = 0.55
+BOUNDARY_CLEARANCE = 0.55
 """Points inside keep so many sizes from the boundary: less makes slivers on it, more leaves long triangles."""
-SEAM = 0.75
+SEAM_CLEARANCE = 0.75
 """Points inside keep so many sizes from those on a seam: the circles over its pieces are empty, so they are edges."""
-HALVINGS = 8
+MAX_HALVINGS = 8
 """Rounds of halving boundary pieces that are no edges; each mends what it finds, two are usual."""
 MOST_NODES = 400_000
 """Of a mesh: beyond it the factors alone take more than 2 GB."""
@@ -116,7 +116,7 @@ def mesh(
     if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
         raise _too_many(4 * (len(inside) + len(fixed)))
     inside = _relax_points(region, kept_from, np.concatenate([fixed, sewn]), inside)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         fixed = np.concatenate([ring.locate(arc) for ring, arc in zip(rings, laid, strict=True)])
         points = np.concatenate([fixed, *on_seams, inside])
         corners = _triangles(region, points)
@@ -171,7 +171,7 @@ def _explain_crossing(shape: Any) -> GeometryError:
     return GeometryError(f"the outline crosses itself or touches itself at {place} ({what.strip().lower()})")
 
 
-STEEP = 0.5
+MIN_CROSSING_SINE = 0.5
 """Sine of the angle at which a seam must cross an edge to begin at a node of it."""
 
 
@@ -182,7 +182,7 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, near: floa
     for start, end in seams:
         seam, way = end - start, start - ring.points
         det = along[:, 0] * seam[1] - along[:, 1] * seam[0]
-        steep = np.abs(det) > STEEP * ring.lengths * np.hypot(*seam)
+        steep = np.abs(det) > MIN_CROSSING_SINE * ring.lengths * np.hypot(*seam)
         det = np.where(steep, det, 1.0)
         share = (way[:, 0] * seam[1] - way[:, 1] * seam[0]) / det
         on_seam = (way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0]) / det
@@ -228,7 +228,7 @@ def _boundary_nodes(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArr
     return np.concatenate(found)
 
 
-BENT = 0.05
+MAX_CURVATURE_JUMP = 0.05
 """Jump of the curvature, times the size, at which a node stands: a side across the end of a fillet, a parabola, made
 the force of a strip 0.8 mm thick 1e-4 too small."""
 
@@ -239,15 +239,17 @@ def _curvature_jumps(ring: Ring, stops: FloatArray, field: Sizes) -> FloatArray:
     jumps = sizes * ring.curvature_jumps
     taken = list(ring.locate(stops))
     found = []
-    for vertex in np.flatnonzero(jumps > BENT)[np.argsort(-jumps[jumps > BENT], kind="stable")]:
+    for vertex in np.flatnonzero(jumps > MAX_CURVATURE_JUMP)[
+        np.argsort(-jumps[jumps > MAX_CURVATURE_JUMP], kind="stable")
+    ]:
         place = ring.points[vertex]
-        if all(np.hypot(*(place - other)) > APART * sizes[vertex] for other in taken):
+        if all(np.hypot(*(place - other)) > MIN_STOP_DISTANCE * sizes[vertex] for other in taken):
             taken.append(place)
             found.append(ring.places[vertex])
     return np.array(found)
 
 
-APART = 0.4
+MIN_STOP_DISTANCE = 0.4
 """Distance between nodes that stand at stops, in sizes, from which on both do."""
 
 
@@ -269,7 +271,7 @@ def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> 
     return np.concatenate(found)
 
 
-CELL = 16
+CELL_SIZE = 16
 """Side of the cells in which lattices are laid, in sizes: cells where no such size is wanted have none."""
 
 
@@ -279,16 +281,16 @@ def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: floa
     Its cells are found by halving larger ones, so that one small fillet does not need small cells everywhere.
     """
     x0, y0, x1, y1 = bounds
-    side = CELL * size
+    side = CELL_SIZE * size
     columns, rows = np.arange(x0, x1, side), np.arange(y0, y1, side)
     times = 2 ** max(0, math.ceil(math.log2(max(len(columns), len(rows)))))
     cells = np.zeros((1, 2), np.int64)
     while True:
         middles = np.array([x0, y0]) + side * (cells + 0.5 * times)
-        near = field(middles) - GRADING * times * side  # sizes change by that within half a diagonal
+        near = field(middles) - SIZE_GRADING * times * side  # sizes change by that within half a diagonal
         cells = cells[near < 2 * size]
-        if CELL**2 * len(cells) > 20 * MOST_NODES:  # of them a few lie in the part
-            raise _too_many(CELL**2 * len(cells))
+        if CELL_SIZE**2 * len(cells) > 20 * MOST_NODES:  # of them a few lie in the part
+            raise _too_many(CELL_SIZE**2 * len(cells))
         if times == 1:
             break
         times //= 2
@@ -296,8 +298,8 @@ def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: floa
         cells = cells[(cells[:, 0] < len(columns)) & (cells[:, 1] < len(rows))]
     cells = cells[np.lexsort(cells.T)]  # row by row: what is thrown does not depend on how cells were found
     corner = np.column_stack([columns[cells[:, 0]], rows[cells[:, 1]]])
-    lines = round(CELL / np.sqrt(0.75))
-    column, row = np.meshgrid(np.arange(CELL), np.arange(lines))
+    lines = round(CELL_SIZE / np.sqrt(0.75))
+    column, row = np.meshgrid(np.arange(CELL_SIZE), np.arange(lines))
     inner = np.column_stack([(column + 0.5 * (row % 2)).ravel() * size, row.ravel() * side / lines])
     return np.asarray((corner[:, None] + inner).reshape(-1, 2))
 
@@ -328,7 +330,7 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
     # not to the nearest place where sizes are known: those are so far apart that a seam on the edge of small fillets
     # had points on that edge, which could then not be meshed
     clearance = distance(region.boundary, points_of(points))
-    return np.asarray(points[clearance > 0.5 * ROOM * field(points)])
+    return np.asarray(points[clearance > 0.5 * BOUNDARY_CLEARANCE * field(points)])
 
 
 @dataclass(frozen=True)
@@ -341,11 +343,11 @@ class Spacing:
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return those of the points (k, 2) [m] that are far enough."""
         sizes, clearance = self.field.looked_up(points)
-        room = ROOM * sizes
+        room = BOUNDARY_CLEARANCE * sizes
         far = clearance > room
         if len(self.sewn):
             # half a size beside a seam's own points is further than that from the line between them
-            far &= cKDTree(self.sewn).query(points)[0] > SEAM * room / ROOM
+            far &= cKDTree(self.sewn).query(points)[0] > SEAM_CLEARANCE * room / BOUNDARY_CLEARANCE
         return points[far]
 
 
@@ -354,22 +356,22 @@ def _relax_points(region: Any, room: Spacing, fixed: FloatArray, inside: FloatAr
     from shapely import contains_xy
 
     field = room.field
-    for _ in range(ROUNDS):
+    for _ in range(N_RELAXATIONS):
         points = np.concatenate([fixed, inside])
         sides = _triangles(region, points)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
         keys = np.sort(sides.min(axis=1) * len(points) + sides.max(axis=1))
         keys = keys[np.diff(keys, prepend=-1) > 0]  # a fifth of the time of numpy's unique
         bars = np.column_stack([keys // len(points), keys % len(points)])
         sizes = field(0.5 * (points[bars[:, 0]] + points[bars[:, 1]]))
-        for _ in range(MOVES):
+        for _ in range(MOVES_PER_ROUND):
             way = points[bars[:, 0]] - points[bars[:, 1]]
             length = np.hypot(*way.T)
-            wanted = PUSH * np.sqrt((length**2).sum() / (sizes**2).sum()) * sizes
+            wanted = BAR_LENGTH_FACTOR * np.sqrt((length**2).sum() / (sizes**2).sum()) * sizes
             push = (np.maximum(wanted - length, 0.0) / length)[:, None] * way
             force = np.column_stack(
                 [np.bincount(bars.ravel("F"), np.concatenate([push[:, k], -push[:, k]]), len(points)) for k in (0, 1)]
             )
-            points[len(fixed) :] += STEP * force[len(fixed) :]
+            points[len(fixed) :] += PUSH_SHARE * force[len(fixed) :]
         inside = points[len(fixed) :]
         inside = room(inside[contains_xy(region, inside)])
     return inside
@@ -427,7 +429,7 @@ def _crossed_pieces(region: Any, corners: IntArray, points: FloatArray, seam: Fl
     along = along / length
     place = (points - seam[0]) @ along
     off = np.abs((points - seam[0]) @ np.array([-along[1], along[0]]))
-    slack = max(STRAIGHT, near)
+    slack = max(SEAM_DISTANCE_TOL, near)
     chosen = np.flatnonzero((off <= slack) & (place >= -slack) & (place <= length + slack))
     chosen = chosen[np.argsort(place[chosen], kind="stable")]
     first, last = chosen[:-1], chosen[1:]
@@ -440,7 +442,7 @@ def _crossed_pieces(region: Any, corners: IntArray, points: FloatArray, seam: Fl
     return np.asarray(middles[contains_xy(region, middles)])
 
 
-STRAIGHT = 1e-9
+SEAM_DISTANCE_TOL = 1e-9
 """Distance from a seam up to which a point is on it [m]."""
 
 

@@ -27,17 +27,17 @@ if TYPE_CHECKING:
     from cfmkit.solid.plane_stress_law import Law
     from cfmkit.solid.rigid_groups import Group
 
-THIN = 0.1
+ELEMENT_WIDTH_RATIO = 0.1
 """Width of the deck's elements, in the thinnest place of the part at most: within 6e-4 of plane stress then."""
-ROW = 12
+NUMBERS_PER_LINE = 12
 """Numbers on a line of a set."""
-GUIDES = 2
+MAX_GUIDE_NODES = 2
 """Nodes that carry what is prescribed along a direction, at most."""
-ARC = 4
+POINTS_PER_INCREMENT = 4
 """Points on the arc of what is turned, to each increment: between them it is led along a chord."""
-STIFF = 1e3
+HUB_MODULUS_FACTOR = 1e3
 """Modulus of a hub, in that of the part."""
-FLAT = 1e-6
+LINE_RTOL = 1e-6
 """Height of what counts as a line, in its length: outlines are drawn a little beside the line across a beam."""
 
 
@@ -67,7 +67,7 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
     elements, groups = meshed.problem.elements, meshed.problem.supports.groups
     grid = elements.mesh
     widths = np.unique(elements.width)
-    share = min(1.0, THIN * part.thinnest / float(widths.max()))
+    share = min(1.0, ELEMENT_WIDTH_RATIO * part.thinnest / float(widths.max()))
     used = np.zeros(len(grid.nodes), bool)
     used[grid.triangles] = True
     number = np.cumsum(used)
@@ -102,11 +102,11 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
             yield from _stiff(word, hub, start, share * to_border(part.width, "length"), part.law.youngs_modulus)
             nodes, start, spare = list(dict.fromkeys([*nodes, hub.center])), start + len(hub.triangles), hub.spare
             made = _guide_lines(group, travel, hub.center, spare)
-            turned = _turn_lines(word, hub, travel * float(group.driven[2]), spare + GUIDES, poses)
-            spare += GUIDES + 2
+            turned = _turn_lines(word, hub, travel * float(group.driven[2]), spare + MAX_GUIDE_NODES, poses)
+            spare += MAX_GUIDE_NODES + 2
         elif group.free.shape[1]:
             made, turned = _rigid(word, group, travel, spare), Lines()
-            spare += 2 + GUIDES
+            spare += 2 + MAX_GUIDE_NODES
         else:
             ends = to_border(travel * group.driven[:2], "length").tolist()
             made, turned = (
@@ -114,7 +114,9 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
                 Lines(),
             )
         yield f"*NSET, NSET={word}"
-        yield from (", ".join(map(str, nodes[k : k + ROW])) + "," for k in range(0, len(nodes), ROW))
+        yield from (
+            ", ".join(map(str, nodes[k : k + NUMBERS_PER_LINE])) + "," for k in range(0, len(nodes), NUMBERS_PER_LINE)
+        )
         yield from (*made.model, *turned.model)
         moves, turns = moves + made.moves, turns + turned.moves
     turned_arms = [f"{word}-ARM" for word, group, _ in held if travel * group.driven[2] != 0]
@@ -198,9 +200,9 @@ class Hub:
         size = float(np.ptp(own @ along))
         middle = min(places, key=lambda node: float(np.hypot(*(places[node] - center))))
         added = {}
-        if np.hypot(*(places[middle] - center)) > FLAT * size:
+        if np.hypot(*(places[middle] - center)) > LINE_RTOL * size:
             middle, added = spare, {spare: center}
-        if np.ptp(own @ across) < FLAT * size:
+        if np.ptp(own @ across) < LINE_RTOL * size:
             added |= {spare + 1: center + 0.5 * size * across, spare + 2: center - 0.5 * size * across}
         every = np.array([*places, *added])
         at = np.array([*own, *added.values()])
@@ -210,7 +212,9 @@ class Hub:
         found[twice < 0] = found[twice < 0][:, [0, 2, 1]]
         far = int(np.hypot(*(at - center).T).argmax())
         arm = int(every[far]), at[far] - center
-        return cls(middle, arm, added, max([spare, *added]) + 1, every[found[np.abs(twice) > FLAT * size**2 / len(at)]])
+        return cls(
+            middle, arm, added, max([spare, *added]) + 1, every[found[np.abs(twice) > LINE_RTOL * size**2 / len(at)]]
+        )
 
 
 def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Iterator[str]:
@@ -220,7 +224,7 @@ def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Ite
     yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(hub.triangles.tolist()))
     yield f"*MATERIAL, NAME=STIFF-{word}"
     yield "*ELASTIC"
-    yield f"{STIFF * to_border(modulus, 'stress'):.10g}, 0"
+    yield f"{HUB_MODULUS_FACTOR * to_border(modulus, 'stress'):.10g}, 0"
     yield f"*SOLID SECTION, ELSET=HUB-{word}, MATERIAL=STIFF-{word}"
     yield f"{width:.10g}"
 
@@ -241,7 +245,7 @@ def _rigid(word: str, group: Group, travel: float, spare: int) -> Lines:
 
 def _guide_lines(group: Group, travel: float, center: int, carrier: int) -> Lines:
     """Return what moves a centre along every direction that is not free, by nodes from `carrier` on."""
-    model, moves = _nodes(dict.fromkeys(range(carrier, carrier + GUIDES), group.center)), []
+    model, moves = _nodes(dict.fromkeys(range(carrier, carrier + MAX_GUIDE_NODES), group.center)), []
     for way in _prescribed_directions(group.free):
         terms = [(center, 1 + k, float(way[k])) for k in (0, 1) if abs(way[k]) > 1e-12]
         terms.sort(key=lambda term: -abs(term[2]))  # the first is eliminated: it must not vanish
@@ -266,7 +270,7 @@ def _turn_lines(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> 
     if angle == 0:
         return Lines()
     x, y = to_border(hub.arm[1], "length").tolist()
-    time = np.linspace(0.0, 1.0, ARC * poses + 1)
+    time = np.linspace(0.0, 1.0, POINTS_PER_INCREMENT * poses + 1)
     c, s = np.cos(angle * time), np.sin(angle * time)
     model = [f"** torque on {word}: x Fy - y Fx, with the force on node {hub.arm[0]}"]
     model += [f"** and (x, y) = ({x:.9g}, {y:.9g}) mm turned by {angle:.9g} rad times the time"]

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from cfmkit.arrays import read_only
-from cfmkit.solid.elements import CORNERS, shape_functions, slopes
+from cfmkit.solid.elements import PARENT_NODES, shape_functions, slopes
 from cfmkit.solid.mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ CHILDREN_BY_SIDES = {
 """Corners of the children by which sides are halved; side 0, from node 0 to node 1, is the longest."""
 
 
-ROUNDS = 3
+N_NEWTON_STEPS = 3
 """Of Newton's method for places in curved triangles: one is exact in straight-sided ones."""
 
 
@@ -90,7 +90,7 @@ def refine(mesh: TriangleMesh, rings: tuple[Ring, ...], marked: NDArray[np.bool_
         for child in children:
             corners.append(rotated[chosen][:, child])
             parents.append(chosen)
-            places.append(np.broadcast_to(CORNERS[list(child)], (len(chosen), 3, 2)))
+            places.append(np.broadcast_to(PARENT_NODES[list(child)], (len(chosen), 3, 2)))
     return _with_side_nodes(
         mesh, rings, rotated, halved, np.concatenate(corners), np.concatenate(parents), np.concatenate(places)
     )
@@ -184,7 +184,7 @@ def _places_in(triangles: FloatArray, nodes: FloatArray, places: FloatArray) -> 
     Inside triangles with a curved side the new sides are straight: displacements taken from places half way in the
     parent triangle were wrong there by as much as what was missing on the coarser mesh.
     """
-    for _ in range(ROUNDS):
+    for _ in range(N_NEWTON_STEPS):
         off = nodes - np.einsum("na,nak->nk", shape_functions(places), triangles)
         jacobian = np.einsum("nai,nak->nki", slopes(places), triangles)
         places = places + np.linalg.solve(jacobian, off[:, :, None])[:, :, 0]

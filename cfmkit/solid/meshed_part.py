@@ -44,30 +44,30 @@ if TYPE_CHECKING:
     from cfmkit.solid.plane_stress_law import Law
 
 
-ACROSS, SHARE = 1.5, 0.4
+ELEMENTS_ACROSS, FILLET_ELEMENT_RATIO = 1.5, 0.4
 """Elements across the thinnest place, and side of an element on a fillet in radii, of the mesh that is refined: split
 once, the force of Lan's part is within 1e-4 of that of much finer meshes."""
-TURN = math.radians(1.0)
+MAX_ARC_TURN = math.radians(1.0)
 """Turn between the lines that stand for an arc, at most [rad]: beside corners of 9 degrees the largest stress of a
 strip with fillets of 0.3 mm was 4 % too low, and rose with finer meshes to 6 % too much."""
-BESIDE = 0.15
+CLAMP_CLEARANCE = 0.15
 """Part of the thinnest place within which no stress is read beside the end of a rigid piece that an edge runs straight
 into. There the model's stress grows with finer meshes, as it does not in the part, whose blocks give a little: that of
 the spring of `vcfm_ding2022` was 15, 18 and 25 MPa on three meshes, and 14.2, 14.0 and 14.3 MPa beyond this."""
-TANGENT = 0.5
+TANGENT_SINE = 0.5
 """Sine of the angle between an edge and the face of a rigid piece below which it is a fillet that runs out on it."""
-BULKY, COARSE = 2.0, 4.0
+BULKY_AREA_RATIO, BLOCK_ELEMENT_RATIO = 2.0, 4.0
 """Area of a part, in that of strips of its thinnest size along its edges, from which on blocks have elements so many
 times as large: mechanisms of beams have 1.0 to 1.4, that of Lan 1.9 with fillets of 5 mm, 19 with fillets of 20 mm."""
 SINGULAR_SPLITS = 3
 """How often triangles at singular points are split before a part is solved: each costs some fifteen nodes a point, and
 halves the error from there."""
-ALLOWED = 5e-4
+MAX_EFFORT_ERROR = 5e-4
 """Difference of cubic and pose, in parts of the largest effort, below which poses are dense enough."""
-ON = 1e-3
+NODE_DISTANCE_TOL = 1e-3
 """Nodes nearer to a pad or a hole than this belong to it, and smaller steps of an edge are none: in thicknesses of the
 thinnest place."""
-RING = 2e-5
+BOUNDARY_TOLERANCE = 2e-5
 """How far the lines of a boundary may be from its arcs, in the same: their bending stiffness is then within 1e-4."""
 
 
@@ -103,7 +103,7 @@ class Part:
     @property
     def near(self) -> float:
         """Largest distance of nodes of a pad or a hole from it [m]."""
-        return ON * self.thinnest
+        return NODE_DISTANCE_TOL * self.thinnest
 
     @cached_property
     def faces(self) -> tuple[FloatArray, ...]:
@@ -125,10 +125,11 @@ class Part:
                 found.append(whole[0] if whole else seam)
         return tuple(found)
 
-    def create_mesh(self, size: float | None = None, across: float = ACROSS) -> Meshed:
+    def create_mesh(self, size: float | None = None, across: float = ELEMENTS_ACROSS) -> Meshed:
         """Return the part with elements of a size [m], and of so many across the thickness at least.
 
-        A part with blocks has as many across as the size leaves. Without a size there are `ACROSS` across the thinnest
+        A part with blocks has as many across as the size leaves. Without a size there are `ELEMENTS_ACROSS` across
+        the thinnest
         place.
 
         Raises
@@ -136,8 +137,8 @@ class Part:
         cfmkit.errors.GeometryError
             If the outline cannot be meshed so, or no node is where the part is held.
         """
-        size = self.thinnest / ACROSS if size is None else size
-        share = SHARE * size / (self.thinnest / ACROSS)
+        size = self.thinnest / ELEMENTS_ACROSS if size is None else size
+        share = FILLET_ELEMENT_RATIO * size / (self.thinnest / ELEMENTS_ACROSS)
         across = self.thinnest / size if self.largest > 1.0 else across
         grid = mesh(self.rings, self.largest * size, share, across, self.faces, self.near)
         check_mesh(grid, sum(ring.area for ring in self.rings), self.sections)
@@ -166,7 +167,7 @@ class Part:
             for seam in self.faces:
                 face = seam[1] - seam[0]
                 sine = abs(face[0] * along[1] - face[1] * along[0]) / (np.hypot(*face) * np.hypot(*along))
-                if sine > TANGENT and LineString(seam).distance(LineString(ends)) < self.near:
+                if sine > TANGENT_SINE and LineString(seam).distance(LineString(ends)) < self.near:
                     found.append(edge[0] if held[edge[0]] else edge[1])
         return np.array(found, np.int64)
 
@@ -176,7 +177,7 @@ class Part:
 
         near, tree = np.zeros(len(grid.nodes), bool), cKDTree(grid.nodes)
         for place in grid.nodes[self.clamp_ends(grid, held)]:
-            near[tree.query_ball_point(place, BESIDE * self.thinnest)] = True
+            near[tree.query_ball_point(place, CLAMP_CLEARANCE * self.thinnest)] = True
         return near
 
     def _widths(self, grid: TriangleMesh) -> FloatArray:
@@ -254,7 +255,7 @@ class Meshed:
         self,
         stops: Sequence[float],
         report: Callable[[float], None] = lambda _share: None,
-        allowed: float = ALLOWED,
+        allowed: float = MAX_EFFORT_ERROR,
     ) -> MeshSolution:
         """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
         course, off = refine_path(self.problem, follow(self.problem, stops, report), allowed)
@@ -320,7 +321,7 @@ def largest_in(rings: Sequence[Ring], thinnest: float) -> float:
     """Return how large elements may be where a part of beams is thick, in those of its thinnest place [m]."""
     area = sum(ring.area for ring in rings)
     around = sum(float(ring.places[-1]) for ring in rings)
-    return COARSE if area > BULKY * 0.5 * around * thinnest else 1.0
+    return BLOCK_ELEMENT_RATIO if area > BULKY_AREA_RATIO * 0.5 * around * thinnest else 1.0
 
 
 def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[Ring, ...]:
@@ -331,22 +332,26 @@ def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[R
     contours : sequence of Contour
         Outlines and holes.
     thinnest : float
-        Thinnest place of the part [m]: rings are within `RING` of it from arcs; smooth edges are taken by their
+        Thinnest place of the part [m]: rings are within `BOUNDARY_TOLERANCE` of it from arcs; smooth edges are taken
+        by their
         points.
     """
-    step = ON * thinnest if math.isfinite(thinnest) else 0.0
-    return tuple(Ring.from_points(contour.points(RING * thinnest, TURN), contour.hole, step) for contour in contours)
+    step = NODE_DISTANCE_TOL * thinnest if math.isfinite(thinnest) else 0.0
+    return tuple(
+        Ring.from_points(contour.points(BOUNDARY_TOLERANCE * thinnest, MAX_ARC_TURN), contour.hole, step)
+        for contour in contours
+    )
 
 
-HALVED = 16.0
+HALVING_ERROR_RATIO = 16.0
 """Factor by which half an interval has less error."""
-CHECKS = 3
+N_CHECKS = 3
 """Intervals that must be below what is allowed, one after the other, those with the largest estimates first."""
-SHORTEST = 2.0**-10
+MIN_INTERVAL_SHARE = 2.0**-10
 """Intervals are not halved below this part of the travel: there the curve has a corner, which is a pose."""
 
 
-def refine_path(problem: SolidProblem, course: PosePath, allowed: float = ALLOWED) -> tuple[PosePath, float]:
+def refine_path(problem: SolidProblem, course: PosePath, allowed: float = MAX_EFFORT_ERROR) -> tuple[PosePath, float]:
     """Return a path with poses added where the curve needs them, and what the curve is off between poses.
 
     Parameters
@@ -378,9 +383,9 @@ def refine_path(problem: SolidProblem, course: PosePath, allowed: float = ALLOWE
             break
         course, difference = found
         off.append(difference / size)
-        if len(off) >= CHECKS and max(off[-CHECKS:]) <= allowed:
+        if len(off) >= N_CHECKS and max(off[-N_CHECKS:]) <= allowed:
             break
-    return course, max(off[-CHECKS:], default=float("nan"))
+    return course, max(off[-N_CHECKS:], default=float("nan"))
 
 
 def _check_interval(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tuple[PosePath, float] | None:
@@ -394,7 +399,7 @@ def _check_interval(problem: SolidProblem, course: PosePath, skipped: set[float]
     for k in np.argsort(-ranks, kind="stable"):
         low, high = sorted(travel[k : k + 2].tolist())
         cornered = any(low <= place <= high for place in corners)
-        if cornered or high - low < SHORTEST * span or low in skipped:
+        if cornered or high - low < MIN_INTERVAL_SHARE * span or low in skipped:
             continue
         pose = pose_between(problem, course.poses[k], course.poses[k + 1], 0.5 * (low + high))
         if pose is None:
@@ -413,5 +418,5 @@ def missed_by_cubics(poses: tuple[Balance, ...]) -> FloatArray:
     for k in range(1, len(poses) - 1):
         ends = sorted((poses[k - 1], poses[k + 1]), key=lambda pose: pose.travel)
         x, y, slope = np.array([(pose.travel, pose.effort, pose.stiffness) for pose in ends]).T
-        missed[k] = abs(float(CubicHermiteSpline(x, y, slope)(poses[k].travel)) - poses[k].effort) / HALVED
+        missed[k] = abs(float(CubicHermiteSpline(x, y, slope)(poses[k].travel)) - poses[k].effort) / HALVING_ERROR_RATIO
     return np.asarray(np.maximum(missed[:-1], missed[1:]))

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from cfmkit.solid.followed_part import PathGuide
 
 FINEST_STEP = 2.0**-16  # share of the travel below which no step is tried
-GROWTH = 2.0  # of a step after one that was easy
-CORNER = 2.0**-9  # share of the travel over which a mesh may round a bifurcation
+STEP_GROWTH = 2.0  # of a step after one that was easy
+MAX_CORNER_SHARE = 2.0**-9  # share of the travel over which a mesh may round a bifurcation
 CORNER_WIDTH = 1e-9  # share of the travel between the two poses at a corner
 BESIDE_CORNER = 1.0 / 16.0
 """Share of the way from a bifurcation to the next pose of its branch at which the branch's stiffness is taken."""
@@ -138,7 +138,7 @@ def follow(
         return PosePath((), PathEnd.OVERLOADED if problem.supports.loaded else PathEnd.NO_START)
     span = abs(stops[-1] - stops[0])
     first_step = 1.0 if guide else float(np.abs(np.diff(stops)).max()) / span
-    options = Options(span, first_step=first_step, growth=GROWTH, corner=CORNER, finest_step=FINEST_STEP)
+    options = Options(span, first_step=first_step, growth=STEP_GROWTH, corner=MAX_CORNER_SHARE, finest_step=FINEST_STEP)
     path = PosePath((), PathEnd.COMPLETE)
     event: PathEvent | None = None  # a bifurcation behind the last pose
     for item in follow_path(part, start, np.array(stops[1:]), options):

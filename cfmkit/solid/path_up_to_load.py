@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from cfmkit.solid.meshed_part import Meshed, MeshSolution
     from cfmkit.solid.path_following import PosePath
 
-RANGES = (1.25, 2.5, 5.0, 10.0)
+TRAVEL_RANGES = (1.25, 2.5, 5.0, 10.0)
 """Travels in which a load is looked for, in those that the beams need for it."""
-MARGIN = 1.05
+TRAVEL_MARGIN = 1.05
 """Travel of the finer mesh, in that of a coarse one: their forces differ by up to a few thousandths, the travels by a
 few per cent where the curve is flat."""
-ROUNDS = 4
+MAX_NEWTON_STEPS = 4
 """Of Newton's method for the travel at the load: two are usual, as the cubic is close."""
-CLOSE, SAME = 1e-9, 1e-6
+LOAD_RTOL, MISSED_LOAD_RTOL = 1e-9, 1e-6
 """Differences from the load, in parts of it, at which it is found, and at which it is not missed: in long thin strips
 efforts are known to 1e-7 only."""
-HALVINGS = 60
+MAX_HALVINGS = 60
 """Of an interval between two poses: beyond them a travel has no more digits."""
 
 
@@ -95,7 +95,7 @@ def travel_for(
         Is given the share that is done.
     """
     travel, sense = guess, np.sign(load)
-    for times in RANGES:
+    for times in TRAVEL_RANGES:
         stops = np.linspace(0.0, times * guess, poses).tolist()
         course = follow(meshed.problem, stops, report, lambda effort: sense * effort >= abs(load))
         if len(course.poses) < 2:
@@ -104,7 +104,7 @@ def travel_for(
         travel = found.end
         if found.how is not LoadEnd.SHORT or course.ended:
             break
-    return MARGIN * travel
+    return TRAVEL_MARGIN * travel
 
 
 def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
@@ -116,9 +116,9 @@ def follow_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> t
     poses = [pose for pose in course.poses if abs(pose.travel) < abs(found.end) * (1 - 1e-12)]
     beyond = course.poses[len(poses)]
     last, travel = None, found.end
-    for _ in range(ROUNDS):
+    for _ in range(MAX_NEWTON_STEPS):
         last = pose_between(solved.problem, poses[-1], beyond, travel)
-        if last is None or found.how is LoadEnd.MAXIMUM or abs(last.effort - load) <= CLOSE * abs(load):
+        if last is None or found.how is LoadEnd.MAXIMUM or abs(last.effort - load) <= LOAD_RTOL * abs(load):
             break
         travel += (load - last.effort) / last.stiffness
     if last is None:
@@ -145,10 +145,10 @@ def travels_at(course: PosePath, loads: FloatArray) -> FloatArray:
     sense = float(np.sign(loads[-1]))
     law = course.law(sense)
     wanted = np.abs(loads)
-    wanted = wanted[wanted <= abs(course.poses[-1].effort) * (1 + SAME)]
+    wanted = wanted[wanted <= abs(course.poses[-1].effort) * (1 + MISSED_LOAD_RTOL)]
     at = np.clip(np.searchsorted(law(law.x), wanted), 1, len(law.x) - 1)
     low, high = law.x[at - 1], law.x[at]
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         middle = 0.5 * (low + high)
         below = law(middle) < wanted
         low, high = np.where(below, middle, low), np.where(below, high, middle)

@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-ROUNDS = 20
+N_NEWTON_STEPS = 20
 """Of Newton's method for the stretch across the plane; from 1 it takes four to six."""
 
 
@@ -83,7 +83,7 @@ class NeoHookean:
         with np.errstate(invalid="ignore", divide="ignore"):
             log = np.log1p(more)  # NaN where the material is turned inside out: no such state is accepted
             x = np.zeros_like(det)  # logarithm of the squared stretch across
-            for _ in range(ROUNDS):
+            for _ in range(N_NEWTON_STEPS):
                 # stress across, times the squared stretch: mu (c33 - 1) + lambda/2 ln(det c33) = 0
                 step = (mu * np.expm1(x) + 0.5 * lam * (log + x)) / (mu * np.exp(x) + 0.5 * lam)
                 x = x - np.clip(step, -1.0, 1.0)
@@ -108,7 +108,7 @@ class NeoHookean:
         return stress, tangent, np.exp(0.5 * x)
 
 
-LAWS: dict[str, type[SaintVenantKirchhoff | NeoHookean]] = {
+MATERIAL_LAWS: dict[str, type[SaintVenantKirchhoff | NeoHookean]] = {
     "st-venant-kirchhoff": SaintVenantKirchhoff,
     "neo-hookean": NeoHookean,
 }

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from cfmkit.solid.elements import Elements
     from cfmkit.solid.meshed_part import MeshSolution
 
-STEP = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Of the central differences, in parts of the travel: their error is its square, below that of the cubics."""
-ROUNDS = 8
+MAX_NEWTON_STEPS = 8
 """Of Newton's method for a place in a triangle; straight-sided ones take one."""
-INSIDE = 1e-6
+TRIANGLE_TOL = 1e-6
 """How far beyond a triangle a place may be, in parts of it."""
 
 
@@ -85,7 +85,7 @@ def _reading_between(
     from scipy.interpolate import CubicHermiteSpline
 
     travel = solved.course.travel
-    step = STEP * float(np.ptp(travel))
+    step = DIFFERENCE_STEP * float(np.ptp(travel))
     values, ahead, behind = (
         np.array([read(pose.unknowns + way * pose.slope, pose.travel + way) for pose in solved.course.poses])
         for way in (0.0, step, -step)
@@ -115,10 +115,10 @@ class MaterialPoint:
         near = np.hypot(*(corners[:, :3].mean(axis=1) - place).T).argsort()[:20]
         for nodes, x in zip(triangles[near], corners[near], strict=True):
             at = np.full(2, 1.0 / 3.0)
-            for _ in range(ROUNDS):
+            for _ in range(MAX_NEWTON_STEPS):
                 jacobian = slopes(at[None])[0].T @ x  # rows: by r, by s
                 at = at + np.linalg.solve(jacobian.T, place - shape_functions(at) @ x)
-            if min(*at, 1.0 - at.sum()) >= -INSIDE:
+            if min(*at, 1.0 - at.sum()) >= -TRIANGLE_TOL:
                 parent = slopes(at[None])[0]
                 return cls(nodes, shape_functions(at), parent @ np.linalg.inv(parent.T @ x).T)
         return None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.beam_sections import ALLOWED
+from cfmkit.export.beam_sections import SECTION_RTOL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.solid.mesh import TriangleMesh
 
-PIECES = 8
+LINES_PER_EDGE = 8
 """Lines that stand for the parabola of an edge."""
 
 
@@ -31,7 +31,7 @@ def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection])
     cfmkit.errors.GeometryError
         With the place and the values.
     """
-    if abs(grid.area - area) > ALLOWED * area:
+    if abs(grid.area - area) > SECTION_RTOL * area:
         raise GeometryError(f"the mesh covers {1e6 * grid.area:.6g} mm2 of the part's {1e6 * area:.6g} mm2")
     starts, ends = _edges(grid)
     for section in sections:
@@ -42,6 +42,6 @@ def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection])
 def _edges(grid: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     """Return the boundary of a mesh as short lines: starts and ends (n, 2) [m]."""
     a, b, middle = (grid.nodes[grid.edges[:, k], None] for k in range(3))
-    s = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
+    s = np.linspace(0.0, 1.0, LINES_PER_EDGE + 1)[:, None]
     curve = (1 - s) * (1 - 2 * s) * a + 4 * s * (1 - s) * middle + s * (2 * s - 1) * b
     return curve[:, :-1].reshape(-1, 2), curve[:, 1:].reshape(-1, 2)

@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from cfmkit.solid.boundary_and_element_sizes import Ring
     from cfmkit.solid.meshed_part import MeshSolution
 
-ROUND = 0.02
+RADIUS_RTOL = 0.02
 """Three neighbouring vertices stand on a fillet if their circle's radius differs from it by this share at most."""
-BEYOND = math.radians(6.0)
+ARC_EXTENSION = math.radians(6.0)
 """How far beyond its outermost vertices an arc may go on: outlines may lack the vertex at which it begins."""
 
-RIGID = 1e-9
+MIN_STRESS_SHARE = 1e-9
 """Fillets with less than this share of the part's largest stress join pieces that move as one: it is rounding."""
 
-ON = 0.01
+RADIUS_DISTANCE_TOL = 0.01
 """Points nearer to the circle of a fillet than this are on it, and ends of a fillet nearer to a piece are on its edge;
 in radii."""
 
@@ -63,7 +63,8 @@ class FilletArc:
         way, middle = points - self.center, self.middle - self.center
         off = np.abs(np.arctan2(middle[0] * way[:, 1] - middle[1] * way[:, 0], way @ middle))
         return np.asarray(
-            (np.abs(np.hypot(*way.T) - self.radius) < ON * self.radius) & (off <= 0.5 * self.turn + BEYOND)
+            (np.abs(np.hypot(*way.T) - self.radius) < RADIUS_DISTANCE_TOL * self.radius)
+            & (off <= 0.5 * self.turn + ARC_EXTENSION)
         )
 
     def find_touched(self, pieces: Mapping[str, Sequence[FloatArray]]) -> tuple[str, ...]:
@@ -74,7 +75,11 @@ class FilletArc:
         return tuple(
             name
             for name, polygons in pieces.items()
-            if any(LinearRing(polygon).distance(end) < ON * self.radius for polygon in polygons for end in ends)
+            if any(
+                LinearRing(polygon).distance(end) < RADIUS_DISTANCE_TOL * self.radius
+                for polygon in polygons
+                for end in ends
+            )
         )
 
 
@@ -124,7 +129,7 @@ def stressed_fillets(solved: MeshSolution, radius: float) -> tuple[FilletStress,
     for number, ring in enumerate(solved.part.rings):
         for arc in arcs(ring, number, radius):
             own = (ring_of[nodes] == number) & arc.covers(grid.nodes[nodes])
-            if np.abs(stress[:, own]).max(initial=0.0) > RIGID * np.abs(stress).max():
+            if np.abs(stress[:, own]).max(initial=0.0) > MIN_STRESS_SHARE * np.abs(stress).max():
                 worst = np.abs(stress[:, own]).argmax(axis=1)
                 largest = stress[:, own][np.arange(len(stress)), worst]
                 found.append(FilletStress(arc, solved.course.travel[rising], read_only(largest[rising])))
@@ -135,7 +140,7 @@ def arcs(ring: Ring, number: int, radius: float) -> Iterator[FilletArc]:
     """Yield the arcs of a radius that turn towards the waste on a ring."""
     points, count = ring.points, len(ring.points)
     centers, radii = _circles(points)
-    on = (ring.turns < 0) & (np.abs(radii - radius) <= ROUND * radius)
+    on = (ring.turns < 0) & (np.abs(radii - radius) <= RADIUS_RTOL * radius)
     if radius <= 0 or on.all():
         return
     for first in np.flatnonzero(on & ~np.roll(on, 1)):

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from cfmkit.arrays import LONGEST, Named
+from cfmkit.arrays import MAX_REPR_LENGTH, Named
 from cfmkit.specs.units import Force, Length
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -21,7 +21,7 @@ class Model(BaseModel):
     def __repr__(self) -> str:
         """Return the block as it is built, or its fields where that is too long."""
         text = super().__repr__()
-        return text if len(text) <= LONGEST else f"{type(self).__name__}({Named(self)!r})"
+        return text if len(text) <= MAX_REPR_LENGTH else f"{type(self).__name__}({Named(self)!r})"
 
     # Blocks stand in others, and only the whole is validated: built with it, each is built once, and quicker to import.
     model_config = ConfigDict(

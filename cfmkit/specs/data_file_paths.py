@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-TAKEN = ("curve.csv", "data.csv", "residuals.csv", "parameters.csv", "cycles.csv", "results.csv")
+TAKEN_NAMES = ("curve.csv", "data.csv", "residuals.csv", "parameters.csv", "cycles.csv", "results.csv")
 """Names under which runs write files of their own."""
 
 
@@ -30,7 +30,7 @@ class DataSource(str):
         root, path = os.path.realpath(folder), os.path.realpath(source.path)
         if not name or "\0" in name or os.path.isabs(name) or os.path.commonpath([root, path]) != root:
             raise ValueError("must be a file in the folder of the specification, or below it")
-        if name in TAKEN:
+        if name in TAKEN_NAMES:
             raise ValueError(f"{name!r} is what runs call a file of their own; rename it")
         if not os.path.isfile(path):
             raise ValueError(f"there is no file {name!r} in the folder of the specification")

@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-LONGEST = 500
-_TWO = {
+MAX_FORMULA_LENGTH = 500
+_BINARY_OPERATORS = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_ONE: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
-_FUNCTIONS = {name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "abs", "tanh", "log")} | {
+_UNARY_OPERATORS: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+_NUMPY_FUNCTIONS = {name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "abs", "tanh", "log")} | {
     "min": np.minimum,
     "max": np.maximum,
 }
 
 
-_SLOPES: dict[str, Callable[[Any], Any]] = {
+_FUNCTION_SLOPES: dict[str, Callable[[Any], Any]] = {
     "sin": np.cos,
     "cos": lambda x: -np.sin(x),
     "tan": lambda x: 1 + np.tan(x) ** 2,
@@ -56,8 +56,8 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
     >>> formula("1.5*(1 - cos(pi*x/12))")(np.array([0.0, 12.0])).tolist()
     [0.0, 3.0]
     """
-    if len(text) > LONGEST:
-        raise ValueError(f"a formula has at most {LONGEST} characters, this one has {len(text)}")
+    if len(text) > MAX_FORMULA_LENGTH:
+        raise ValueError(f"a formula has at most {MAX_FORMULA_LENGTH} characters, this one has {len(text)}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -102,11 +102,11 @@ def slope(text: str) -> Callable[[FloatArray], FloatArray]:
 def _slope(node: ast.expr, x: FloatArray) -> Any:
     """Return the derivative of a formula that `formula` accepts, by the rules of calculus."""
     if isinstance(node, ast.UnaryOp):
-        return _ONE[type(node.op)](_slope(node.operand, x))
+        return _UNARY_OPERATORS[type(node.op)](_slope(node.operand, x))
     if isinstance(node, ast.BinOp):
         u, v, du, dv = _value(node.left, x), _value(node.right, x), _slope(node.left, x), _slope(node.right, x)
         if isinstance(node.op, ast.Add | ast.Sub):
-            return _TWO[type(node.op)](du, dv)
+            return _BINARY_OPERATORS[type(node.op)](du, dv)
         if isinstance(node.op, ast.Mult):
             return du * v + u * dv
         if isinstance(node.op, ast.Div):
@@ -119,7 +119,7 @@ def _slope(node: ast.expr, x: FloatArray) -> Any:
         if len(inner) == 2:
             first = inner[0] <= inner[1] if node.func.id == "min" else inner[0] >= inner[1]
             return np.where(first, *slopes)
-        return _SLOPES[node.func.id](inner[0]) * slopes[0]
+        return _FUNCTION_SLOPES[node.func.id](inner[0]) * slopes[0]
     return 1.0 if isinstance(node, ast.Name) and node.id == "x" else 0.0
 
 
@@ -128,20 +128,20 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
         return _number(node.value)
     if isinstance(node, ast.Name) and node.id in ("x", "pi"):
         return x if node.id == "x" else np.pi
-    if isinstance(node, ast.BinOp) and type(node.op) in _TWO:
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY_OPERATORS:
         with np.errstate(all="ignore"):
-            return np.asarray(_TWO[type(node.op)](np.asarray(_value(node.left, x)), _value(node.right, x)))
-    if isinstance(node, ast.UnaryOp) and type(node.op) in _ONE:
-        return _ONE[type(node.op)](_value(node.operand, x))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
+            return np.asarray(_BINARY_OPERATORS[type(node.op)](np.asarray(_value(node.left, x)), _value(node.right, x)))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY_OPERATORS:
+        return _UNARY_OPERATORS[type(node.op)](_value(node.operand, x))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _NUMPY_FUNCTIONS:
         wanted = 2 if node.func.id in ("min", "max") else 1
         if len(node.args) != wanted or node.keywords:
             raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
         with np.errstate(all="ignore"):
-            return _FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
+            return _NUMPY_FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
     reported = quote(ast.unparse(node))
     raise ValueError(
-        f"{reported} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}"
+        f"{reported} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_NUMPY_FUNCTIONS)}"
     )
 
 

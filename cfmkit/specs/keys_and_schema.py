@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.specs.units.fields import UnitField
 from cfmkit.specs.units.quantities import format_quantity
-from cfmkit.specs.units.table import UNITLESS
+from cfmkit.specs.units.table import UNITLESS_DIMENSIONS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from cfmkit.specs.spec import Spec
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_NOTHING = object()
-_BOUNDS = ("gt", "ge", "lt", "le")
-_KINDS = {
+SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_NO_VALUE = object()
+_BOUND_NAMES = ("gt", "ge", "lt", "le")
+_KIND_WORDS = {
     "string": "text",
     "integer": "whole number",
     "number": "number",
@@ -54,7 +54,7 @@ def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:
     """
     each = {name: json_schema(model) for name, model in models.items()}
     if len(each) == 1:
-        return {"$schema": DIALECT} | next(iter(each.values()))
+        return {"$schema": SCHEMA_DIALECT} | next(iter(each.values()))
     shared = {
         f"{name}.{key}": _rename_references(block, name) for name, one in each.items() for key, block in _blocks(one)
     }
@@ -62,7 +62,7 @@ def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:
         {key: value for key, value in _rename_references(one, name).items() if key != "$defs"}
         for name, one in each.items()
     ]
-    return {"$schema": DIALECT, "title": "cfmkit specification", "oneOf": choices, "$defs": shared}
+    return {"$schema": SCHEMA_DIALECT, "title": "cfmkit specification", "oneOf": choices, "$defs": shared}
 
 
 def json_schema(spec_type: type[BaseModel]) -> dict[str, Any]:
@@ -92,13 +92,18 @@ def _default_as_written(node: dict[str, Any], value: Any) -> Any:
         return [_default_as_written(inner, item) for item in value]
     choices = (node, *node.get("anyOf", ()))
     dimension = next((one["x-dimension"] for one in choices if "x-dimension" in one), None)
-    if not isinstance(value, int | float) or isinstance(value, bool) or dimension is None or dimension in UNITLESS:
+    if (
+        not isinstance(value, int | float)
+        or isinstance(value, bool)
+        or dimension is None
+        or dimension in UNITLESS_DIMENSIONS
+    ):
         return value
     return format_quantity(value, dimension.split(" ")[0])
 
 
 def _bounds_as_text(node: dict[str, Any], dimension: str) -> None:
-    bounds = {name: node.pop(name) for name in _BOUNDS if name in node}
+    bounds = {name: node.pop(name) for name in _BOUND_NAMES if name in node}
     if bounds:
         node["x-allowed"] = UnitField((dimension.split(" ")[0],)).limits(bounds)
 
@@ -164,13 +169,13 @@ def _members(node: dict[str, Any], blocks: dict[str, Any]) -> list[dict[str, Any
 def _key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool) -> Key:
     members = _members(node, blocks)
     quantities = [one for one in members if "x-dimension" in one]
-    default = node.get("default", _NOTHING)
+    default = node.get("default", _NO_VALUE)
     return Key(
         path,
         " or ".join(dict.fromkeys(_kind(one, blocks) for one in members)),
         next((one["examples"][0] for one in quantities if one.get("examples")), ""),
         "; ".join(dict.fromkeys(filter(None, map(_describe_allowed, members)))),
-        _default(default) if default not in (_NOTHING, None, "", []) else "",
+        _default(default) if default not in (_NO_VALUE, None, "", []) else "",
         required,
         node.get("description") or next((one["description"] for one in members if "description" in one), ""),
     )
@@ -186,7 +191,7 @@ def _kind(node: dict[str, Any], blocks: dict[str, Any]) -> str:
     if node.get("type") == "array":
         return f"list of {_items(node, blocks)}"
     kind = node.get("type", "value")
-    return "number or text" if isinstance(kind, list) else _KINDS.get(kind, "value")
+    return "number or text" if isinstance(kind, list) else _KIND_WORDS.get(kind, "value")
 
 
 def _items(node: dict[str, Any], blocks: dict[str, Any]) -> str:

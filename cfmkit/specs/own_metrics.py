@@ -68,7 +68,7 @@ def register_metric(
     cfmkit.errors.UsageError
         If the name cannot stand in a requirement, or there is no such dimension.
     """
-    from cfmkit.specs.units import DIMENSIONS
+    from cfmkit.specs.units import DIMENSIONS_BY_NAME
 
     name = getattr(function, "__name__", type(function).__name__) if name is None else name
     if not NAME_PATTERN.fullmatch(name):
@@ -77,8 +77,10 @@ def register_metric(
             "name it: cfmkit.metric(name='...')"
         )
     dimension = PLAIN_NUMBER if dimension is None else dimension
-    if dimension not in DIMENSIONS:
-        raise UsageError(f"metric {name!r}: there is no dimension {dimension!r}; there are {', '.join(DIMENSIONS)}")
+    if dimension not in DIMENSIONS_BY_NAME:
+        raise UsageError(
+            f"metric {name!r}: there is no dimension {dimension!r}; there are {', '.join(DIMENSIONS_BY_NAME)}"
+        )
     described = (getattr(function, "__doc__", "") or "").strip().partition("\n")[0]
     metric = OwnMetric(name, dimension, definition or described or f"the user's function {name}", function)
     return enter(metric)

@@ -19,8 +19,8 @@ from cfmkit.specs.own_metrics import name_of
 from cfmkit.specs.study_spec import Correlated, Sensitivity, Sweep, Tolerance
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
-    DIMENSIONS,
-    SHARE,
+    DIMENSIONS_BY_NAME,
+    SHARE_DIMENSION,
     Displacement,
     Ends,
     Length,
@@ -224,12 +224,12 @@ class Spec(Model):
 
     @model_validator(mode="after")
     def _windows_are_of_the_motion(self) -> Self:
-        right = DIMENSIONS[self.motion]
+        right = DIMENSIONS_BY_NAME[self.motion]
         faults = {
             path: f"the curve runs over {right.phrase}: write its window in {right.unit}, or in shares of the travel: "
             "[1 %, 100 %]"
             for path, ends in self.windows()
-            if {dimension_of_end(end) for end in ends} - {self.motion, SHARE}
+            if {dimension_of_end(end) for end in ends} - {self.motion, SHARE_DIMENSION}
         }
         refuse("Spec", faults)
         return self

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-EFFORTS, SLOPES = ("force", "torque"), ("stiffness", "rotational_stiffness")
+EFFORT_DIMENSIONS, SLOPE_DIMENSIONS = ("force", "torque"), ("stiffness", "rotational_stiffness")
 MOTION_OF = {"force": "length", "torque": "angle"}
 MOST_POINTS = 10_000
 
@@ -68,8 +68,8 @@ class _OneOf(UnitField):
         return self.json_schema({})
 
 
-Effort = Annotated[float, _OneOf(EFFORTS)]
-AnyStiffness = Annotated[float, _OneOf(SLOPES)]
+Effort = Annotated[float, _OneOf(EFFORT_DIMENSIONS)]
+AnyStiffness = Annotated[float, _OneOf(SLOPE_DIMENSIONS)]
 Interpolation = Literal["smooth", "linear"]
 
 
@@ -114,7 +114,11 @@ class Target(Model):
             raise ValueError("'start' belongs to 'stiffness': points say where they start")
         if self.points is not None:
             _check(self.points)
-        if self.start and self.stiffness and EFFORTS.index(_dim(self.start)) != SLOPES.index(_dim(self.stiffness)):
+        if (
+            self.start
+            and self.stiffness
+            and EFFORT_DIMENSIONS.index(_dim(self.start)) != SLOPE_DIMENSIONS.index(_dim(self.stiffness))
+        ):
             raise ValueError("'stiffness' and 'start' must both be of a force, or both of a torque")
         return self
 
@@ -131,7 +135,7 @@ class Target(Model):
             said |= {"torque" for place, _ in points if place and _dim(place) == "angle"}
             return said.pop() if said else None
         if self.stiffness:
-            return EFFORTS[SLOPES.index(_dim(self.stiffness))]
+            return EFFORT_DIMENSIONS[SLOPE_DIMENSIONS.index(_dim(self.stiffness))]
         return _dim(self.start) if self.start else None
 
     def curve(self, level: float | None = None) -> TargetCurve:
@@ -154,7 +158,9 @@ class Target(Model):
             return Target(points=_from_file(self.file), interpolation=self.interpolation)
         if self.stiffness is not None and self.start is None and level:
             return self.model_copy(
-                update={"start": DimensionedFloat(level, EFFORTS[SLOPES.index(_dim(self.stiffness))])}
+                update={
+                    "start": DimensionedFloat(level, EFFORT_DIMENSIONS[SLOPE_DIMENSIONS.index(_dim(self.stiffness))])
+                }
             )
         return self
 
@@ -177,8 +183,8 @@ def _check(points: tuple[tuple[float, float], ...]) -> None:
         raise ValueError("points are forces over displacements, or torques over angles; these are mixed")
 
 
-_HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*\[(?P<unit>[^\[\]]+)\]\s*")
-_COLUMNS = {"displacement": "length", "force": "force", "angle": "angle", "torque": "torque"}
+_HEADER_PATTERN = re.compile(r"\s*(?P<name>[a-z_]+)\s*\[(?P<unit>[^\[\]]+)\]\s*")
+_COLUMN_DIMENSIONS = {"displacement": "length", "force": "force", "angle": "angle", "torque": "torque"}
 
 
 def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]:
@@ -200,7 +206,7 @@ def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]
         rows = list(lines)
     except csv.Error as problem:
         raise ValueError(f"{source}:{lines.line_num}: {problem}") from None
-    heads = [_HEADER.fullmatch(cell) for cell in (rows[0] if rows else [])]
+    heads = [_HEADER_PATTERN.fullmatch(cell) for cell in (rows[0] if rows else [])]
     units = {head["name"]: (column, head["unit"]) for column, head in enumerate(heads) if head}
     pair = next((two for two in (("displacement", "force"), ("angle", "torque")) if set(two) <= set(units)), None)
     if pair is None:
@@ -213,11 +219,13 @@ def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]
         for name in pair:
             column, unit = units[name]
             try:
-                numbers.append(read_quantity(f"{cells[column].strip()} {unit}", _COLUMNS[name]))
+                numbers.append(read_quantity(f"{cells[column].strip()} {unit}", _COLUMN_DIMENSIONS[name]))
             except (QuantityError, IndexError) as problem:
                 reported = str(problem) if isinstance(problem, QuantityError) else f"no {name}"
                 raise ValueError(f"{source}:{line}: {reported}") from None
-        points.append((Place(numbers[0], _COLUMNS[pair[0]]), DimensionedFloat(numbers[1], _COLUMNS[pair[1]])))
+        points.append(
+            (Place(numbers[0], _COLUMN_DIMENSIONS[pair[0]]), DimensionedFloat(numbers[1], _COLUMN_DIMENSIONS[pair[1]]))
+        )
     if not 2 <= len(points) <= MOST_POINTS:
         raise ValueError(f"{source}: a curve has 2 to {MOST_POINTS} points, not {len(points)}")
     try:

@@ -1,5 +1,5 @@
 """Materials of mechanisms: the library of named materials, and how a specification names or describes one."""
 
-from cfmkit.stock.materials import MATERIALS, Material, UnknownMaterial, material
+from cfmkit.stock.materials import MATERIALS_BY_NAME, Material, UnknownMaterial, material
 
-__all__ = ["MATERIALS", "Material", "UnknownMaterial", "material"]
+__all__ = ["MATERIALS_BY_NAME", "Material", "UnknownMaterial", "material"]

@@ -20,7 +20,7 @@ from cfmkit.specs.units.fields import describe_value
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue, Relaxation, assumed_laws
 from cfmkit.stock.materials import UnknownMaterial, material
 from cfmkit.stock.printing import LAYER_STRENGTHS, Layers
-from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
+from cfmkit.stock.processes import PROCESSES_BY_NAME, ProcessAccuracy, ProcessName
 from cfmkit.stock.stock_series import System  # noqa: TC001  of a field
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ class PartProcess(Model):
         """Smallest inside radius [m]; None if neither a name nor a value says it."""
         if self.least_radius is not None:
             return self.least_radius
-        return PROCESSES[self.name].least_radius if self.name else None
+        return PROCESSES_BY_NAME[self.name].least_radius if self.name else None
 
     @property
     def prints(self) -> bool:
@@ -257,11 +257,11 @@ class PartProcess(Model):
         """Thinnest wall [m]; None if neither a name nor a value says it."""
         if self.least_feature is not None:
             return self.least_feature
-        return PROCESSES[self.name].least_feature if self.name else None
+        return PROCESSES_BY_NAME[self.name].least_feature if self.name else None
 
     def accuracy(self, usual: ProcessAccuracy) -> ProcessAccuracy:
         """Return what the process holds, and what the usual one does where it has no name."""
-        known = PROCESSES[self.name] if self.name else usual
+        known = PROCESSES_BY_NAME[self.name] if self.name else usual
         own = {
             one: value
             for one in ("kerf", "thickness", "position", "least_feature", "least_radius")

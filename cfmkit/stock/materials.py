@@ -68,7 +68,7 @@ class Material:
     aliases: tuple[str, ...] = ()  # other words for it; a name that is not found is compared with these too
 
 
-_METALS = (
+_METAL_LIST = (
     Material(
         "steel-1.4310", 179e9, 0.29, 965e6, 7900.0,
         "E: EN 10151 strip 1.4310, cold rolled to Rm 1300 MPa, along the grain (189 GPa after tempering, 195 GPa at "
@@ -127,7 +127,7 @@ _METALS = (
     ),
 )  # fmt: skip
 
-_PLASTICS = (
+_PLASTIC_LIST = (
     Material(
         "pla", 3.0e9, 0.36, 45e6, 1240.0,
         "Printed (filament). Nominal: Stratasys PLA, ASTM D638, on edge (3.04 GPa, yield 45 MPa; flat 2.54 GPa, 26 "
@@ -213,7 +213,7 @@ _PLASTICS = (
     ),
 )  # fmt: skip
 
-_PAPERS = (
+_PUBLISHED_LIST = (
     Material(
         "pom-lan-2010", 2.0e9, 0.35, 76e6, 1410.0,
         "Lan, Wang, Chen 2010, Table 2: E and yield stress of their polyoxymethylene (used there with a safety "
@@ -242,7 +242,9 @@ _PAPERS = (
     ),
 )  # fmt: skip
 
-MATERIALS: Mapping[str, Material] = MappingProxyType({item.name: item for item in (*_METALS, *_PLASTICS, *_PAPERS)})
+MATERIALS_BY_NAME: Mapping[str, Material] = MappingProxyType(
+    {item.name: item for item in (*_METAL_LIST, *_PLASTIC_LIST, *_PUBLISHED_LIST)}
+)
 """Every material by name."""
 
 
@@ -259,10 +261,10 @@ def material(name: str) -> Material:
     >>> material("pom").youngs_modulus
     2800000000.0
     """
-    if name in MATERIALS:
-        return MATERIALS[name]
+    if name in MATERIALS_BY_NAME:
+        return MATERIALS_BY_NAME[name]
     near = _nearest(name)
-    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(MATERIALS)}"
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(MATERIALS_BY_NAME)}"
     raise UnknownMaterial(f"there is no material {name!r}; {hint}")
 
 
@@ -270,7 +272,7 @@ def _nearest(name: str) -> tuple[str, ...]:
     """Return the names that `name` could have meant, by alias or by spelling."""
     wanted = name.strip().lower().replace("_", "-").replace(" ", "-")
     words: dict[str, list[str]] = {}
-    for item in MATERIALS.values():
+    for item in MATERIALS_BY_NAME.values():
         for word in (item.name, *item.aliases):
             words.setdefault(word, []).append(item.name)
     close = [wanted] if wanted in words else difflib.get_close_matches(wanted, words, n=2, cutoff=0.6)

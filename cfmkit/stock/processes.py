@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
-from cfmkit.stock.materials import MATERIALS
+from cfmkit.stock.materials import MATERIALS_BY_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,7 +33,7 @@ class ProcessAccuracy:
     reason: str  # why these
 
 
-_ALL = (
+_PROCESS_LIST = (
     ProcessAccuracy("laser", 0.2e-3, 0.03e-3, 0.05e-3, 0.5e-3, 0.1e-3,
             "a leaf has two cut sides, and the kerf changes with focus, power and sheet"),
     ProcessAccuracy("wire-edm", 0.3e-3, 0.005e-3, 0.005e-3, 0.2e-3, 0.15e-3,
@@ -46,7 +46,7 @@ _ALL = (
             "a thin leaf yields to the cutter; inside corners have the radius of a 2 mm one"),
 )  # fmt: skip
 
-PROCESSES: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for one in _ALL})
+PROCESSES_BY_NAME: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for one in _PROCESS_LIST})
 """All by name."""
 
 SPRING_RATE = 0.05
@@ -57,15 +57,15 @@ coiled springs in grade 2, the usual one, tolerances of this size; it is written
 are wider: Lee Spring states 10 % of the rate.
 """
 
-PRINTED = {"pla": "fdm", "abs": "fdm", "petg": "fdm", "pa12-sls": "sls", "pa12-mjf": "sls"}
-METAL = 20e9
+PROCESS_BY_PLASTIC = {"pla": "fdm", "abs": "fdm", "petg": "fdm", "pa12-sls": "sls", "pa12-mjf": "sls"}
+MIN_METAL_MODULUS = 20e9
 """Young's modulus above which a material is taken for a metal [Pa]: no plastic reaches it, no metal is as soft."""
 
 
-POWDERS = ("pa12-sls", "pa12-mjf")
+POWDER_MATERIALS = ("pa12-sls", "pa12-mjf")
 """Materials whose values are those of sintered powder."""
 
-RUBBERS = ("tpu-95a",)
+RUBBER_MATERIALS = ("tpu-95a",)
 """Materials that yield to a cutter."""
 
 
@@ -86,20 +86,20 @@ def why_not_made(process: str, material: str | None, youngs_modulus: float) -> s
     if process in made_by:
         return ""
     *others, last = made_by
-    name = material or ("this metal" if youngs_modulus > METAL else "this plastic")
+    name = material or ("this metal" if youngs_modulus > MIN_METAL_MODULUS else "this plastic")
     return f"{name} is not made by {process}, but by {', '.join(others)}{' or ' if others else ''}{last}"
 
 
 def _processes_of(material: str | None, youngs_modulus: float) -> tuple[str, ...]:
     """Return by which processes parts of a material are made."""
-    if youngs_modulus > METAL:
+    if youngs_modulus > MIN_METAL_MODULUS:
         return ("laser", "wire-edm", "mill")
-    if material in POWDERS:
+    if material in POWDER_MATERIALS:
         return ("sls",)
-    if material in RUBBERS:
+    if material in RUBBER_MATERIALS:
         return ("laser", "fdm")
     # a material of one's own may be a powder, too
-    return ("laser", "fdm", "mill") if material in MATERIALS else ("laser", "fdm", "sls", "mill")
+    return ("laser", "fdm", "mill") if material in MATERIALS_BY_NAME else ("laser", "fdm", "sls", "mill")
 
 
 def usual(material: str | None, youngs_modulus: float) -> ProcessAccuracy:
@@ -110,5 +110,5 @@ def usual(material: str | None, youngs_modulus: float) -> ProcessAccuracy:
     >>> usual("pla", 3e9).name, usual(None, 200e9).name, usual(None, 2e9).name
     ('fdm', 'wire-edm', 'laser')
     """
-    name = PRINTED.get(material or "", "wire-edm" if youngs_modulus > METAL else "laser")
-    return PROCESSES[name]
+    name = PROCESS_BY_PLASTIC.get(material or "", "wire-edm" if youngs_modulus > MIN_METAL_MODULUS else "laser")
+    return PROCESSES_BY_NAME[name]

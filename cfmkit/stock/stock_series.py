@@ -115,22 +115,24 @@ SOCKET_SCREWS = tuple(
 )  # fmt: skip
 """ISO 4762 heads and ISO 273 medium holes."""
 
-MARKET = "sellers' list"
+MARKET_SOURCE = "sellers' list"
 
 ALL_SERIES = (
-    StockSeries("sheet", "metric", MARKET, "aluminiumplatesupplier.com, how to choose aluminum plate thickness (6061)",
+    StockSeries("sheet", "metric", MARKET_SOURCE,
+           "aluminiumplatesupplier.com, how to choose aluminum plate thickness (6061)",
            _mm(0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.5, 1.8, 2, 2.3, 2.5, 2.8, 3, 3.5, 4, 5, 6, 7, 8, 9, 10, 12,
                14, 16, 18, 20, 22, 25, 30), ("aluminium-6061-t6",)),
-    StockSeries("sheet", "metric", MARKET, "pandasmetal.github.io, aluminium sheet 1 mm thickness (6061, 7075)",
+    StockSeries("sheet", "metric", MARKET_SOURCE, "pandasmetal.github.io, aluminium sheet 1 mm thickness (6061, 7075)",
            _mm(0.3, 0.5, 0.8, 1, 1.2, 1.5, 2, 2.5, 3, 4, 5), ("aluminium-7075-t6",)),
-    StockSeries("sheet", "metric", MARKET, "machinemfg.com, 304 and 316 stainless steel plate weight chart, up to 3 mm",
+    StockSeries("sheet", "metric", MARKET_SOURCE,
+           "machinemfg.com, 304 and 316 stainless steel plate weight chart, up to 3 mm",
            _mm(0.5, 0.8, 1, 1.2, 1.5, 2, 2.5, 3), ("steel-304",)),
-    StockSeries("sheet", "metric", MARKET, "usisteels.com, standard mild steel plate thickness chart",
+    StockSeries("sheet", "metric", MARKET_SOURCE, "usisteels.com, standard mild steel plate thickness chart",
            _mm(1.6, 2, 3, 5, 6, 8, 10, 12, 16, 20, 25), ("steel-s235",)),
-    StockSeries("sheet", "inch", MARKET, "pandasmetal.github.io, cutting 6mm aluminium sheet (6061, inch)",
+    StockSeries("sheet", "inch", MARKET_SOURCE, "pandasmetal.github.io, cutting 6mm aluminium sheet (6061, inch)",
            _inches(0.025, 0.032, 0.040, 0.050, 0.063, 0.080, 0.090, 0.100, 0.125, 0.160, 0.190, 0.25, 0.3125, 0.375,
                    0.4375, 0.5, 0.625, 0.75, 0.875, 1), ("aluminium-6061-t6",)),
-    StockSeries("sheet", "inch", MARKET, "github.com/machineagency/jubilee, wiki, Parts to Laser Cut (Delrin)",
+    StockSeries("sheet", "inch", MARKET_SOURCE, "github.com/machineagency/jubilee, wiki, Parts to Laser Cut (Delrin)",
            _inches(0.0625, 0.09375, 0.125), ("pom",)),
     StockSeries("wire", "metric", "EN 10270-1 up to 0.5 mm; above, preferred numbers of ISO 3, R10",
            "springwire.net, spring wire sizes and tolerances; durofer.ch, spring wire",

@@ -20,7 +20,7 @@ from cfmkit.errors import CfmError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-NUMERICAL = ("numpy", "scipy")
+NUMERICAL_LIBRARIES = ("numpy", "scipy")
 """The libraries whose versions can change a number."""
 
 _LEFT_BEHIND = (".pyc", ".pyo", ".so", ".pyd")
@@ -78,7 +78,7 @@ def _canonical(value: Any) -> Any:
     raise CfmError(f"a {type(value).__name__} has no identity: only texts, numbers and their collections have")
 
 
-def origin(libraries: Iterable[str] = NUMERICAL) -> dict[str, str]:
+def origin(libraries: Iterable[str] = NUMERICAL_LIBRARIES) -> dict[str, str]:
     """Return what computes: cfmkit's version and content, and the versions of Python and of libraries.
 
     It belongs into the identity of every result that is kept for a later run.

@@ -13,11 +13,11 @@ from cfmkit.store.safe_disk_changes import quote_path
 if TYPE_CHECKING:
     from pathlib import Path
 
-MANIFEST = "manifest.json"
-RESERVED = ".cfmkit"
-JOURNAL = ".cfmkit-journal.sqlite"
+MANIFEST_NAME = "manifest.json"
+RESERVED_PREFIX = ".cfmkit"
+JOURNAL_NAME = ".cfmkit-journal.sqlite"
 """What a long run notes as it goes; unlike its other files it is there before the run ends, and stays."""
-CURE = "move it away or give another output folder (--out)"
+OVERWRITE_REMEDY = "move it away or give another output folder (--out)"
 
 
 def checked_name(name: str) -> str:
@@ -42,7 +42,7 @@ def _problem(name: str) -> str | None:
         return "it has an empty part, '.' or '..'"
     if "\\" in name or any(ord(char) < 32 or ord(char) == 127 for char in name):
         return "it holds a backslash or a control character"
-    if name.lower() == MANIFEST or any(part.lower().startswith(RESERVED) for part in parts):
+    if name.lower() == MANIFEST_NAME or any(part.lower().startswith(RESERVED_PREFIX) for part in parts):
         return "the folder keeps it for itself"
     return None
 
@@ -58,11 +58,15 @@ def refuse_in_the_way(root: Path, name: str, *, ours: bool) -> None:
         place = place / part
         mode = mode_of(place)
         if mode is not None and not stat.S_ISDIR(mode):
-            raise OutputError(f"{quote_path(place)} is in the way: it is {_what(mode)}, not a folder; {CURE}")
+            raise OutputError(
+                f"{quote_path(place)} is in the way: it is {_what(mode)}, not a folder; {OVERWRITE_REMEDY}"
+            )
     mode = mode_of(root / name)
     if mode is None or (ours and stat.S_ISREG(mode)):
         return
-    raise OutputError(f"{quote_path(root / name)} is in the way: it is {_what(mode)} that no earlier run wrote; {CURE}")
+    raise OutputError(
+        f"{quote_path(root / name)} is in the way: it is {_what(mode)} that no earlier run wrote; {OVERWRITE_REMEDY}"
+    )
 
 
 def hash_in(root: Path, name: str) -> str | None:

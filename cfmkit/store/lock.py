@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-LOCK = ".cfmkit.lock"
+LOCK_NAME = ".cfmkit.lock"
 SOFT_LOCK = ".cfmkit.softlock"
-_LOG = logging.getLogger("cfmkit.store")
+_STORE_LOG = logging.getLogger("cfmkit.store")
 
 SIGNATURE_TIMEOUT = 0.3
 """Seconds to wait for the owner's name to appear in a lock file that was just made."""
@@ -93,10 +93,10 @@ class FolderLock:
         """
         os.stat(self._folder)
         if locks_wanted():
-            self._descriptor = _lock(self._folder / LOCK, self._folder)
+            self._descriptor = _lock(self._folder / LOCK_NAME, self._folder)
             if self._descriptor < 0:
                 self._soft = _lock_softly(self._folder / SOFT_LOCK, self._folder)
-            self.name = SOFT_LOCK if self._soft else LOCK
+            self.name = SOFT_LOCK if self._soft else LOCK_NAME
         self._owner = os.getpid()
 
     @property
@@ -120,7 +120,7 @@ class FolderLock:
             with contextlib.suppress(OSError):
                 self._soft.release()
         elif self.name:
-            _unlock(self._descriptor, self._folder / LOCK)
+            _unlock(self._descriptor, self._folder / LOCK_NAME)
         self._descriptor, self._soft, self.name = -1, None, ""
 
 
@@ -217,7 +217,7 @@ def _lock_softly(file: Path, folder: Path) -> Any:
 @cache
 def _report_soft_locks(folder: str) -> None:
     message = "warning  no file locks in %s: the file %s marks a live run (--no-lock: none)"
-    _LOG.warning(message, quote_path(folder), SOFT_LOCK)
+    _STORE_LOG.warning(message, quote_path(folder), SOFT_LOCK)
 
 
 def _same(descriptor: int, file: Path) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.errors import CfmError, OutputError
-from cfmkit.store.file_names_and_overwrite_checks import CURE, MANIFEST, checked_name, hash_in, mode_of
+from cfmkit.store.file_names_and_overwrite_checks import MANIFEST_NAME, OVERWRITE_REMEDY, checked_name, hash_in, mode_of
 from cfmkit.store.safe_disk_changes import FileRecord, quote_path, reporting
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from datetime import datetime, timedelta
     from pathlib import Path
 
-LIBRARIES = (
+RESULT_LIBRARIES = (
     "SALib",
     "ezdxf",
     "matplotlib",
@@ -36,7 +36,7 @@ LIBRARIES = (
 )
 """The libraries whose versions can change a result; those a run imported are listed."""
 
-_OWN = ("cfmkit", "duration_s", "files", "finished", "started", "versions")
+_OWN_KEYS = ("cfmkit", "duration_s", "files", "finished", "started", "versions")
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Manifest:
         duration : timedelta
             How long it took.
         """
-        if taken := sorted(set(info) & set(_OWN)):
+        if taken := sorted(set(info) & set(_OWN_KEYS)):
             raise CfmError(f"the manifest itself says what {', '.join(taken)} is")
         data = {
             **info,
@@ -96,14 +96,14 @@ class Manifest:
         cfmkit.errors.OutputError
             If a ``manifest.json`` is there that cfmkit did not write.
         """
-        path = folder / MANIFEST
+        path = folder / MANIFEST_NAME
         mode = mode_of(path)
         if mode is None:
             return None
         with reporting(path, "read"):
             data = _parse(path.read_bytes()) if stat.S_ISREG(mode) else None
         if data is None:
-            raise OutputError(f"{quote_path(path)} is in the way: cfmkit did not write it; {CURE}")
+            raise OutputError(f"{quote_path(path)} is in the way: cfmkit did not write it; {OVERWRITE_REMEDY}")
         files = {name: FileRecord(**record) for name, record in data["files"].items()}
         return cls(MappingProxyType(files), MappingProxyType(data))
 
@@ -143,7 +143,7 @@ def _is_entry(name: str, record: object) -> bool:
 def imported_versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that this process has imported."""
     versions = {"python": platform.python_version()}
-    for name in LIBRARIES:
+    for name in RESULT_LIBRARIES:
         if (module := sys.modules.get(name)) is not None:
             versions[name] = str(getattr(module, "__version__", "unknown"))
     return versions

@@ -18,8 +18,8 @@ from cfmkit.errors import CfmError, OutputError
 from cfmkit.store import safe_disk_changes, transaction
 from cfmkit.store.content_hashes_and_versions import file_hash
 from cfmkit.store.file_names_and_overwrite_checks import (
-    JOURNAL,
-    MANIFEST,
+    JOURNAL_NAME,
+    MANIFEST_NAME,
     checked_name,
     hash_in,
     mode_of,
@@ -27,8 +27,8 @@ from cfmkit.store.file_names_and_overwrite_checks import (
 )
 from cfmkit.store.lock import FolderLock
 from cfmkit.store.manifest import Manifest
-from cfmkit.store.safe_disk_changes import TEMPORARY, FileRecord, quote_path, reporting
-from cfmkit.store.transaction import NEW, RUN
+from cfmkit.store.safe_disk_changes import TEMPORARY_NAME, FileRecord, quote_path, reporting
+from cfmkit.store.transaction import NEW_FOLDER, TRANSACTION_FOLDER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 
     from cfmkit.store.safe_disk_changes import Data
 
-_TEMPORARY = re.compile(re.escape(TEMPORARY).replace(r"\{pid\}", "([0-9]+)").replace(r"\{count\}", "[0-9]+"))
+_TEMPORARY_PATTERN = re.compile(
+    re.escape(TEMPORARY_NAME).replace(r"\{pid\}", "([0-9]+)").replace(r"\{count\}", "[0-9]+")
+)
 _MOST_TRIES = 20
 
 
@@ -152,7 +154,7 @@ class RunFolder:
         manifest: other runs into the folder leave it alone.
         """
         self._require_open()
-        return self.path / JOURNAL
+        return self.path / JOURNAL_NAME
 
     def commit(self, info: Mapping[str, Any]) -> Manifest:
         """Put the files and a manifest in place of those of the run before, all or none; once.
@@ -177,7 +179,7 @@ class RunFolder:
             removed, kept = self._list_outdated()
             new = {name: record.sha256 for name, record in self._staged.items()}
             new |= {spare: self._keep(name, spare) for name, spare in kept.items()}
-            new[MANIFEST] = self._stage(MANIFEST, manifest.to_json()).sha256
+            new[MANIFEST_NAME] = self._stage(MANIFEST_NAME, manifest.to_json()).sha256
             self._lock.check()
             transaction.execute(self.path, transaction.plan_for(self.path, new, removed))
         self.previous, self.kept = manifest, MappingProxyType(kept)
@@ -206,12 +208,12 @@ class RunFolder:
     def _clear_temporaries(self) -> None:
         """Remove what `atomic_write` left here in processes that have died."""
         for entry in os.scandir(self.path):
-            match = _TEMPORARY.fullmatch(entry.name)
+            match = _TEMPORARY_PATTERN.fullmatch(entry.name)
             if match and not _alive(int(match[1])):
                 safe_disk_changes.discard(Path(entry.path))
 
     def _stage(self, name: str, data: Data) -> FileRecord:
-        place = self.path / RUN / NEW / name
+        place = self.path / TRANSACTION_FOLDER / NEW_FOLDER / name
         with reporting(self.path / name):
             safe_disk_changes.make_folders(place.parent)
             if mode_of(place) is not None:
@@ -220,7 +222,7 @@ class RunFolder:
 
     def _keep(self, name: str, spare: str) -> str:
         """Stage an edited file under its spare name; return its hash."""
-        place = self.path / RUN / NEW / spare
+        place = self.path / TRANSACTION_FOLDER / NEW_FOLDER / spare
         safe_disk_changes.make_folders(place.parent)
         safe_disk_changes.duplicate(self.path / name, place)
         return file_hash(place) or ""

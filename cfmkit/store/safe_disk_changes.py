@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 system = os
 """Every change to the disk goes through this name, so that tests can make each one fail."""
 
-TEMPORARY = ".cfmkit-{pid}-{count}.tmp"
+TEMPORARY_NAME = ".cfmkit-{pid}-{count}.tmp"
 _counter = itertools.count()
 
-_REASONS = {
+_ERROR_REASONS = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
     errno.EFBIG: "the file is too large for this file system",
@@ -71,7 +71,7 @@ def reporting(path: str | os.PathLike[str], doing: str = "write") -> Iterator[No
 
 def reason(error: OSError) -> str:
     """Return why an operation of the system failed, for a message."""
-    return _REASONS.get(error.errno or 0) or reason_of(error)
+    return _ERROR_REASONS.get(error.errno or 0) or reason_of(error)
 
 
 def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
@@ -95,7 +95,7 @@ def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
     if "\0" in os.fspath(path):
         raise OutputError(f"cannot write {quote_path(path)}: a path holds no NUL character")
     target = Path(os.path.realpath(path))
-    temporary = target.parent / TEMPORARY.format(pid=os.getpid(), count=next(_counter))
+    temporary = target.parent / TEMPORARY_NAME.format(pid=os.getpid(), count=next(_counter))
     with reporting(path):
         _refuse_special(target)
         try:

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import OutputError
 from cfmkit.store import safe_disk_changes
 from cfmkit.store.file_names_and_overwrite_checks import (
-    CURE,
-    MANIFEST,
+    MANIFEST_NAME,
+    OVERWRITE_REMEDY,
     checked_name,
     hash_in,
     mode_of,
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-RUN = ".cfmkit-run"
-NEW, OLD, PLAN, UNDO = "new", "old", "plan.json", "undo.json"
+TRANSACTION_FOLDER = ".cfmkit-run"
+NEW_FOLDER, OLD_FOLDER, PLAN_NAME, UNDO_NAME = "new", "old", "plan.json", "undo.json"
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ class CommitPlan:
 
 def plan_for(root: Path, new: dict[str, str], removed: Iterable[str]) -> CommitPlan:
     """Return the plan that installs the staged files `new` (name -> hash) and removes others."""
-    changes = [Change(name, new[name], hash_in(root, name)) for name in sorted(new) if name != MANIFEST]
+    changes = [Change(name, new[name], hash_in(root, name)) for name in sorted(new) if name != MANIFEST_NAME]
     changes += [Change(name, None, hash_in(root, name)) for name in sorted(removed)]
-    changes += [Change(MANIFEST, new[MANIFEST], hash_in(root, MANIFEST))]
+    changes += [Change(MANIFEST_NAME, new[MANIFEST_NAME], hash_in(root, MANIFEST_NAME))]
     above = {parent for name in new for parent in _parents(name)}
     return CommitPlan(tuple(changes), tuple(sorted(name for name in above if mode_of(root / name) is None)))
 
@@ -80,7 +80,9 @@ def execute(root: Path, plan: CommitPlan) -> None:
     """
     try:
         _keep_old(root, plan)
-        safe_disk_changes.atomic_write(root / RUN / PLAN, json.dumps(asdict(plan), indent=1).encode())
+        safe_disk_changes.atomic_write(
+            root / TRANSACTION_FOLDER / PLAN_NAME, json.dumps(asdict(plan), indent=1).encode()
+        )
         _roll_forward(root, plan)
     except BaseException as error:
         with suppress(OSError, OutputError):
@@ -99,59 +101,61 @@ def recover(root: Path) -> None:
     cfmkit.errors.OutputError
         If that is not possible now; nothing is lost, and the next run tries again.
     """
-    run = root / RUN
+    run = root / TRANSACTION_FOLDER
     if (mode := mode_of(run)) is None:
         return
     if not run.is_dir() or run.is_symlink():
-        raise OutputError(f"{quote_path(run)} is in the way: it is not a folder of cfmkit (mode {mode:o}); {CURE}")
+        raise OutputError(
+            f"{quote_path(run)} is in the way: it is not a folder of cfmkit (mode {mode:o}); {OVERWRITE_REMEDY}"
+        )
     with reporting(root, "repair"):
-        if mode_of(run / UNDO) is not None:
-            _roll_back(root, _read_plan(root, UNDO))
-        elif mode_of(run / PLAN) is not None:
-            _resume(root, _read_plan(root, PLAN))
+        if mode_of(run / UNDO_NAME) is not None:
+            _roll_back(root, _read_plan(root, UNDO_NAME))
+        elif mode_of(run / PLAN_NAME) is not None:
+            _resume(root, _read_plan(root, PLAN_NAME))
     clear(root)
 
 
 def clear(root: Path) -> None:
     """Remove the working folder, unless it holds a plan that the next run has to finish."""
-    if mode_of(root / RUN) is not None and not _pending(root):
-        safe_disk_changes.clear_folder(root / RUN)
+    if mode_of(root / TRANSACTION_FOLDER) is not None and not _pending(root):
+        safe_disk_changes.clear_folder(root / TRANSACTION_FOLDER)
 
 
 def _pending(root: Path) -> bool:
-    return any(mode_of(root / RUN / name) is not None for name in (PLAN, UNDO))
+    return any(mode_of(root / TRANSACTION_FOLDER / name) is not None for name in (PLAN_NAME, UNDO_NAME))
 
 
 def _keep_old(root: Path, plan: CommitPlan) -> None:
     """Give every file that will go a second name, and bring all names down to the disk."""
     for change in plan.changes:
         if change.old is not None:
-            target = root / RUN / OLD / change.name
+            target = root / TRANSACTION_FOLDER / OLD_FOLDER / change.name
             safe_disk_changes.make_folders(target.parent)
             safe_disk_changes.duplicate(root / change.name, target)
-    for branch in (NEW, OLD):
-        for folder, _, _ in os.walk(root / RUN / branch):
+    for branch in (NEW_FOLDER, OLD_FOLDER):
+        for folder, _, _ in os.walk(root / TRANSACTION_FOLDER / branch):
             sync_folder(type(root)(folder))
-    sync_folder(root / RUN)
+    sync_folder(root / TRANSACTION_FOLDER)
     sync_folder(root)
 
 
 def _roll_forward(root: Path, plan: CommitPlan) -> None:
     touched = {root}
     for change in plan.changes:
-        if change.name == MANIFEST:
+        if change.name == MANIFEST_NAME:
             _sync(touched)
         _apply(root, change)
         touched |= {root / parent for parent in _parents(change.name)}
     _sync(touched)
     # Only now: undoing this would need new folders, which a full disk may refuse.
     remove_empty(root / parent for change in plan.changes if change.new is None for parent in _parents(change.name))
-    safe_disk_changes.system.unlink(root / RUN / PLAN)
+    safe_disk_changes.system.unlink(root / TRANSACTION_FOLDER / PLAN_NAME)
 
 
 def _apply(root: Path, change: Change) -> None:
     """Put one new file in its place, or take one old file away, unless that is done already."""
-    place, staged = root / change.name, root / RUN / NEW / change.name
+    place, staged = root / change.name, root / TRANSACTION_FOLDER / NEW_FOLDER / change.name
     if change.new is None:
         if mode_of(place) is not None:
             _refuse_changed(root, change)
@@ -166,12 +170,15 @@ def _refuse_changed(root: Path, change: Change) -> None:
     """Raise if the file in place is neither the one that the plan knew nor the new one."""
     place = root / change.name
     if mode_of(place) is not None and hash_in(root, change.name) not in {change.old, change.new} - {None}:
-        raise OutputError(f"{quote_path(place)} was changed while a run was replacing it; {CURE}")
+        raise OutputError(f"{quote_path(place)} was changed while a run was replacing it; {OVERWRITE_REMEDY}")
 
 
 def _resume(root: Path, plan: CommitPlan) -> None:
     """Roll forward if every new file is there, as it is after any kill; else roll back."""
-    found = (hash_in(root / RUN / NEW, change.name) or hash_in(root, change.name) for change in plan.changes)
+    found = (
+        hash_in(root / TRANSACTION_FOLDER / NEW_FOLDER, change.name) or hash_in(root, change.name)
+        for change in plan.changes
+    )
     if all(change.new in (None, there) for change, there in zip(plan.changes, found, strict=True)):
         _roll_forward(root, plan)
         return
@@ -180,9 +187,9 @@ def _resume(root: Path, plan: CommitPlan) -> None:
 
 def _turn_back(root: Path, plan: CommitPlan) -> None:
     """Undo a plan, if it was ever begun."""
-    run = root / RUN
-    if mode_of(run / PLAN) is not None:
-        safe_disk_changes.system.replace(run / PLAN, run / UNDO)
+    run = root / TRANSACTION_FOLDER
+    if mode_of(run / PLAN_NAME) is not None:
+        safe_disk_changes.system.replace(run / PLAN_NAME, run / UNDO_NAME)
         _roll_back(root, plan)
 
 
@@ -192,11 +199,11 @@ def _roll_back(root: Path, plan: CommitPlan) -> None:
     remove_empty(root / name for name in plan.folders)
     with suppress(OSError):
         _sync({root, *(root / parent for change in plan.changes for parent in _parents(change.name))})
-    safe_disk_changes.system.unlink(root / RUN / UNDO)
+    safe_disk_changes.system.unlink(root / TRANSACTION_FOLDER / UNDO_NAME)
 
 
 def _restore(root: Path, change: Change) -> None:
-    place, kept = root / change.name, root / RUN / OLD / change.name
+    place, kept = root / change.name, root / TRANSACTION_FOLDER / OLD_FOLDER / change.name
     there = hash_in(root, change.name)
     if change.old is None:
         if there is not None and there == change.new:
@@ -220,11 +227,11 @@ def _parents(name: str) -> list[str]:
 
 def _read_plan(root: Path, name: str) -> CommitPlan:
     """Return a plan, checked: it decides what is replaced and removed."""
-    path = root / RUN / name
+    path = root / TRANSACTION_FOLDER / name
     try:
         data = json.loads(path.read_bytes())
         plan = CommitPlan(tuple(Change(**change) for change in data["changes"]), tuple(data["folders"]))
-        names = [change.name for change in plan.changes if change.name != MANIFEST]
+        names = [change.name for change in plan.changes if change.name != MANIFEST_NAME]
         for item in (*names, *plan.folders):
             checked_name(item)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OutputError):

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 
-OUTPUTS = "cfm-out"
+OUTPUT_FOLDER = "cfm-out"
 """Folders of this name hold results: a search for specifications does not look into them."""
 
-ENDINGS = (".yaml", ".yml")
-TAKEN = ("results.csv", "requirements.csv", "metrics.json", "manifest.json", "report.html", "changes.csv")
+SPEC_SUFFIXES = (".yaml", ".yml")
+TAKEN_NAMES = ("results.csv", "requirements.csv", "metrics.json", "manifest.json", "report.html", "changes.csv")
 """Names in the output folder that no specification's folder may have."""
 
-SKIPPED, LEFT = "skipped", "not run: an earlier specification failed"
+SKIPPED_STATUS, SKIPPED_MESSAGE = "skipped", "not run: an earlier specification failed"
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Entry:
     # family, name: as the specification says
     family: str = ""
     name: str = ""
-    status: str = SKIPPED  # as in metrics.json; ``skipped`` if it was not run
+    status: str = SKIPPED_STATUS  # as in metrics.json; ``skipped`` if it was not run
     code: ExitCode = ExitCode.OK  # what a run of it alone would have returned
     message: str = ""  # what is wrong, in one line; empty if nothing is
     # requirements, warnings: as in metrics.json
@@ -57,7 +57,7 @@ class Entry:
     @property
     def skipped(self) -> bool:
         """Whether it was not run."""
-        return self.status == SKIPPED
+        return self.status == SKIPPED_STATUS
 
     @property
     def missed(self) -> tuple[Mapping[str, Any], ...]:
@@ -126,7 +126,7 @@ def _matches(name: str, out: str) -> list[str]:
     return found
 
 
-def files_below(folder: str, out: str = OUTPUTS) -> list[str]:
+def files_below(folder: str, out: str = OUTPUT_FOLDER) -> list[str]:
     """Return the YAML files in a folder and below, those in folders of results left out.
 
     Parameters
@@ -141,7 +141,7 @@ def files_below(folder: str, out: str = OUTPUTS) -> list[str]:
     cfmkit.errors.UsageError
         If there is none.
     """
-    found = [os.path.join(folder, one) for one in _search("**/*", out, folder) if one.lower().endswith(ENDINGS)]
+    found = [os.path.join(folder, one) for one in _search("**/*", out, folder) if one.lower().endswith(SPEC_SUFFIXES)]
     if not found:
         raise UsageError(f"{folder}: there is no YAML file in this folder or below")
     return found
@@ -153,7 +153,7 @@ def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
     found = []
     for path in sorted(_paths(pattern, root or "")):
         whole = os.path.join(root, path) if root else path
-        ours = OUTPUTS in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
+        ours = OUTPUT_FOLDER in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
         if os.path.isfile(whole) and not ours:
             found.append(path)
     return found
@@ -169,8 +169,8 @@ def _paths(pattern: str, root: str) -> set[str]:
     return {path for folder in folders for path in _paths(glob.escape(folder) + (rest[0] or "*"), root)}
 
 
-_SEPARATORS = re.escape(os.sep + (os.altsep or ""))
-_ANY_DEPTH = re.compile(rf"(?:^|(?<=[{_SEPARATORS}]))\*\*(?:[{_SEPARATORS}]|$)")
+_PATH_SEPARATORS = re.escape(os.sep + (os.altsep or ""))
+_ANY_DEPTH = re.compile(rf"(?:^|(?<=[{_PATH_SEPARATORS}]))\*\*(?:[{_PATH_SEPARATORS}]|$)")
 """The part of a pattern that stands for any number of folders."""
 
 
@@ -192,7 +192,7 @@ def _folders_below(top: str, root: str) -> Iterator[str]:
         except OSError:  # as `glob` does: what cannot be read holds nothing
             continue
         yield folder
-        kept = (one for one in entries if not one.name.startswith(".") and one.name != OUTPUTS)
+        kept = (one for one in entries if not one.name.startswith(".") and one.name != OUTPUT_FOLDER)
         below = [one for one in kept if os.path.isdir(one)]  # one.is_dir() fails where a link leads to itself
         waiting.extendleft(os.path.join(folder, one.name, "") for one in reversed(below) if not one.is_symlink())
         waiting.extend(os.path.join(folder, one.name, "") for one in below if one.is_symlink())
@@ -226,7 +226,7 @@ def _find_repeated(depths: Mapping[Path, int]) -> list[Path]:
 
 
 def _distinct(names: Iterable[str]) -> Iterator[str]:
-    taken = set(TAKEN)
+    taken = set(TAKEN_NAMES)
     for name in names:
         plain = "".join(char if char.isprintable() and char not in '\\/:*?"<>|' else "_" for char in name)
         plain = plain if plain.strip(". ") and not plain.lower().startswith(".cfmkit") else f"spec{plain}"
@@ -288,11 +288,13 @@ def message(entries: Sequence[Entry]) -> str:
     '2 specs: 1 ok, 1 skipped'
     """
     counts = Counter(outcome(one) for one in entries)
-    reported = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), TIMED_OUT, SKIPPED) if counts[word])
+    reported = ", ".join(
+        f"{counts[word]} {word}" for word in (*OUTCOME_WORDS.values(), TIMED_OUT, SKIPPED_STATUS) if counts[word]
+    )
     return f"{len(entries)} spec{'s' * (len(entries) != 1)}: {reported}"
 
 
-OUTCOMES = {
+OUTCOME_WORDS = {
     ExitCode.OK: "ok",
     ExitCode.REQUIREMENT_MISSED: "missed",
     ExitCode.PARTIAL: "partial",
@@ -312,4 +314,4 @@ def outcome(one: Entry) -> str:
     """Return in a word how a specification ended."""
     if one.status == Status.TIMEOUT.key:
         return TIMED_OUT
-    return SKIPPED if one.skipped else OUTCOMES.get(one.code, "failed")
+    return SKIPPED_STATUS if one.skipped else OUTCOME_WORDS.get(one.code, "failed")

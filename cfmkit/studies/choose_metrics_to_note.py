@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE
+from cfmkit.families.base import ENVELOPE_METRICS
 from cfmkit.metrics import definition_of, definitions, metrics_by_name, values_of_family
 from cfmkit.metrics.spread import STATIC_BALANCE
 from cfmkit.studies.point_evaluation import Metric, Study
@@ -69,7 +69,7 @@ def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:
     lasting = getattr(spec, "durability", None)
     lives = () if lasting is not None and lasting.fatigue is not None else NEED_FATIGUE
     followed = () if getattr(spec, "target_curve", None) is not None else NEED_CURVE
-    by_name = (STATIC_BALANCE, *ENVELOPE)
+    by_name = (STATIC_BALANCE, *ENVELOPE_METRICS)
     return frozenset((*followed, *(() if stressed else NEED_STRESS), *lives, *NEED_TIME, *by_name))
 
 

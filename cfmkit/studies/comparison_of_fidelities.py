@@ -15,7 +15,7 @@ from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import window_of, windows_judged
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.compare import PLACES, Compared, largest, mean, rms
+from cfmkit.metrics.compare import N_COMPARED_PLACES, Compared, largest, mean, rms
 from cfmkit.metrics.compare import compare as compare_sides
 from cfmkit.results import Finding, Status
 
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Spec
 
-PATH = "analysis.fidelity"
+FIDELITY_KEY = "analysis.fidelity"
 
-OPTION = "--compare-fidelity"
+FIDELITY_OPTION = "--compare-fidelity"
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class FidelityComparison:
     def _measures(self, item: Variant) -> Mapping[str, Measure]:
         window = self.differences(item).window
         over = f" over {span_text(window.lo, window.hi, self.kind)}" if window else ""
-        what = f"({item.name} - {self.finest}) {{}}, at {PLACES} even places{over}"
+        what = f"({item.name} - {self.finest}) {{}}, at {N_COMPARED_PLACES} even places{over}"
         return {
             "fidelity_rms": (rms, f"root mean square of {what}"),
             "fidelity_max": (largest, f"value largest in magnitude of {what}"),
@@ -148,16 +148,16 @@ def choices_of(spec: Spec) -> Choices:
     record = family(spec.family)
     names = tuple(record.models)
     if len(names) < 2:
-        raise UsageError(f"{OPTION}: {record.phrase} has only one model: there is nothing to compare")
+        raise UsageError(f"{FIDELITY_OPTION}: {record.phrase} has only one model: there is nothing to compare")
     specs, obstacles = {}, {}
     for name in names:
         try:
-            specs[name] = spec.replace({PATH: name})
+            specs[name] = spec.replace({FIDELITY_KEY: name})
         except SpecError as error:
             obstacles[name] = "; ".join(problem.message for problem in error.problems)
     if len(specs) < 2:
         reported = "; ".join(f"{name!r} cannot run here: {why}" for name, why in obstacles.items())
-        raise SpecError([Problem(OPTION, 0, 0, "", f"needs two models; {reported}")])
+        raise SpecError([Problem(FIDELITY_OPTION, 0, 0, "", f"needs two models; {reported}")])
     return Choices(names, specs, obstacles)
 
 
@@ -188,9 +188,9 @@ def fidelity_of(result: Result) -> str:
         If the family does not write it into the specification of its results.
     """
     # A result that failed early has the specification as it was given: there the family's own rule applies.
-    name = result.spec.get_value(PATH) or getattr(result.spec, "fidelity", None)
+    name = result.spec.get_value(FIDELITY_KEY) or getattr(result.spec, "fidelity", None)
     if not isinstance(name, str):
-        raise CfmError(f"a result of the family {result.spec.family} does not say its {PATH}")
+        raise CfmError(f"a result of the family {result.spec.family} does not say its {FIDELITY_KEY}")
     return name
 
 

@@ -25,7 +25,7 @@ from cfmkit.studies.row_blocks_for_journal import (
     record,
 )
 from cfmkit.studies.serial_and_cluster_executors import Lost, serial
-from cfmkit.studies.variants_in_rows import BLOCK, are_solved_together, evaluate_rows
+from cfmkit.studies.variants_in_rows import BLOCK_SIZE, are_solved_together, evaluate_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Study
     from cfmkit.studies.serial_and_cluster_executors import Executor
 
-JOBS = 64
+TARGET_JOB_COUNT = 64
 """Blocks that a study is cut into unless they become too large, or too small."""
 
-TOGETHER, SHARES = 256, 12
+MAX_POINTS_PER_TASK, MIN_TASKS = 256, 12
 """Points that small blocks are computed together up to, where that leaves a dozen processes something to do.
 
 A sweep of 3600 cams takes a seventh less time per row in 256 at a time than in 64, in 1024 another fifteenth.
 """
 
-MISSING, HELD, NOTED = 0, 1, 2
+ROW_MISSING, ROW_IN_MEMORY, ROW_IN_JOURNAL = 0, 1, 2
 """Where a row is: nowhere yet, in memory, in the journal."""
 
 
@@ -93,12 +93,12 @@ class Work:
         if self.study.curves:
             return self.smallest
         # A power of two, so that a study with a few more points has the same blocks and finds them in the journal.
-        return 1 << (min(BLOCK, max(self.smallest, len(self.plan) // JOBS)).bit_length() - 1)
+        return 1 << (min(BLOCK_SIZE, max(self.smallest, len(self.plan) // TARGET_JOB_COUNT)).bit_length() - 1)
 
     @property
     def together(self) -> int:
         """Number of points that a process computes at once: those of one block, or of a few small ones."""
-        few = min(TOGETHER, len(self.plan) // SHARES) // self.step
+        few = min(MAX_POINTS_PER_TASK, len(self.plan) // MIN_TASKS) // self.step
         return self.step * (max(1, few) if self.vectorised and not self.study.curves else 1)
 
     def jobs(self) -> Iterator[Job]:
@@ -169,7 +169,7 @@ class Records:
     def __init__(self, work: Work, journal: Journal | Memory) -> None:
         """Start without rows."""
         self.work, self._journal = work, journal
-        self._places = np.full(len(work.plan), MISSING, dtype=np.uint8)
+        self._places = np.full(len(work.plan), ROW_MISSING, dtype=np.uint8)
         self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
         self._held: dict[int, ResultRows] = {}
         self.reused = self.bugs = 0
@@ -182,7 +182,7 @@ class Records:
     @property
     def finished(self) -> int:
         """Number of points that have a row."""
-        return int((self._places != MISSING).sum())
+        return int((self._places != ROW_MISSING).sum())
 
     def recall(self, job: Job) -> ResultRows | None:
         """Return rows that the journal had from before, and remember them; None if it had not."""
@@ -202,16 +202,16 @@ class Records:
             self._journal.add(job.key, record(rows))
             self._mark_noted(job)
             return
-        self._places[job.start : job.stop] = HELD
+        self._places[job.start : job.stop] = ROW_IN_MEMORY
         self._held[job.start] = rows
         self.bugs += len(rows.bugs)
         self.bug = self.bug or next(iter(rows.bugs.values()), "")
 
     def _mark_noted(self, job: Job) -> None:
-        self._places[job.start : job.stop] = NOTED
+        self._places[job.start : job.stop] = ROW_IN_JOURNAL
         self._keys[job.start : job.stop] = np.frombuffer(bytes.fromhex(job.key), dtype=np.uint8)
 
-    def batches(self, size: int = BLOCK) -> Iterator[tuple[NDArray[np.int64], ResultRows]]:
+    def batches(self, size: int = BLOCK_SIZE) -> Iterator[tuple[NDArray[np.int64], ResultRows]]:
         """Yield (indices of points, their rows) in order, about `size` at a time; unfinished points are left out."""
         starts: list[NDArray[np.int64]] = []
         parts: list[ResultRows | Row] = []
@@ -239,16 +239,16 @@ class Records:
         at = 0
         while at < len(self._places):
             place = int(self._places[at])
-            if place == MISSING:
+            if place == ROW_MISSING:
                 at += 1
                 continue
-            part = self._held[at] if place == HELD else self._read(at)
+            part = self._held[at] if place == ROW_IN_MEMORY else self._read(at)
             yield at, part
             at += 1 if isinstance(part, Row) else len(part)
 
     def noted_keys(self) -> Iterator[bytes]:
         """Yield the keys of all rows that are in the journal; rows of one block have the same."""
-        noted = self._keys[self._places == NOTED]
+        noted = self._keys[self._places == ROW_IN_JOURNAL]
         first = np.append(True, (noted[1:] != noted[:-1]).any(axis=1))[: len(noted)]
         yield from (key.tobytes() for key in noted[first])
 
@@ -265,7 +265,7 @@ class Records:
 
     def row(self, index: int) -> ResultRows:
         """Return the row of one finished point."""
-        if int(self._places[index]) == HELD:
+        if int(self._places[index]) == ROW_IN_MEMORY:
             start = max(at for at in self._held if at <= index)
             return cut_rows(self._held[start], index - start, index - start + 1)
         rows, start = self.work.recall(self._read_record(index)), index - index % self.work.step

@@ -1,6 +1,6 @@
 """Findings of studies: command -> name -> meaning."""
 
-FINDINGS = {
+STUDY_FINDINGS = {
     "sensitivity": {
         "failed_samples": "samples have no result: indices that need them are not stated; as parts they are bad",
         "not_stated": "indices or tolerances that cannot be stated are empty",

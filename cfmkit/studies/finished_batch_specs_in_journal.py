@@ -17,21 +17,21 @@ from cfmkit.errors import ExitCode, OutputError
 from cfmkit.families import origins
 from cfmkit.results import Status
 from cfmkit.store import Manifest, file_hash, origin, stable_hash
-from cfmkit.store.file_names_and_overwrite_checks import MANIFEST
-from cfmkit.store.lock import LOCK
-from cfmkit.store.transaction import RUN
+from cfmkit.store.file_names_and_overwrite_checks import MANIFEST_NAME
+from cfmkit.store.lock import LOCK_NAME
+from cfmkit.store.transaction import TRANSACTION_FOLDER
 from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 if TYPE_CHECKING:
     from cfmkit.designing.run_many_starts import Notes
 
-RECORDS = 1
+RECORD_VERSION = 1
 """How records are written: those of another number are not found."""
 
-LIBRARIES = ("SALib", "PyYAML", "ezdxf", "matplotlib", "numpy", "pint", "pydantic", "scipy", "shapely")
+FILE_LIBRARIES = ("SALib", "PyYAML", "ezdxf", "matplotlib", "numpy", "pint", "pydantic", "scipy", "shapely")
 """Those that can change a file of a run."""
 
-KEPT = (ExitCode.OK, ExitCode.INVALID, ExitCode.NO_SOLUTION, ExitCode.PARTIAL, ExitCode.REQUIREMENT_MISSED)
+KEPT_CODES = (ExitCode.OK, ExitCode.INVALID, ExitCode.NO_SOLUTION, ExitCode.PARTIAL, ExitCode.REQUIREMENT_MISSED)
 """Ends that would be the same tomorrow; a full disk, a folder in use, a time-out or a bug may not."""
 
 
@@ -51,7 +51,7 @@ class KeptRuns:
     def __init__(self, out: str, options: list[Any], notes: Notes) -> None:
         """Nothing is read yet."""
         self._out, self._notes = out, notes
-        self._about = stable_hash([RECORDS, options, origin(LIBRARIES), origins()])
+        self._about = stable_hash([RECORD_VERSION, options, origin(FILE_LIBRARIES), origins()])
         self._asked: dict[str, str | None] = {}
 
     def recall(self, spec: str, folder: str) -> Entry | None:
@@ -76,12 +76,12 @@ class KeptRuns:
     def keep(self, entry: Entry) -> None:
         """Note how a specification ended, unless that may be different tomorrow."""
         key = self._asked.get(entry.folder)
-        if key is None or entry.code not in KEPT or entry.status == Status.TIMEOUT.key:
+        if key is None or entry.code not in KEPT_CODES or entry.status == Status.TIMEOUT.key:
             return
         # The file may have been saved while it was computed; what was found is then of neither text.
         if self._key(entry.spec, entry.folder) != key:
             return
-        manifest = file_hash(Path(self._out, entry.folder, MANIFEST)) if entry.written else None
+        manifest = file_hash(Path(self._out, entry.folder, MANIFEST_NAME)) if entry.written else None
         self._notes.add(key, {"entry": entry.as_json(), "data": list(entry.data), "manifest": manifest})
 
     def _key(self, spec: str, folder: str) -> str | None:
@@ -98,7 +98,11 @@ class KeptRuns:
         place = Path(self._out, folder)
         if manifest is None:
             return True
-        if os.path.lexists(place / RUN) or os.path.lexists(place / LOCK) or file_hash(place / MANIFEST) != manifest:
+        if (
+            os.path.lexists(place / TRANSACTION_FOLDER)
+            or os.path.lexists(place / LOCK_NAME)
+            or file_hash(place / MANIFEST_NAME) != manifest
+        ):
             return False
         try:
             found = Manifest.read(place)

@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 SYNC_INTERVAL = 1.0
 """Seconds after which the file is brought down to the disk."""
 
-PATIENCE = 60.0
+WRITER_TIMEOUT = 60.0
 """Seconds to wait for another writer, which may be making a large file small."""
 
-_LOG = logging.getLogger("cfmkit.studies")
-_TABLE = "CREATE TABLE IF NOT EXISTS records (key BLOB PRIMARY KEY, session INTEGER, record BLOB) WITHOUT ROWID"
-_REASONS = {
+_STUDIES_LOG = logging.getLogger("cfmkit.studies")
+_CREATE_TABLE = "CREATE TABLE IF NOT EXISTS records (key BLOB PRIMARY KEY, session INTEGER, record BLOB) WITHOUT ROWID"
+_ERROR_REASONS = {
     "SQLITE_FULL": "the disk is full",
     "SQLITE_READONLY": "permission denied",
     "SQLITE_CANTOPEN": "permission denied, or it is no ordinary file",
@@ -70,7 +70,7 @@ class Journal:
                     raise
                 _remove(self.path)
                 self._open()
-                _LOG.warning("journal  %s was damaged: everything is computed again", quote_path(self.path))
+                _STUDIES_LOG.warning("journal  %s was damaged: everything is computed again", quote_path(self.path))
         self._forget_older()
         return self
 
@@ -84,7 +84,7 @@ class Journal:
         if empty:
             _remove(self.path)
         if self.damaged:
-            _LOG.warning("journal  damaged records that were computed again: %d", self.damaged)
+            _STUDIES_LOG.warning("journal  damaged records that were computed again: %d", self.damaged)
 
     def __len__(self) -> int:
         """Return the number of records in the file."""
@@ -151,13 +151,13 @@ class Journal:
         """Open the database and check it; on failure it is closed."""
         alone = not locks_can_be_used(self.path.parent)
         place = f"{self.path.absolute().as_uri()}{'?nolock=1' if alone else ''}"
-        self._db = sqlite3.connect(place, PATIENCE, isolation_level=None, check_same_thread=False, uri=True)
+        self._db = sqlite3.connect(place, WRITER_TIMEOUT, isolation_level=None, check_same_thread=False, uri=True)
         try:
             if alone:  # the log then needs no memory that processes share
                 self._db.execute("PRAGMA locking_mode=EXCLUSIVE")
             for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "temp_store=MEMORY"):
                 self._db.execute(f"PRAGMA {pragma}").fetchall()
-            self._db.execute(_TABLE)
+            self._db.execute(_CREATE_TABLE)
             if self._db.execute("PRAGMA quick_check(1)").fetchone() != ("ok",):
                 raise _Damaged
             self._known = self._newest_session()
@@ -185,7 +185,9 @@ class Journal:
         older = self.path.with_suffix(".jsonl")
         if older != self.path and older.is_file() and not older.is_symlink():
             discard(older)
-            _LOG.warning("journal  that of an earlier version of cfmkit is not read: its points are computed again")
+            _STUDIES_LOG.warning(
+                "journal  that of an earlier version of cfmkit is not read: its points are computed again"
+            )
 
     @contextmanager
     def _reporting(self, doing: str) -> Iterator[None]:
@@ -194,7 +196,7 @@ class Journal:
             yield
         except sqlite3.Error as error:
             name = _name_of(error)
-            why = next((text for start, text in _REASONS.items() if name.startswith(start)), str(error))
+            why = next((text for start, text in _ERROR_REASONS.items() if name.startswith(start)), str(error))
             raise OutputError(f"cannot {doing} {quote_path(self.path)}: {why}") from error
 
 

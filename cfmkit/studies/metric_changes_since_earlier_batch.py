@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, UsageError, visible
 from cfmkit.metrics import flat_metrics
-from cfmkit.metrics.compare import TOLERANCE, Compared, MetricChange, compare
+from cfmkit.metrics.compare import COMPARISON_RTOL, Compared, MetricChange, compare
 from cfmkit.results import Status
 from cfmkit.tables import Table, TableColumn, text_column
 
@@ -80,7 +80,7 @@ def _read_json(path: str) -> dict[str, Any] | None:
 
 
 def changes(
-    known: Known, entries: Sequence[Entry], folder: str, tolerance: float = TOLERANCE
+    known: Known, entries: Sequence[Entry], folder: str, tolerance: float = COMPARISON_RTOL
 ) -> tuple[MetricChange, ...]:
     """Return what is not as it was, in the order of the specifications and their metrics.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.study import figures
-from cfmkit.plots.study_data_to_draw import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
+from cfmkit.plots.study_data_to_draw import PERCENT_DIMENSION, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.results import Status
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
@@ -91,7 +91,7 @@ def _drawn_scale(metric: Metric, values: FloatArray) -> DrawnScale:
 def measured_scale(name: str, dimension: str, values: FloatArray) -> DrawnScale:
     """Return a metric in border units as it is drawn: shares in per cent, as the page says them."""
     if dimension == "ratio":
-        return DrawnScale(name, PERCENT, 100.0 * values)
+        return DrawnScale(name, PERCENT_DIMENSION, 100.0 * values)
     return DrawnScale(name, dimension, values)
 
 

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
 
-RECORDS = 4
+RECORD_VERSION = 4
 """How records of the journal are written: those of another number are computed again."""
 
 _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
@@ -131,7 +131,7 @@ class Study:
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
-        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.findings, self.made]
+        about = [RECORD_VERSION, self.paths, noted, self.design, self.curves, self.seed, self.findings, self.made]
         about += [computing, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 

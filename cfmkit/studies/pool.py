@@ -27,7 +27,7 @@ from cfmkit.errors import CfmError, UsageError
 from cfmkit.numerics.one_blas_thread import ONE_THREAD
 from cfmkit.results import Status
 from cfmkit.studies import worker_process
-from cfmkit.studies.serial_and_cluster_executors import BUG, Lost, never
+from cfmkit.studies.serial_and_cluster_executors import BUG_PREFIX, Lost, never
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -38,15 +38,15 @@ if TYPE_CHECKING:
 
     Messages = SimpleQueue[tuple["_Worker", bytes | None]]
 
-DEATHS = 2
+MAX_WORKER_DEATHS = 2
 """A job is given up after so many of its workers have died."""
 
-PATIENCE = 0.1
+POLL_INTERVAL = 0.1
 """Seconds between two looks at the clock and at whether to stop."""
 
-OVER = "the time allowed for all jobs was used up"
+OUT_OF_TIME_MESSAGE = "the time allowed for all jobs was used up"
 
-QUICK, AHEAD = 0.02, 4
+QUICK_JOB_DURATION, JOBS_AHEAD = 0.02, 4
 """Jobs that take less than so many seconds are handed out so many at a time: the pipe is never empty."""
 
 MOST_STILLBORN = {True: 60, False: 4}
@@ -158,7 +158,7 @@ class _Crew:
         return any(one.given for one in self.workers)
 
     def _ahead(self) -> int:
-        return AHEAD if self.pace is not None and self.pace < QUICK else 1
+        return JOBS_AHEAD if self.pace is not None and self.pace < QUICK_JOB_DURATION else 1
 
     def _next(self) -> Any:
         """Return the next job, None if there is none now."""
@@ -173,7 +173,7 @@ class _Crew:
     def collect_finished(self) -> Iterator[tuple[Any, Any]]:
         """Yield what has finished since the last look, or nothing after a short while."""
         with suppress(Empty):
-            one, message = self.messages.get(timeout=PATIENCE)
+            one, message = self.messages.get(timeout=POLL_INTERVAL)
             while True:
                 if one in self.workers:
                     yield from self._remove_worker(one) if message is None else self._handle_message(one, message)
@@ -182,17 +182,17 @@ class _Crew:
 
     def _handle_message(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
         kind, rest = message[:1], message[1:]
-        if kind == worker_process.READY:
+        if kind == worker_process.READY_MESSAGE:
             one.begin()
-        elif kind == worker_process.STARTED:
+        elif kind == worker_process.STARTED_MESSAGE:
             one.started, self.stillborn = time.monotonic(), 0
         else:
             took = time.monotonic() - (one.started or 0.0)
             self.pace = took if self.pace is None else 0.9 * self.pace + 0.1 * took
             one.started = None
             job, outcome = one.given.popleft(), pickle.loads(rest)
-            if kind == worker_process.BROKEN:
-                outcome = Lost(Status.CRASHED, f"{BUG}{outcome[0]}", outcome[1])
+            if kind == worker_process.BROKEN_MESSAGE:
+                outcome = Lost(Status.CRASHED, f"{BUG_PREFIX}{outcome[0]}", outcome[1])
             yield job, outcome
 
     def _remove_worker(self, one: _Worker) -> Iterator[tuple[Any, Any]]:
@@ -203,11 +203,12 @@ class _Crew:
         if one.started is not None:
             job = one.given.popleft()
             self.deaths[job] += 1
-            if self.deaths[job] < DEATHS:
+            if self.deaths[job] < MAX_WORKER_DEATHS:
                 self.again.appendleft(job)
             else:
                 reported = (
-                    f"the process that worked on this point died {DEATHS} times ({_cause(one.process.returncode)})"
+                    f"the process that worked on this point died {MAX_WORKER_DEATHS} times "
+                    f"({_cause(one.process.returncode)})"
                 )
                 yield job, Lost(Status.CRASHED, reported)
         self.again.extend(one.given)
@@ -237,7 +238,7 @@ class _Crew:
                 job = one.given.popleft()
                 if not over:
                     self.again.extend(one.given)
-                yield job, Lost(Status.TIMEOUT, OVER if over else f"not finished within {allowed:g} s")
+                yield job, Lost(Status.TIMEOUT, OUT_OF_TIME_MESSAGE if over else f"not finished within {allowed:g} s")
 
 
 def pack_registrations() -> bytes:
@@ -295,7 +296,7 @@ def _start_worker() -> _Worker:
     given = json.dumps({"path": sys.path, "parent": parent})
     return _Worker(
         subprocess.Popen(
-            [sys.executable, "-P", "-c", worker_process.START, given],
+            [sys.executable, "-P", "-c", worker_process.WORKER_PROGRAM, given],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | ONE_THREAD,

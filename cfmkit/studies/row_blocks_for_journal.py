@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 WARNINGS_JOINT = "; "
 """Between the names of warnings in a column of a table."""
 
-_STATUS = {status.key: status for status in Status}
+_STATUS_BY_KEY = {status.key: status for status in Status}
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def recall_rows(reported: Any, metrics: int, requirements: int) -> ResultRows:
     values = unsqueeze(reported["v"], reported["n"], metrics)
     met = _mask(reported["q"], reported["n"] * requirements).reshape(reported["n"], requirements)
     curves = {int(k): _bytes(text) for k, text in reported.get("u", {}).items()}
-    odd = {int(k): (_STATUS[s], m) for k, (s, m) in reported["o"].items()}
+    odd = {int(k): (_STATUS_BY_KEY[s], m) for k, (s, m) in reported["o"].items()}
     masks = {
         name: np.unpackbits(_unpack(bits, np.uint8), count=reported["n"])
         for name, bits in reported.get("w", {}).items()
@@ -121,7 +121,9 @@ def recalled_row(reported: Any) -> Row:
     curve = _bytes(reported["u"]) if "u" in reported else b""
     noted = tuple(_unpack(reported["v"], np.float64).tolist()) if "v" in reported else ()
     met = tuple(map("1".__eq__, reported.get("q", "")))
-    return Row(_STATUS[reported["s"]], noted, met, reported.get("m", ""), curve, warnings=tuple(reported.get("w", ())))
+    return Row(
+        _STATUS_BY_KEY[reported["s"]], noted, met, reported.get("m", ""), curve, warnings=tuple(reported.get("w", ()))
+    )
 
 
 def join_rows(parts: Sequence[ResultRows]) -> ResultRows:
@@ -154,10 +156,10 @@ def cut_rows(rows: ResultRows, start: int, stop: int) -> ResultRows:
     if (start, stop) == (0, len(rows)):
         return rows
 
-    def kept(items: Mapping[int, Any]) -> dict[int, Any]:
+    def select_block(items: Mapping[int, Any]) -> dict[int, Any]:
         return {k - start: item for k, item in items.items() if start <= k < stop}
 
-    odd, curves, bugs = kept(rows.odd), kept(rows.curves), kept(rows.bugs)
+    odd, curves, bugs = select_block(rows.odd), select_block(rows.curves), select_block(rows.bugs)
     warned = {name: mask[start:stop] for name, mask in rows.warned.items()}
     return ResultRows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs, warned)
 
@@ -170,10 +172,10 @@ def _unpack(text: str, dtype: Any) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(text), dtype=dtype)
 
 
-ORDERS = 4
+N_DIFFERENCE_ORDERS = 4
 """Each column is kept as its differences of order 0, 1, 2 or 3, whichever takes the fewest bits."""
 
-_PROBED = 512
+_N_PROBED_ROWS = 512
 """Rows from which the order is chosen."""
 
 
@@ -186,10 +188,10 @@ def squeeze(values: FloatArray) -> str:
     """
     bits = np.ascontiguousarray(np.asarray(values, dtype="<f8").T).view("<u8")
     tried = [bits]
-    while len(tried) < ORDERS:
+    while len(tried) < N_DIFFERENCE_ORDERS:
         tried.append(np.diff(tried[-1], axis=1, prepend=np.uint64(0)))
     folded = [_fold_sign(one) for one in tried]
-    middle = slice(bits.shape[1] // 2, bits.shape[1] // 2 + _PROBED)
+    middle = slice(bits.shape[1] // 2, bits.shape[1] // 2 + _N_PROBED_ROWS)
     lengths = [np.log2(one[:, middle].astype(np.float64) + 1.0).sum(axis=1) for one in folded]
     order = np.argmin(lengths, axis=0).astype(np.uint8)
     chosen = np.choose(order[:, None], folded)
@@ -204,7 +206,7 @@ def unsqueeze(text: str, rows: int, columns: int) -> FloatArray:
     planes = np.frombuffer(decompress(data[columns:]), dtype=np.uint8).reshape(columns, 8, rows)
     folded = np.ascontiguousarray(planes.transpose(0, 2, 1)).reshape(columns, 8 * rows).view("<u8")
     bits = (folded >> np.uint64(1)) ^ (~(folded & np.uint64(1)) + np.uint64(1))
-    for least in range(1, ORDERS):
+    for least in range(1, N_DIFFERENCE_ORDERS):
         chosen = order >= least
         bits[chosen] = np.cumsum(bits[chosen], axis=1, dtype=np.uint64)
     values: FloatArray = np.ascontiguousarray(bits.view("<f8").T).astype(np.float64, copy=False)

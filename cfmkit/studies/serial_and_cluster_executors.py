@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     Executor = Callable[[Work, Iterator[Any], Stopping], Iterator[tuple[Any, Any]]]
 
 
-BUG = "a bug in cfmkit: "
+BUG_PREFIX = "a bug in cfmkit: "
 """What the message of a job begins with that an exception ended which cfmkit does not raise on purpose."""
 
 
@@ -57,7 +57,7 @@ class Lost:
 
 def lost_to(error: Exception) -> Lost:
     """Return the outcome of a job that a bug ended, with its traceback."""
-    return Lost(Status.CRASHED, f"{BUG}{_one_line(error)}", "".join(traceback.format_exception(error)))
+    return Lost(Status.CRASHED, f"{BUG_PREFIX}{_one_line(error)}", "".join(traceback.format_exception(error)))
 
 
 def surviving(work: Work, job: Any) -> Any:
@@ -122,12 +122,12 @@ def cores() -> int:
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
-LOCAL = "local"
-ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
-RETRIES = 1
+LOCAL_CLUSTER = "local"
+ADDRESS_PATTERN = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
+MAX_RETRIES = 1
 """Other workers that get a job after its worker has died."""
 
-AHEAD = 4
+JOBS_PER_THREAD = 4
 """Jobs under way for each thread of the cluster: none of them waits for this process."""
 
 CONNECT_WITHIN = 10
@@ -136,7 +136,7 @@ CONNECT_WITHIN = 10
 WORKERS_WITHIN = 60
 """Seconds to wait for a worker, at the start and when all have left."""
 
-PATIENCE = 0.2
+POLL_INTERVAL = 0.2
 """Seconds between two looks at whether to stop."""
 
 
@@ -163,7 +163,7 @@ class Cluster:
 
 def _refuse_odd(address: str) -> None:
     """Raise if an address cannot be one: Dask would try, and print its own errors."""
-    if address != LOCAL and not ADDRESS.fullmatch(address):
+    if address != LOCAL_CLUSTER and not ADDRESS_PATTERN.fullmatch(address):
         raise UsageError(f"--cluster {address!r} is not an address; write e.g. tcp://host:8786, or local")
 
 
@@ -175,13 +175,16 @@ def _client(address: str, workers: int) -> Iterator[Any]:
         import distributed
     except ImportError:
         raise UsageError("--cluster needs Dask: pip install distributed") from None
-    settings = {"distributed.scheduler.allowed-failures": RETRIES, "distributed.comm.timeouts.connect": CONNECT_WITHIN}
+    settings = {
+        "distributed.scheduler.allowed-failures": MAX_RETRIES,
+        "distributed.comm.timeouts.connect": CONNECT_WITHIN,
+    }
     library: Any = distributed
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(settings))
         stack.enter_context(_silent_logs())
         place: Any = address
-        if address == LOCAL:
+        if address == LOCAL_CLUSTER:
             place = stack.enter_context(
                 library.LocalCluster(
                     n_workers=workers,
@@ -204,7 +207,7 @@ def _client(address: str, workers: int) -> Iterator[Any]:
 @contextmanager
 def _silent_logs() -> Iterator[None]:
     """Keep Dask's log messages off the screen: what concerns the user is raised."""
-    loggers = [logging.getLogger(name) for name in list(logging.root.manager.loggerDict) if _DASK.match(name)]
+    loggers = [logging.getLogger(name) for name in list(logging.root.manager.loggerDict) if _DASK_LOGGERS.match(name)]
     before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
@@ -215,8 +218,8 @@ def _silent_logs() -> Iterator[None]:
             logger.setLevel(level)
 
 
-_DASK = re.compile(r"(distributed|tornado)\b")
-_KEPT = "what is finished is kept: run the same command again to continue"
+_DASK_LOGGERS = re.compile(r"(distributed|tornado)\b")
+_RESUME_MESSAGE = "what is finished is kept: run the same command again to continue"
 
 
 class _ClusterRun:
@@ -237,7 +240,7 @@ class _ClusterRun:
         empty = False
         while True:
             threads = self._threads()
-            while not (empty or stopping()) and len(self.under_way) < AHEAD * max(1, threads):
+            while not (empty or stopping()) and len(self.under_way) < JOBS_PER_THREAD * max(1, threads):
                 job = next(jobs, None)
                 empty = job is None
                 if job is not None:
@@ -245,7 +248,7 @@ class _ClusterRun:
             if not self.under_way:
                 return
             with suppress(Empty):
-                future, job = self.under_way.pop(self.finished.get(timeout=PATIENCE).key)
+                future, job = self.under_way.pop(self.finished.get(timeout=POLL_INTERVAL).key)
                 yield job, self._outcome(future)
 
     def _submit(self, job: Any) -> None:
@@ -267,10 +270,12 @@ class _ClusterRun:
         if error is None:
             raise self._build_error()
         if type(error).__name__ == "KilledWorker":
-            return Lost(Status.CRASHED, f"the workers that worked on this point died {RETRIES + 1} times")
+            return Lost(Status.CRASHED, f"the workers that worked on this point died {MAX_RETRIES + 1} times")
         # `do_parcel` lets no error of a point out: this worker could not even read the job.
         self._refuse_other_code()
-        raise UsageError(f"--cluster {self.address}: a worker cannot do this study ({_one_line(error)}); {_KEPT}")
+        raise UsageError(
+            f"--cluster {self.address}: a worker cannot do this study ({_one_line(error)}); {_RESUME_MESSAGE}"
+        )
 
     def _threads(self) -> int:
         """Return how many threads the workers have.
@@ -285,7 +290,7 @@ class _ClusterRun:
         if threads:
             self.last_worker = time.monotonic()
         elif time.monotonic() - self.last_worker > WORKERS_WITHIN:
-            raise self._no_workers(f"; {_KEPT}")
+            raise self._no_workers(f"; {_RESUME_MESSAGE}")
         return threads
 
     def _wait_for_workers(self) -> None:
@@ -313,7 +318,7 @@ class _ClusterRun:
             raise self._build_error() from None
 
     def _build_error(self) -> UsageError:
-        return UsageError(f"--cluster {self.address}: the Dask scheduler has gone; {_KEPT}")
+        return UsageError(f"--cluster {self.address}: the Dask scheduler has gone; {_RESUME_MESSAGE}")
 
     def _refuse_other_code(self) -> None:
         """Raise if a worker that is there now has other code; it may be too old to compare stamps itself."""

@@ -189,8 +189,8 @@ def decimals_of(accuracy: ProcessAccuracy) -> int:
 
     Examples
     --------
-    >>> from cfmkit.stock.processes import PROCESSES
-    >>> {name: decimals_of(process) for name, process in PROCESSES.items()}
+    >>> from cfmkit.stock.processes import PROCESSES_BY_NAME
+    >>> {name: decimals_of(process) for name, process in PROCESSES_BY_NAME.items()}
     {'laser': 3, 'wire-edm': 4, 'fdm': 3, 'sls': 3, 'mill': 3}
     """
     deviation = min(entry for entry in (accuracy.thickness, accuracy.position, 1e-3) if entry > 0.0)

@@ -35,7 +35,7 @@ MOST_SHOWN = 4
 """Metrics that are drawn."""
 
 
-TIE = 1e-9
+TIE_RTOL = 1e-9
 """Points whose values differ by less than this, relative to the value, count as equally good."""
 
 
@@ -60,7 +60,7 @@ class Objective:
 
     def slack(self, score: float) -> float:
         """Return by how much scores may differ that count as equally good."""
-        return TIE * max(abs(score), abs(self.middle or 0.0))
+        return TIE_RTOL * max(abs(score), abs(self.middle or 0.0))
 
 
 def objective(study: Study) -> Objective | None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MOST_CURVES = 100
 """Curves in one picture; of studies with more points only the metrics are drawn."""
 
-NOTHING = "nothing to vary: give --vary '{example}', or add a block 'sweep: {vary: {...}}' to the spec"
+NOTHING_TO_VARY = "nothing to vary: give --vary '{example}', or add a block 'sweep: {vary: {...}}' to the spec"
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
     block = spec.sweep
     asked = request.vary or (collect_variations(block.vary) if block else ())
     if not asked:
-        raise UsageError(NOTHING.replace("{example}", _example(spec)))
+        raise UsageError(NOTHING_TO_VARY.replace("{example}", _example(spec)))
     plan = _plan(spec, request, asked)
     design = _is_given(request.design, block.design if block else False)
     drawn = request.pictures and len(plan.variables) == 1 and len(plan) <= MOST_CURVES

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 Value = float | int | str | bool
 Kind = Literal["quantity", "number", "whole", "word", "switch"]
 
-FIXED = ("cfmkit", "family", "name", "description", "requirements", "sweep", "sensitivity")
+FIXED_BLOCKS = ("cfmkit", "family", "name", "description", "requirements", "sweep", "sensitivity")
 """Blocks of a specification that do not describe the mechanism or its analysis."""
 
-NAME = "NAME"
+NAME_PLACEHOLDER = "NAME"
 """Stands for any name of a block's own choosing in a path, as the name of a beam."""
 
-_DEEPEST = 8
+_MAX_DEPTH = 8
 
 
 class CannotVary(ValueError):
@@ -111,7 +111,7 @@ def leaf(spec_type: type[Spec], path: str) -> Leaf:
     """
     here: tuple[Slot, ...] = (Slot(spec_type),)
     parts = path.split(".")
-    if parts[0] in FIXED:
+    if parts[0] in FIXED_BLOCKS:
         raise CannotVary(f"{parts[0]!r} is nothing to vary: it is not part of the mechanism or its analysis")
     for depth, part in enumerate(parts):
         key: str | int = int(part) if part.isdecimal() and part.isascii() and len(part) < 10 else part
@@ -152,7 +152,7 @@ def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...
     if near:
         return f"there is no {path!r}; did you mean {near[0]!r}?"
     names = [name for slot in here if slot.model is not None for name in slot.model.model_fields]
-    inside = [name for name in names if above or name not in FIXED]
+    inside = [name for name in names if above or name not in FIXED_BLOCKS]
     where = f"below {above!r} there are" if above else "a path starts with"
     return f"there is no {path!r}; {where} {', '.join(inside)}" if inside else f"there is nothing below {above!r}"
 
@@ -160,18 +160,18 @@ def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...
 def paths(spec_type: type[Spec]) -> Iterator[str]:
     """Yield the path of every leaf that can be varied; items of lists as ``.0``, of named ones as ``.NAME``."""
     for name in spec_type.model_fields:
-        if name not in FIXED:
+        if name not in FIXED_BLOCKS:
             yield from _paths_below(Slot(spec_type).child(name), name, 1)
 
 
 def _paths_below(slots: tuple[Slot, ...], path: str, depth: int) -> Iterator[str]:
     if any(_kind(slot) for slot in slots):
         yield path
-    for slot in slots if depth < _DEEPEST else ():
+    for slot in slots if depth < _MAX_DEPTH else ():
         if slot.model is not None:
             for name in slot.model.model_fields:
                 yield from _paths_below(slot.child(name), f"{path}.{name}", depth + 1)
         elif slot.origin in (tuple, list):
             yield from _paths_below(slot.child(0), f"{path}.0", depth + 1)
         elif slot.origin is dict:
-            yield from _paths_below(slot.child(NAME), f"{path}.{NAME}", depth + 1)
+            yield from _paths_below(slot.child(NAME_PLACEHOLDER), f"{path}.{NAME_PLACEHOLDER}", depth + 1)

@@ -11,7 +11,7 @@ from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.rows import Variants, valid
 from cfmkit.metrics import other_name, split_name
-from cfmkit.metrics.branches_cut_to_window import TOLERANCE
+from cfmkit.metrics.branches_cut_to_window import WINDOW_RTOL
 from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.metrics.requirements import Bounds
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     ByBranch = Mapping[str, FloatArray]
 
 
-BLOCK = 4096
+BLOCK_SIZE = 4096
 """Points that are evaluated and noted together."""
 
 _OF_WINDOWS = ("analysis.window", "requirements")
@@ -107,7 +107,7 @@ class SolvedVariants:
         for ends in zip(*windows, strict=True):
             low, high = self._places(ends) or (0.0, 0.0)
             for curves in self.solved.branches.values():
-                slack = TOLERANCE * (high - low)
+                slack = WINDOW_RTOL * (high - low)
                 good &= (curves.extent[0] <= low + slack) & (curves.extent[1] >= high - slack)
         return good
 
@@ -189,7 +189,7 @@ def _window_places(ends: Ends, start: FloatArray, stop: FloatArray) -> tuple[Flo
     return None if (low == high).any() else (low, high)
 
 
-SMALLEST, SMALLEST_TRACED = 64, 8
+MIN_BLOCK_SIZES, SMALLEST_TRACED = 64, 8
 """Points in a block at least, of closed forms and of traced models: a traced one takes milliseconds."""
 
 
@@ -209,7 +209,7 @@ def are_solved_together(study: Study, plan: Plan) -> int:
         return 0
     if not together or (study.curves and traced):
         return 0
-    return SMALLEST_TRACED if traced else SMALLEST
+    return SMALLEST_TRACED if traced else MIN_BLOCK_SIZES
 
 
 def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:

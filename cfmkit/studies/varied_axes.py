@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.variable_paths import Value
 
-EXAMPLE = "write e.g. --vary 'mechanism.roller_radius=8 mm:16 mm:5' or --vary 'a.b=[1 mm, 2 mm]'"
-LARGEST = 10**18
+VARY_EXAMPLE = "write e.g. --vary 'mechanism.roller_radius=8 mm:16 mm:5' or --vary 'a.b=[1 mm, 2 mm]'"
+MAX_COUNT = 10**18
 """No count is larger than this: whatever reads it stays a plain integer."""
 
 
@@ -59,9 +59,9 @@ def parse_variation(option: str) -> WantedVariation:
 
     path, equals, content = (part.strip() for part in option.partition("="))
     if not equals or not content:
-        raise UsageError(f"--vary {quote(option)}: no values; {EXAMPLE}")
+        raise UsageError(f"--vary {quote(option)}: no values; {VARY_EXAMPLE}")
     if not path or not all(part.strip() for part in path.split(".")):
-        raise UsageError(f"--vary {quote(option)}: {quote(path)} is not a dotted path; {EXAMPLE}")
+        raise UsageError(f"--vary {quote(option)}: {quote(path)} is not a dotted path; {VARY_EXAMPLE}")
     source = f"--vary {path}"
     if not content.startswith("["):
         return WantedVariation(path, content, source)
@@ -201,7 +201,7 @@ def _end(found: Leaf, text: str) -> tuple[Any, str]:
 def _count(text: str) -> int:
     if not (text.isascii() and text.isdigit()):
         raise CannotVary(f"{text!r} is not a number of values; write e.g. 11")
-    count = int(text) if len(text) < 19 else LARGEST
+    count = int(text) if len(text) < 19 else MAX_COUNT
     if count < 2:
         raise CannotVary(f"a range has at least 2 values, not {count}")
     return count

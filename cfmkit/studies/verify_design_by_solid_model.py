@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-FIDELITY = "analysis.fidelity"
-DIGITS = 7
+FIDELITY_KEY = "analysis.fidelity"
+WIDTH_DIGITS = 7
 """Significant ones of a corrected width: a tenth of a micrometre in a metre."""
 
 AT_END = {"design.rescale.force": "nominal_force"}
@@ -61,7 +61,7 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
         return design
     record = family(given.family)
     try:
-        as_solid = design.spec.replace({FIDELITY: "solid"})
+        as_solid = design.spec.replace({FIDELITY_KEY: "solid"})
     except SpecError as error:
         reported = "; ".join(problem.message for problem in error.problems)
         return Design(None, Status.INVALID, f"design.verify: this design cannot be analysed as a solid: {reported}")
@@ -82,7 +82,7 @@ def verify_by_solid(given: Spec, design: Design, run: Run) -> Design:
     )
     if _sheet(as_solid):
         return _relevel(given, design, as_solid, path, factor, begun, run)
-    corrected = {path: float(f"{factor * width:.{DIGITS}g}") for path, width in _widths(as_solid).items()}
+    corrected = {path: float(f"{factor * width:.{WIDTH_DIGITS}g}") for path, width in _widths(as_solid).items()}
     outside = _explain_outside(given, design.spec, corrected)
     if outside is not None:
         return outside
@@ -117,7 +117,7 @@ def _relevel(
     if again.spec is None:
         return replace(again, message=f"design.verify: for a solid of {format_short(wanted, 'force')}, {again.message}")
     # what is wanted stays what is wanted
-    made = again.spec.replace({path: wanted, FIDELITY: "solid"})
+    made = again.spec.replace({path: wanted, FIDELITY_KEY: "solid"})
     other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
     note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
     if (

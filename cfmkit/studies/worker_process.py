@@ -22,13 +22,13 @@ from typing import IO, Any
 
 from cfmkit.studies.serial_and_cluster_executors import garbage_collector
 
-START = (
+WORKER_PROGRAM = (
     "import json, sys; given = json.loads(sys.argv[1]); sys.path[:] = given['path']; "
     "from cfmkit.studies.worker_process import main; main(given['parent'])"
 )
 """The program of a worker; its only argument says where to find modules and whose process it is."""
 
-READY, STARTED, DONE, BROKEN = b"r", b"s", b"d", b"b"
+READY_MESSAGE, STARTED_MESSAGE, DONE_MESSAGE, BROKEN_MESSAGE = b"r", b"s", b"d", b"b"
 LENGTH_BYTES = 8
 
 
@@ -84,21 +84,21 @@ def _pipes() -> tuple[IO[bytes], IO[bytes]]:
 
 
 def _serve(work: Any, received: SimpleQueue[bytes], outlet: IO[bytes]) -> None:
-    send(outlet, READY)
+    send(outlet, READY_MESSAGE)
     with garbage_collector() as collect:
         while True:
             job = pickle.loads(received.get())
-            send(outlet, STARTED)
+            send(outlet, STARTED_MESSAGE)
             send(outlet, _outcome(work, job))
             collect()
 
 
 def _outcome(work: Any, job: Any) -> bytes:
     try:
-        return DONE + pickle.dumps(work(job), pickle.HIGHEST_PROTOCOL)
+        return DONE_MESSAGE + pickle.dumps(work(job), pickle.HIGHEST_PROTOCOL)
     except Exception as error:
         reported = " ".join(f"{type(error).__name__}: {error}".split())
-        return BROKEN + pickle.dumps((reported, "".join(traceback.format_exception(error))))
+        return BROKEN_MESSAGE + pickle.dumps((reported, "".join(traceback.format_exception(error))))
 
 
 def _read_on(inlet: IO[bytes], received: SimpleQueue[bytes]) -> None:

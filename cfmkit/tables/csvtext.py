@@ -18,23 +18,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import CfmError, DataError, UsageError, reason_of
-from cfmkit.tables.table import HEADER, Cell, Table, TableColumn, Values
+from cfmkit.tables.table import HEADER_PATTERN, Cell, Table, TableColumn, Values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
 
-_CHUNK = 8192
+_CHUNK_ROWS = 8192
 """Rows that are text at one time: large enough for speed, small beside the table itself."""
 
-_INTEGER = re.compile(r"-?(?:0|[1-9][0-9]*)")
-_NUMBER = re.compile(_INTEGER.pattern + r"(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?|-?inf")
-_SPECIAL = re.compile(r'[",\r\n]')
-_FORMULA = re.compile("'*\\s*[=+\\-@\uff1d\uff0b\uff0d\uff20].", re.DOTALL)
+_INTEGER_PATTERN = re.compile(r"-?(?:0|[1-9][0-9]*)")
+_NUMBER_PATTERN = re.compile(_INTEGER_PATTERN.pattern + r"(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?|-?inf")
+_SPECIAL_CHARACTERS = re.compile(r'[",\r\n]')
+_FORMULA_START = re.compile("'*\\s*[=+\\-@\uff1d\uff0b\uff0d\uff20].", re.DOTALL)
 """How a formula begins in a spreadsheet, blanks and full-width signs included, after any number of apostrophes."""
 
-_TOKEN = re.compile(r'("(?:[^"]|"")*"|[^",\r\n]*)([,\n])')
+_TOKEN_PATTERN = re.compile(r'("(?:[^"]|"")*"|[^",\r\n]*)([,\n])')
 
 
 def to_csv(table: Table) -> bytes:
@@ -47,8 +47,8 @@ def csv_chunks(table: Table) -> Iterator[bytes]:
     lone = len(table.columns) == 1
     if table.columns:
         yield _encode_rows([[_text(header)] for header in table.headers])
-    for start in range(0, len(table), _CHUNK):
-        columns = [_texts(column.values[start : start + _CHUNK]) for column in table.columns]
+    for start in range(0, len(table), _CHUNK_ROWS):
+        columns = [_texts(column.values[start : start + _CHUNK_ROWS]) for column in table.columns]
         if lone:  # an empty line would not count as a row
             columns = [[text or '""' for text in columns[0]]]
         yield _encode_rows(columns)
@@ -76,10 +76,10 @@ def _text(cell: Cell) -> str:
         return ""
     if not isinstance(cell, str):
         return repr(cell)
-    is_number = _NUMBER.fullmatch(cell)
-    if not is_number and _FORMULA.match(cell):
+    is_number = _NUMBER_PATTERN.fullmatch(cell)
+    if not is_number and _FORMULA_START.match(cell):
         cell = f"'{cell}"
-    if is_number or _SPECIAL.search(cell):
+    if is_number or _SPECIAL_CHARACTERS.search(cell):
         return '"' + cell.replace('"', '""') + '"'
     return cell
 
@@ -142,7 +142,7 @@ def _quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
     place, start = 0, 1
     row: list[str] = []
     while place < len(text):
-        if not (token := _TOKEN.match(text, place)):
+        if not (token := _TOKEN_PATTERN.match(text, place)):
             line = 1 + text.count("\n", 0, place)
             raise DataError(f"{name}:{line}: a quote or a carriage return is out of place")
         row.append(token[1])
@@ -154,7 +154,7 @@ def _quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
 
 def _column(header: str, cells: Sequence[str]) -> TableColumn:
     """Return the column that these raw cells are."""
-    match = HEADER.fullmatch(_unquote(header))
+    match = HEADER_PATTERN.fullmatch(_unquote(header))
     if not match:
         raise CfmError(f"{_unquote(header)!r} is not a header such as 'force [N]'")
     values = _plain_floats(cells)
@@ -174,11 +174,11 @@ def _plain_floats(cells: Sequence[str]) -> FloatArray | None:
 def _value(raw: str) -> Cell:
     if not raw:
         return None
-    if _NUMBER.fullmatch(raw):
-        return int(raw) if _INTEGER.fullmatch(raw) else float(raw)
+    if _NUMBER_PATTERN.fullmatch(raw):
+        return int(raw) if _INTEGER_PATTERN.fullmatch(raw) else float(raw)
     return _unquote(raw)
 
 
 def _unquote(raw: str) -> str:
     text = raw[1:-1].replace('""', '"') if raw.startswith('"') else raw
-    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text
+    return text[1:] if text.startswith("'") and _FORMULA_START.match(text) else text

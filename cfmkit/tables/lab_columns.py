@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import DataError, QuantityError, UsageError
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.specs.units.table import COMMON, UNITS
+from cfmkit.specs.units.table import COMMON_UNIT_SIZES, UNIT_TABLE
 from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
 
-ROLES = {"time": "time", "length": "displacement", "angle": "angle", "force": "force", "torque": "torque"}
+COLUMN_ROLES = {"time": "time", "length": "displacement", "angle": "angle", "force": "force", "torque": "torque"}
 """What a column of a dimension can be."""
 
 _IN_HEADER = (
@@ -39,12 +39,12 @@ _OTHER_WORDS = {
     "°": "deg", "sec": "s", "secs": "s", "sek": "s", "micron": "um", "microns": "um", "inches": "in", "zoll": "in",
     "kilopond": "kgf", "lbsf": "lbf", "poundsforce": "lbf", "feet": "ft",
 }  # fmt: skip
-_AMBIGUOUS = {"mn"}
+_AMBIGUOUS_UNITS = {"mn"}
 """Spellings without regard to case that could be two units: mN and MN."""
 
 _NUMBERS_OF_ITEMS = {"-": "1", "": "1", "mm/mm": "1"}
 _LABEL_OF_UNITS = re.compile(r"(?i).*(unit|einheit).*")
-_WORDS = {
+_COLUMN_WORDS = {
     "time": ("time", "t", "zeit", "temps", "tiempo", "prüfzeit", "test time"),
     "length": (
         "displacement", "travel", "stroke", "position", "extension", "deflection", "crosshead", "s", "u", "x",
@@ -84,7 +84,7 @@ class ColumnInfo:
         if self.dimension is None:
             return replace(self, unit=unit, dimension=dimension_of(unit), source=source)
         if unit != self.unit:
-            verb = "give" if self.source == CELLS else "gives"
+            verb = "give" if self.source == CELLS_SOURCE else "gives"
             raise DataError(
                 f"{file}: {place}{self.source} {verb} {quote(self.name)} in {self.unit}, {source} in {unit}; correct "
                 "the one that is wrong"
@@ -92,7 +92,7 @@ class ColumnInfo:
         return self
 
 
-HEADER, UNIT_LINE, CELLS = "the header", "the line of units", "the cells"
+HEADER_SOURCE, UNIT_LINE, CELLS_SOURCE = "the header", "the line of units", "the cells"
 
 
 def read_units(text: str | None) -> dict[str, str]:
@@ -142,7 +142,7 @@ def describe(
     """
     columns = [_describe_column(index, *pair, file) for index, pair in enumerate(zip(names, unit_row, strict=True))]
     for index, unit in cells.items():
-        columns[index] = columns[index].states(unit, CELLS, file)
+        columns[index] = columns[index].states(unit, CELLS_SOURCE, file)
     for key, unit in units.items():
         index = _index(key, columns, file)
         columns[index] = replace(columns[index].states(unit, "--units", file), reported=True)
@@ -183,7 +183,7 @@ def _describe_column(index: int, text: str, below: str, file: str) -> ColumnInfo
         name, unit = text, None  # such as "Force (compression)"
     column = ColumnInfo(index, " ".join(name.strip(' "').split()) or f"column {index + 1}")
     if unit is not None:
-        column = column.states(spelt(unit), HEADER, file)
+        column = column.states(spelt(unit), HEADER_SOURCE, file)
     if under is not None and (dimension_of(under) or unit is None):
         column = column.states(spelt(under), UNIT_LINE, file)
     return column
@@ -228,11 +228,11 @@ def _bare_unit(cell: str) -> str | None:
 def _words() -> dict[str, str]:
     """Return the symbols of units of forces, lengths, angles and times by what else people write, folded."""
     found: dict[str, str] = {}
-    for unit in UNITS:
-        if unit.dimension in ROLES:
+    for unit in UNIT_TABLE:
+        if unit.dimension in COLUMN_ROLES:
             names = (unit.symbol, *unit.aliases, unit.name, unit.name + "s", unit.name.replace("meter", "metre"))
             found |= {_fold_case(word): unit.symbol for word in names if len(word) > 1}
-    return {word: symbol for word, symbol in (found | _OTHER_WORDS).items() if word not in _AMBIGUOUS}
+    return {word: symbol for word, symbol in (found | _OTHER_WORDS).items() if word not in _AMBIGUOUS_UNITS}
 
 
 def _fold_case(unit: str) -> str:
@@ -270,14 +270,14 @@ def is_known(unit: str) -> bool:
 def dimension_of(unit: str) -> str | None:
     """Return which of the dimensions of interest a unit has; None if it has none of them."""
     symbol = spelt(unit)
-    common = next((name for name in ROLES if (name, symbol) in COMMON), None)
+    common = next((name for name in COLUMN_ROLES if (name, symbol) in COMMON_UNIT_SIZES), None)
     if common or not is_unit(symbol):
         return common
     try:
         powers = unit_size(symbol).powers
     except QuantityError:
         return None
-    return next((name for name in ROLES if border_size(name).powers == powers), None)
+    return next((name for name in COLUMN_ROLES if border_size(name).powers == powers), None)
 
 
 def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> dict[str, ColumnInfo]:
@@ -308,14 +308,16 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
         candidates["time"] = beside[-1:]  # each displacement has its time
     if several := [candidates[one] for one in (*complete[0], "time") if len(candidates[one]) > 1]:
         raise DataError(_choices(several, name))
-    return {ROLES[dimension]: found[0] for dimension, found in candidates.items() if found}
+    return {COLUMN_ROLES[dimension]: found[0] for dimension, found in candidates.items() if found}
 
 
 def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInfo]:
     """Return the columns that could be of a dimension's role: those of --units, else of the usual name, else all."""
     found = [column for column in columns if column.dimension == dimension]
     found = [column for column in found if column.reported] or found
-    named = [column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _WORDS[dimension]]
+    named = [
+        column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _COLUMN_WORDS[dimension]
+    ]
     return named if len(found) > 1 and named else found
 
 
@@ -331,7 +333,7 @@ def _choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
     sets = list(zip(*several, strict=True)) if side_by_side else [(column,) for column in several[0]]
     options = " or ".join(f'--units "{",".join(map(key, chosen))}"' for chosen in sets)
     many = "; ".join(
-        f"{len(found)} columns could be the {ROLES[found[0].dimension or 'time']}: "
+        f"{len(found)} columns could be the {COLUMN_ROLES[found[0].dimension or 'time']}: "
         f"{', '.join(column.label for column in found)}"
         for found in several
     )

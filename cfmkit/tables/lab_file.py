@@ -25,7 +25,7 @@ import numpy as np
 
 from cfmkit.errors import DataError
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.tables.lab_columns import CELLS, ColumnInfo, describe, dimension_of, is_unit_row, spelt, split_header
+from cfmkit.tables.lab_columns import CELLS_SOURCE, ColumnInfo, describe, dimension_of, is_unit_row, spelt, split_header
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "spaces"}
+SEPARATOR_NAMES = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "spaces"}
 """What may stand between cells, in the order in which it is tried, and its name."""
 
 LONGEST_LINE = 100_000
@@ -48,18 +48,23 @@ UNIT_LINES = 40
 FEWEST_ROWS = 8
 """A shorter run of lines with numbers is a part of some preamble where there is a longer one."""
 
-_SAMPLE = 40
-_MARKS = (
+_N_SAMPLE_LINES = 40
+_BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_DIGITS = r"([-+]? ?(?:[0-9]+(?:{0}[0-9]+)?{1}|{0}[0-9]+)(?:[eE][-+]?[0-9]+)?)(?:\s*([^\s\d.,;:+-]\S*(?: \S+)?))?"
-_NUMBERS = {".": re.compile(_DIGITS.format(r"\.", r"\.?")), ",": re.compile(_DIGITS.format(",", ""))}
-_PLAIN = frozenset("0123456789.+-eE\n")
-_GROUPED = re.compile(r"[-+]?[0-9]{1,3}(?:([.,' \u00a0\u2009\u202f])[0-9]{3})+(?:[.,][0-9]*)?")
-_MINUS = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=\s?[0-9.,])")
-EMPTY = ' \t\r;,|"\u00a0-=:+*_'
+_DIGITS_PATTERN = (
+    r"([-+]? ?(?:[0-9]+(?:{0}[0-9]+)?{1}|{0}[0-9]+)(?:[eE][-+]?[0-9]+)?)(?:\s*([^\s\d.,;:+-]\S*(?: \S+)?))?"
+)
+_NUMBER_PATTERNS = {
+    ".": re.compile(_DIGITS_PATTERN.format(r"\.", r"\.?")),
+    ",": re.compile(_DIGITS_PATTERN.format(",", "")),
+}
+_PLAIN_CHARACTERS = frozenset("0123456789.+-eE\n")
+_GROUPED_PATTERN = re.compile(r"[-+]?[0-9]{1,3}(?:([.,' \u00a0\u2009\u202f])[0-9]{3})+(?:[.,][0-9]*)?")
+_MINUS_PATTERN = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=\s?[0-9.,])")
+EMPTY_CHARACTERS = ' \t\r;,|"\u00a0-=:+*_'
 """What a line without a value may hold."""
 
 
@@ -81,14 +86,14 @@ class Dialect:
 
     def number(self, cell: str) -> tuple[float, str] | None:
         """Return the number in a cell and the unit behind it, "" where there is none; None if it is no number."""
-        match = _NUMBERS[self.decimal].fullmatch(cell)
+        match = _NUMBER_PATTERNS[self.decimal].fullmatch(cell)
         if match is None or (match[2] and dimension_of(match[2]) is None):
             return None
         return float(match[1].replace(",", ".").replace(" ", "")), spelt(match[2]) if match[2] else ""
 
     def is_number(self, cell: str) -> bool:
         """Return whether a cell is a number in this dialect, perhaps with a unit."""
-        match = _NUMBERS[self.decimal].fullmatch(cell)
+        match = _NUMBER_PATTERNS[self.decimal].fullmatch(cell)
         return match is not None and (not match[2] or dimension_of(match[2]) is not None)
 
 
@@ -175,7 +180,7 @@ class LabTable:
             if "." in text:
                 return None
             text = text.replace(",", ".")
-        if not _PLAIN.issuperset(text):
+        if not _PLAIN_CHARACTERS.issuperset(text):
             return None
         try:
             return np.array(text.split("\n"), dtype=float)
@@ -197,7 +202,7 @@ class LabTable:
         value, unit = found
         if column.unit_column is not None:
             unit = spelt(row[column.unit_column])
-        if unit and unit != column.unit and (column.source != CELLS or not self._alike(unit, column)):
+        if unit and unit != column.unit and (column.source != CELLS_SOURCE or not self._alike(unit, column)):
             column.states(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
         return float(in_si(np.array(value), column.dimension or "", unit or column.unit or ""))
 
@@ -213,13 +218,13 @@ class LabTable:
 def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
     """Return values with a unit as SI, exactly where the unit is that of cfmkit's own files."""
     from cfmkit.specs.units import from_border
-    from cfmkit.specs.units.table import COMMON, border_unit
+    from cfmkit.specs.units.table import COMMON_UNIT_SIZES, border_unit
     from cfmkit.specs.units.unit_size import unit_size
 
     if unit == border_unit(dimension):
         converted: FloatArray = from_border(values, dimension)
         return converted
-    factor = COMMON[dimension, unit] if (dimension, unit) in COMMON else unit_size(unit).factor
+    factor = COMMON_UNIT_SIZES[dimension, unit] if (dimension, unit) in COMMON_UNIT_SIZES else unit_size(unit).factor
     return values * float(factor)
 
 
@@ -231,7 +236,7 @@ def decode_file(data: bytes, name: str) -> tuple[str, str]:
     cfmkit.errors.DataError
         If it is not a text.
     """
-    encoding = next((reported for mark, reported in _MARKS if data.startswith(mark)), "")
+    encoding = next((reported for mark, reported in _BYTE_ORDER_MARKS if data.startswith(mark)), "")
     if not encoding and b"\0" in data[:4096]:
         even, odd = data[:4096:2].count(0), data[1:4096:2].count(0)
         encoding = "utf-16-le" if odd > 8 * even else "utf-16-be" if even > 8 * odd else "ascii"
@@ -248,7 +253,7 @@ def decode_file(data: bytes, name: str) -> tuple[str, str]:
 def lines_of(text: str) -> list[str]:
     """Return the lines of a text, with an ASCII minus before numbers that have another one."""
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return (text if text.isascii() else _MINUS.sub("-", text)).split("\n")
+    return (text if text.isascii() else _MINUS_PATTERN.sub("-", text)).split("\n")
 
 
 def tables_in(lines: list[str], name: str, units: Mapping[str, str] | None = None) -> list[LabTable]:
@@ -268,7 +273,7 @@ def tables_in(lines: list[str], name: str, units: Mapping[str, str] | None = Non
     cfmkit.errors.DataError
         If there is none, or what a line means is open.
     """
-    filled = [index for index, line in enumerate(lines) if line.strip(EMPTY)]
+    filled = [index for index, line in enumerate(lines) if line.strip(EMPTY_CHARACTERS)]
     if not filled:
         raise DataError(f"{name}: the file is empty")
     long = next((index for index in filled if len(lines[index]) > LONGEST_LINE), None)
@@ -294,9 +299,9 @@ def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
     """Return how the numbers of a file are written."""
     # Most lines before the last few are data, whatever stands above and below them.
     middle = filled[len(filled) // 3 : max(len(filled) - 2, 1)] or filled
-    sample = [lines[index] for index in middle[:: max(len(middle) // _SAMPLE, 1)]]
+    sample = [lines[index] for index in middle[:: max(len(middle) // _N_SAMPLE_LINES, 1)]]
     quoted = any('"' in line for line in sample)
-    dialects = [Dialect(separator, decimal, quoted) for separator in SEPARATORS for decimal in ".,"]
+    dialects = [Dialect(separator, decimal, quoted) for separator in SEPARATOR_NAMES for decimal in ".,"]
     dialects = [item for item in dialects if item.separator != "," or item.decimal == "." or quoted]
     scores = [(*_score(dialect, sample), dialect) for dialect in dialects]
     count, _, width, dialect = max(scores, key=lambda item: item[:2])
@@ -348,7 +353,7 @@ def _table(
 ) -> LabTable:
     """Return one table with what the lines above it and its cells say of its columns."""
     names, unit_row, header = _header(lines, shape, range(start, run[0]), run[0] + 1, name)
-    rows = [shape.row(lines[index]) for index in run[:: max(len(run) // _SAMPLE, 1)]]
+    rows = [shape.row(lines[index]) for index in run[:: max(len(run) // _N_SAMPLE_LINES, 1)]]
     beside = _unit_columns(rows, shape, names)
     inside = {k: next(spelt(row[unit]) for row in rows if row[unit]) for k, unit in beside.items()}
     for k in shape.numeric:
@@ -359,7 +364,7 @@ def _table(
     return LabTable(name, shape, lines, tuple(run), placed, header)
 
 
-_COUNTER = re.compile(r"(?i)(no|nr|n|#|idx|index|reading|row|point|count|sample|record|data no|lfd\.? ?nr)\W*")
+_COUNTER_PATTERN = re.compile(r"(?i)(no|nr|n|#|idx|index|reading|row|point|count|sample|record|data no|lfd\.? ?nr)\W*")
 """Names of columns that count the rows: a unit to their right is not theirs."""
 
 
@@ -369,7 +374,7 @@ def _unit_columns(rows: list[list[str]], shape: RowPattern, names: Sequence[str]
     for k in sorted(set(range(shape.width)).difference(shape.numeric)):
         filled = [row[k] for row in rows if any(row[column] for column in shape.numeric)]
         if filled and all(map(dimension_of, filled)):
-            left = [k - 1] if not _COUNTER.fullmatch(names[k - 1].strip(' "')) else []
+            left = [k - 1] if not _COUNTER_PATTERN.fullmatch(names[k - 1].strip(' "')) else []
             beside = [c for c in (*left, k + 1) if c in shape.numeric and c not in found]
             found |= {beside[0]: k} if beside else {}
     return found
@@ -379,7 +384,7 @@ def _header(
     lines: list[str], shape: RowPattern, above: range, first_line: int, name: str
 ) -> tuple[list[str], list[str], int | None]:
     """Return the names, the units and the index of the line with the names."""
-    filled = [index for index in above if lines[index].strip(EMPTY)]
+    filled = [index for index in above if lines[index].strip(EMPTY_CHARACTERS)]
     rows = [(index, _header_cells(lines[index], shape)) for index in reversed(filled[-UNIT_LINES:])]
     near = rows[:HEADER_LINES]
     fitting = [(index, cells) for index, cells in near if len(cells) == shape.width]
@@ -444,6 +449,6 @@ def refuse_group(cell: str, name: str) -> None:
     cfmkit.errors.DataError
         Naming it.
     """
-    match = _GROUPED.fullmatch(cell)
+    match = _GROUPED_PATTERN.fullmatch(cell)
     if match and (match[1] not in ".," or sum(map(cell.count, ".,")) > 1):
         raise DataError(f"{name}: {cell!r} has a thousands separator; export the numbers without one")

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from cfmkit.tables.lab_columns import ColumnInfo
     from cfmkit.tables.lab_file import LabTable
 
-FEWEST = 20
+MIN_SIDE_POINTS = 20
 """Points on a side without which it cannot be told from noise."""
 
-SIDES = {"right": "right", "r": "right", "rechts": "right", "left": "left", "l": "left", "links": "left"}
+SIDE_WORDS = {"right": "right", "r": "right", "rechts": "right", "left": "left", "l": "left", "links": "left"}
 
 
 def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
@@ -103,20 +103,20 @@ def _axis(columns: Sequence[ColumnInfo], axis: str, name: str) -> ColumnInfo:
 def _sides(table: LabTable, column: ColumnInfo) -> NDArray[np.str_]:
     """Return the side of each point."""
     words = [text.lower() for text in table.texts(column)]
-    number = next((number for number, word in enumerate(words) if word not in SIDES), None)
+    number = next((number for number, word in enumerate(words) if word not in SIDE_WORDS), None)
     if number is not None:
         raise DataError(
             f"{table.file}: line {table.rows[number] + 1}: the side is {words[number]!r}; it must be 'left' or 'right'"
         )
-    return np.array([SIDES[word] for word in words])
+    return np.array([SIDE_WORDS[word] for word in words])
 
 
 def _order_points(points: FloatArray, chosen: NDArray[np.bool_], name: str) -> FloatArray:
     side = points[chosen]
-    if len(side) < FEWEST:
+    if len(side) < MIN_SIDE_POINTS:
         raise DataError(
             f"{name}: has {len(points)} points, {len(side)} of them on one side; both flanks are needed with at least "
-            f"{FEWEST} points each"
+            f"{MIN_SIDE_POINTS} points each"
         )
     found: FloatArray = side[np.argsort(side[:, 1], kind="stable")]
     return found

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 Cell = float | int | str | None
 Values = NDArray[Any] | tuple[Cell, ...]
 
-HEADER = re.compile(r"(?P<name>[^\[\] ](?:[^\[\]]*[^\[\] ])?)(?: \[(?P<unit>[^\[\]\s]+)\])?")
-_INT64 = range(-(2**63), 2**63)
+HEADER_PATTERN = re.compile(r"(?P<name>[^\[\] ](?:[^\[\]]*[^\[\] ])?)(?: \[(?P<unit>[^\[\]\s]+)\])?")
+_INT64_RANGE = range(-(2**63), 2**63)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,7 +56,7 @@ class TableColumn(ShortRepr):
 
     def __post_init__(self) -> None:
         """Freeze the values and check them and the name."""
-        match = HEADER.fullmatch(self.header)
+        match = HEADER_PATTERN.fullmatch(self.header)
         if not match or match["name"] != self.name or match["unit"] != self.unit:
             raise CfmError(f"{self.header!r} cannot head a column: it must be a name with a unit in brackets")
         object.__setattr__(self, "values", _frozen(self.values, numeric=self.unit is not None))
@@ -140,7 +140,7 @@ def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
     kinds = set(map(type, cells))
     if kinds in ({float}, {float, type(None)}) or (numeric and kinds <= {type(None)}):
         return _array(np.array([math.nan if cell is None else cell for cell in cells], dtype=np.float64))
-    if kinds == {int} and all(cell in _INT64 for cell in cells):
+    if kinds == {int} and all(cell in _INT64_RANGE for cell in cells):
         return read_only(cells, np.int64)
     return cells
 

@@ -22,7 +22,7 @@ from cfmkit.export.contours import Drawing
 from cfmkit.results import Status
 from cfmkit.runs.files_a_run_writes import files
 from cfmkit.specs.keys_and_schema import keys
-from cfmkit.specs.units import DIMENSIONS
+from cfmkit.specs.units import DIMENSIONS_BY_NAME
 
 CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
 BY_NAME = {path.stem: path for path in CONFIGS}
@@ -126,7 +126,7 @@ def test_what_a_family_says_about_itself_is_complete(name):
     record = families.family(name)
     assert record.summary
     assert record.references
-    assert all(DIMENSIONS[dimension] and definition for dimension, definition in record.values.values())
+    assert all(DIMENSIONS_BY_NAME[dimension] and definition for dimension, definition in record.values.values())
     assert all(record.findings.values())
     named = ((record.draw, "figures"), (record.outline, "drawing"), (record.attribution, "attribute"))
     for module, function in named:
@@ -281,7 +281,7 @@ def test_the_files_of_a_run_are_the_same_every_time(path):
 @pytest.fixture
 def spare(monkeypatch, tmp_path):
     """A fifth family in the registry, which draws and designs nothing; its spec in the current folder."""
-    monkeypatch.setitem(families.FAMILIES, "spare", "spare_family")
+    monkeypatch.setitem(families.FAMILY_MODULES, "spare", "spare_family")
     monkeypatch.chdir(tmp_path)
     Path("spare.yaml").write_text(spare_family.TEXT)
     return "spare.yaml"

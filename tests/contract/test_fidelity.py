@@ -18,7 +18,7 @@ from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.results import Finding, Result, Status
 from cfmkit.studies.comparison_of_fidelities import (
-    PATH,
+    FIDELITY_KEY,
     Choices,
     FidelityComparison,
     Variant,
@@ -70,7 +70,7 @@ def test_models_are_compared_or_one_sentence_says_why_not(path):
     assert {item.name for item in found.variants} == set(choices.specs)
     for item in found.variants:
         assert fidelity_of(item.result) == item.name
-        assert item.result.spec.get_value(PATH) == item.name
+        assert item.result.spec.get_value(FIDELITY_KEY) == item.name
     assert found.finest == [name for name in choices.names if name in choices.specs][-1]
     assert set(found.metrics()) >= {f"fidelity_rms[{item.name}]" for item in found.compared}
 
@@ -79,7 +79,7 @@ def test_models_are_compared_or_one_sentence_says_why_not(path):
 def test_the_models_of_a_family_are_the_words_of_its_fidelity(name):
     record = families.family(name)
     try:
-        words = tuple(leaf(record.spec_type, PATH).choices)
+        words = tuple(leaf(record.spec_type, FIDELITY_KEY).choices)
     except CannotVary:
         words = tuple(record.models)[:1]
     assert tuple(record.models) == words
@@ -191,7 +191,7 @@ def test_what_only_the_other_model_warns_of_is_told_with_its_name_and_what_is_le
 
 
 def test_the_finest_model_that_can_run_is_the_reference():
-    spec = cfmkit.load(CAM).replace({PATH: "quasi-static"})
+    spec = cfmkit.load(CAM).replace({FIDELITY_KEY: "quasi-static"})
     choices = Choices(("rough", "quasi-static", "finest"), {"rough": spec, "quasi-static": spec}, {"finest": "no data"})
     found = compare(cfmkit.analyze(spec), choices, Run())
     assert (found.finest, dict(found.left_out)) == ("quasi-static", {"finest": "no data"})

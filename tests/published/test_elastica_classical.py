@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -46,7 +46,7 @@ LENGTH = 0.4
 
 
 def cantilever(section: Section = SLIM, **beam: object) -> Network:
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0)}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0)}
     return Network(nodes, {"beam": Beam("root", "tip", section, **beam)})  # type: ignore[arg-type]
 
 
@@ -149,7 +149,7 @@ def test_column_kept_on_its_primary_path_is_marked_unstable() -> None:
 def test_parallel_guiding_beam_is_two_cantilevers_of_half_its_length() -> None:
     """Its middle is an inflection point [FF]: the digits are Mattiasson's."""
     table = np.array(MATTIASSON)
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, Support(rotation=True))}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, Support(rotation=True))}
     forces = table[1:, 0] * RIGIDITY / (0.5 * LENGTH) ** 2
     p = pushed(Network(nodes, {"beam": Beam("root", "tip", SLIM)}), forces.tolist(), fy=-1.0)
     moved = p.motion("tip")[p.at_requested]
@@ -242,7 +242,7 @@ def test_pretensioned_beam_is_stiffened_as_a_tie_rod() -> None:
 def test_precompressed_clamped_beam_buckles_at_four_pi_squared() -> None:
     """P = 4 pi^2 EI / L^2 [TG, sec. 2.2], here of a beam that is shorter by its strain."""
     section = Section(2.4e9, 0.1, 1e-3)
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, slider_support(0.0))}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, slider_support(0.0))}
     p = trace(Network(nodes, {"beam": Beam("root", "tip", section)}), Displacement("tip", np.pi, [1e-4 * LENGTH]), FINE)
     critical = 4 * np.pi**2 * RIGIDITY / LENGTH**2
     event = p.events[0]
@@ -256,12 +256,12 @@ def test_precompressed_clamped_beam_buckles_at_four_pi_squared() -> None:
 
 def test_springs_at_the_tip_and_root_add_as_they_should() -> None:
     force, stiffness = 1e-7, 0.7
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0)}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0)}
     sprung = Network(nodes, {"beam": Beam("root", "tip", SLIM)}, springs=(SlideSpring("tip", np.pi / 2, stiffness),))
     assert pushed(sprung, [force], fy=1.0).motion("tip")[-1, 1] == pytest.approx(
         force / (3 * RIGIDITY / LENGTH**3 + stiffness), rel=1e-7
     )
-    nodes = {"root": Node(0, 0, PINNED), "tip": Node(LENGTH, 0)}
+    nodes = {"root": Node(0, 0, PINNED_SUPPORT), "tip": Node(LENGTH, 0)}
     hinged = Network(nodes, {"beam": Beam("root", "tip", SLIM)}, springs=(TorsionSpring(None, "root", 0.03),))
     turn = pushed(hinged, [0.06], moment=1.0).motion("tip")[-1, 2]
     assert turn == pytest.approx(0.06 / 0.03 + 0.06 * LENGTH / RIGIDITY, rel=1e-9)

@@ -16,9 +16,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from cfmkit.elastica import (
-    CLAMPED,
-    FREE,
-    PINNED,
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -45,7 +45,7 @@ def elastica(approach: float) -> float:
 def column(slenderness: float, clamped: bool) -> tuple[Network, float]:
     """Return a column whose far end is guided along it, and its critical load [N]."""
     section = Section(2e9, 1e-2, LENGTH * np.sqrt(12) / slenderness)
-    ends = (CLAMPED, slider_support(0.0)) if clamped else (PINNED, slider_support(0.0, rotates=True))
+    ends = (CLAMPED_SUPPORT, slider_support(0.0)) if clamped else (PINNED_SUPPORT, slider_support(0.0, rotates=True))
     nodes = {"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}
     rigidity = 2e9 * 1e-2 * section.thickness**3 / 12  # type: ignore[operator]
     return Network(nodes, {"x": Beam("a", "b", section)}), (4 if clamped else 1) * np.pi**2 * rigidity / LENGTH**2
@@ -69,9 +69,9 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
 
 
 ENDS = {
-    "free": (CLAMPED, FREE, 0.25),
-    "guided": (CLAMPED, slider_support(0.0), 4.0),
-    "pinned": (PINNED, slider_support(0.0, True), 1.0),
+    "free": (CLAMPED_SUPPORT, FREE_SUPPORT, 0.25),
+    "guided": (CLAMPED_SUPPORT, slider_support(0.0), 4.0),
+    "pinned": (PINNED_SUPPORT, slider_support(0.0, True), 1.0),
 }
 
 
@@ -151,7 +151,7 @@ def test_a_cantilever_in_strong_tension_bends_in_a_boundary_layer(
     young, width, thickness = 2e11, 8e-3, 1e-4
     rigidity = young * width * thickness**3 / 12
     tension = rigidity * (slender / LENGTH) ** 2
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}
     beams = {"x": Beam("a", "b", Section(young, width, thickness, axial=axial))}
     pull = Network(nodes, beams, loads=(PointLoad("b", fx=tension),))
     aside = 1e-4 * tension

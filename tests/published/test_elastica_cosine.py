@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -33,7 +33,7 @@ SPAN, RISE = 0.2, 0.5e-3  # shallow: the closed form leaves out terms of (h/L)^2
 def pressed(ratio: float, points: np.ndarray, branch: str = "stable") -> Path:
     """Half an arch with `ratio` = rise / thickness, its middle taken to points, in rises."""
     section = Section(1e9, 10e-3, RISE / ratio)
-    nodes = {"wall": Node(0, 0, CLAMPED), "middle": Node(0.5 * SPAN, RISE, slider_support(np.pi / 2))}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "middle": Node(0.5 * SPAN, RISE, slider_support(np.pi / 2))}
     arch = Network(nodes, {"half": Beam("wall", "middle", section, CosineArch(RISE, 0.5))})
     path = trace(arch, Displacement("middle", -np.pi / 2, points * RISE), Control(branch=branch))  # type: ignore[arg-type]
     assert path.status is PathStatus.COMPLETE

@@ -12,7 +12,7 @@ import pytest
 from lan_2010 import CM, LEG, ROWS, TRAVEL, VALUES, half
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -35,7 +35,7 @@ SECTION = Section(2e9, 10 * MM, 1 * MM, axial=False)
 def table_4() -> Network:
     section = Section(2e9, 6 * MM, 0.4 * MM, axial=False)
     nodes = {
-        "n1": Node(1 * CM, 0.2 * CM, CLAMPED),
+        "n1": Node(1 * CM, 0.2 * CM, CLAMPED_SUPPORT),
         "n2": Node(0.99 * CM, 0.55 * CM),
         "n3": Node(0.15 * CM, 0.64 * CM),
         "n4": Node(0, 1 * CM, slider_support(np.pi / 2)),

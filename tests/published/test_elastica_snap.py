@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -42,7 +42,12 @@ def traced(network: Network, most: float) -> Path:
 
 def frame(axial: bool = False) -> Network:
     section = Section(720.0, 3.0, 2.0, axial=axial)
-    nodes = {"a": Node(0, 0, PINNED), "corner": Node(0, 120), "tip": Node(24, 120), "b": Node(120, 120, PINNED)}
+    nodes = {
+        "a": Node(0, 0, PINNED_SUPPORT),
+        "corner": Node(0, 120),
+        "tip": Node(24, 120),
+        "b": Node(120, 120, PINNED_SUPPORT),
+    }
     beams = {
         "column": Beam("a", "corner", section),
         "left": Beam("corner", "tip", section),
@@ -54,7 +59,7 @@ def frame(axial: bool = False) -> Network:
 def arch() -> Network:
     foot, top = 100 * np.sin(np.radians(107.5)), 100 * np.cos(np.radians(107.5))
     section, half = Section(12e6, 1.0, 1.0, axial=False), arc(-np.radians(107.5))
-    nodes = {"a": Node(-foot, top, PINNED), "tip": Node(0, 100), "b": Node(foot, top, CLAMPED)}
+    nodes = {"a": Node(-foot, top, PINNED_SUPPORT), "tip": Node(0, 100), "b": Node(foot, top, CLAMPED_SUPPORT)}
     return Network(nodes, {"left": Beam("a", "tip", section, half), "right": Beam("tip", "b", section, half)})
 
 
@@ -144,7 +149,7 @@ def test_lee_frame_through_snap_through_and_snap_back() -> None:
 def test_williams_toggle_through_its_limit_points() -> None:
     """Williams, Q. J. Mech. Appl. Math. 17 (1964) 451: snaps at 34 lb (read to 0.5), regains at about 31 lb."""
     section = Section(1.03e7, 0.753, 0.243)
-    nodes = {"a": Node(0, 0, CLAMPED), "tip": Node(12.943, 0.386, slider_support(np.pi / 2))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(12.943, 0.386, slider_support(np.pi / 2))}
     network = Network(nodes, {"beam": Beam("a", "tip", section)})
     p = traced(network, 35.0)
     assert [event.kind for event in p.events] == ["limit point", "limit point"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -64,7 +64,7 @@ SYMMETRIC = np.array(
 def v_beam(thickness: float = 1 * MM, shear: bool = True) -> Network:
     section = Section(YOUNG, WIDTH, thickness, shear=shear, poisson_ratio=0.3)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "shuttle": Node(LENGTH * np.cos(ANGLE), LENGTH * np.sin(ANGLE), slider_support(np.pi / 2)),
     }
     return Network(nodes, {"v": Beam("wall", "shuttle", section)})
@@ -140,7 +140,7 @@ def cosine_half(ratio: float) -> tuple[Network, float, float]:
     span, thickness = 200 * MM, 2 * MM / ratio
     rise = span / 100
     section = Section(1e9, 10 * MM, thickness)
-    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(0.5 * span, rise, slider_support(np.pi / 2))}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "shuttle": Node(0.5 * span, rise, slider_support(np.pi / 2))}
     beams = {"v": Beam("wall", "shuttle", section, CosineArch(rise, 0.5))}
     unit = 1e9 * 10 * MM * thickness**3 / 12 * rise / span**3
     return Network(nodes, beams), rise, unit

@@ -12,7 +12,7 @@ import pytest
 from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs import papers
-from cfmkit.runs.papers import VERDICTS, check, choose_rows, number, rows
+from cfmkit.runs.papers import VERDICT_MEANINGS, check, choose_rows, number, rows
 
 ROOT = Path(__file__).parents[2]
 TABLES = {  # numbers in the body of each table, counted in the papers
@@ -64,7 +64,7 @@ def test_every_table_is_complete():
 
 def test_every_row_is_whole():
     for row in rows():
-        assert row.verdict in VERDICTS, row
+        assert row.verdict in VERDICT_MEANINGS, row
         assert row.why or row.verdict in ("agrees", "arithmetic", "given", "measured there"), row
         assert row.why or not row.tolerance, row
         assert bool(row.ask) or row.verdict in ("measured there", "not modelled"), row

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -67,7 +67,7 @@ def pinned_beam_rates(section: Section, length: float, angles: np.ndarray) -> np
         Rotations of the link at which the rate is wanted, increasing [rad].
     """
     network = Network(
-        {"root": Node(0.0, 0.0, CLAMPED), "pin": Node(length, 0.0)}, {"leaf": Beam("root", "pin", section)}
+        {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "pin": Node(length, 0.0)}, {"leaf": Beam("root", "pin", section)}
     )
     bending = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
     force = 8.0 * bending / length**2 * np.linspace(0.01, 1.0, 200)
@@ -93,7 +93,7 @@ def parallelogram_force(section: Section, length: float, travel: np.ndarray) -> 
         Across the leaves, increasing [m].
     """
     network = Network(
-        {"root": Node(0.0, 0.0, CLAMPED), "stage": Node(length, 0.0, Support(rotation=True))},
+        {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "stage": Node(length, 0.0, Support(rotation=True))},
         {"leaf": Beam("root", "stage", section)},
     )
     path = trace(network, Displacement("stage", 0.5 * np.pi, travel), Control(tolerance=1e-9))

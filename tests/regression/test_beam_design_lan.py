@@ -10,7 +10,11 @@ import cfmkit.metrics
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.design import missed_by, task_of
 from cfmkit.families.beam.shaping.search import Found
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, audited, scatter_within_tolerances
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
+    NetworkScatter,
+    audit_design,
+    scatter_within_tolerances,
+)
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
@@ -25,7 +29,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     variables = Variables(task, 3)
     found = Found(variables.read(), 3, 3.37e-3, 0.0, 0.0, "", 0)
     assert missed_by(task, found) == {}
-    assert audited(variables, found).sound
+    assert audit_design(variables, found).sound
     window = cfmkit.metrics.Window(3.37e-3, 13.6e-3)
     assert spec.fidelity == "reissner"
     result, bends = cfmkit.analyze(spec), cfmkit.analyze(spec.replace({"analysis.fidelity": "inextensible"}))

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica import CLAMPED, Beam, Network, Node, Polynomial, Section, arc, slider_support
+from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Network, Node, Polynomial, Section, arc, slider_support
 
 if TYPE_CHECKING:
     from cfmkit.elastica import Path
 
 
 def bent(sweep: float, height: float = 0.03) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, slider_support(np.pi / 2))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.05, height, slider_support(np.pi / 2))}
     return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, 1e-3), arc(sweep))})
 
 
 def standing(height: float) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, slider_support(np.pi / 2))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.05, height, slider_support(np.pi / 2))}
     return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, height / 30))})
 
 
@@ -27,8 +27,8 @@ def two_leaves(
 ) -> Network:
     """Two curved leaves to one slider that moves along them; factors of its dimensions."""
     nodes = {
-        "a": Node(0, 0, CLAMPED),
-        "b": Node(0, 0.01, CLAMPED),
+        "a": Node(0, 0, CLAMPED_SUPPORT),
+        "b": Node(0, 0.01, CLAMPED_SUPPORT),
         "d": Node(0.05 * length, 0.004 * rise, slider_support(0.0)),
     }
     section = Section(2e9, 1e-2, 5e-4 * thick)

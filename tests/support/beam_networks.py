@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
-    STRAIGHT,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
+    STRAIGHT_SHAPE,
     Beam,
     CosineArch,
     Displacement,
@@ -41,7 +41,7 @@ def shape(rng: Any, chord: float) -> Any:
     bent = np.column_stack([np.linspace(0, 1, 4), [0.0, *rng.uniform(-0.12, 0.12, 2), 0.0]])
     size = float(rng.uniform(0.02, 0.12) * rng.choice([-1, 1]))
     return [
-        STRAIGHT,
+        STRAIGHT_SHAPE,
         Polynomial(tuple(rng.uniform(-0.8, 0.8, 4).tolist())),
         arc(8 * size),
         CosineArch(size * chord),
@@ -84,7 +84,7 @@ def _nodes(rng: Any) -> dict[str, Node]:
         "b": Support(),
         "c": held(*(bool(rng.random() < 0.5) for _ in range(2))),
         "d": slider_support(float(rng.uniform(1, 2)), bool(rng.random() < 0.5)),
-        "e": CLAMPED if rng.random() < 0.5 else PINNED,
+        "e": CLAMPED_SUPPORT if rng.random() < 0.5 else PINNED_SUPPORT,
     }
     nodes = {name: Node(float(x), float(y), supports[name]) for name, (x, y) in at.items()}
     x, y = at["b"].tolist()

@@ -9,8 +9,8 @@ import numpy as np
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
-    FLEXURES,
-    STRIP,
+    FLEXURE_BEAMS,
+    STRIP_BEAM,
     Elasticity,
     Flexure,
     Strip,
@@ -44,9 +44,9 @@ def corners(unloaded: float = UNLOADED, before: Sequence[float] = (0.5, 0.5, 0.5
 def knee(path: Path, index: int, unloaded: float) -> np.ndarray:
     """Return where the crank pin, or the middle of a strip, is."""
     pins = joints(LINKAGE, unloaded)
-    if STRIP not in path.network.beams:
+    if STRIP_BEAM not in path.network.beams:
         return pins[1] + path.motion("crank end")[index, :2]
-    shape = path.shape(STRIP, index)
+    shape = path.shape(STRIP_BEAM, index)
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(shape, axis=0).T))])
     return shape[np.abs(marks - 60 * MM).argmin()]
 
@@ -80,4 +80,4 @@ def strip_chain(
     return Chain(points, joints(LINKAGE, unloaded), build, np.pi, lambda p, i: knee(p, i, unloaded))  # type: ignore[arg-type]
 
 
-__all__ = ["ABS", "FLEXURES", "LINKAGE", "MM", "RATES", "SHARES", "TABLE_2", "THICKNESS", "UNLOADED", "WIDTH"]
+__all__ = ["ABS", "FLEXURE_BEAMS", "LINKAGE", "MM", "RATES", "SHARES", "TABLE_2", "THICKNESS", "UNLOADED", "WIDTH"]

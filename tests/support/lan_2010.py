@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica import CLAMPED, Beam, Network, Node, Polynomial, slider_support
+from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Network, Node, Polynomial, slider_support
 
 if TYPE_CHECKING:
     from cfmkit.elastica import Section
@@ -45,8 +45,8 @@ def half(
     """
     inner, shapes = nodes or NODES, coefficients or {name: shape for name, (_, _, shape) in SHAPES.items()}
     placed = {
-        "n1": Node(0.25 * CM, 0, CLAMPED),
-        "n2": Node(3.45 * CM, 0, CLAMPED),
+        "n1": Node(0.25 * CM, 0, CLAMPED_SUPPORT),
+        "n2": Node(3.45 * CM, 0, CLAMPED_SUPPORT),
         "n3": Node(*inner["n3"]),
         "n4": Node(*inner["n4"]),
         "n5": Node(0.25 * CM, 4 * CM, slider_support(np.pi / 2)),

@@ -8,7 +8,7 @@ import numpy as np
 from lan_2010 import SHAPES, half
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     CosineArch,
     Displacement,
@@ -45,10 +45,10 @@ def arms(x: Any) -> Network:
     """A tapered beam on a rigid arm, with its weight, and a linked node whose places vary."""
     section = Section(2e9, 8e-3, Taper(np.array([0, 0.5, 1]), np.array([1e-3, x[0], 1.2e-3])), shear=True)
     nodes = {
-        "a": Node(0, 0, CLAMPED),
+        "a": Node(0, 0, CLAMPED_SUPPORT),
         "b": Node(0.05, 0.02),
         "bb": Node(0.05 + x[1], 0.02 + x[2]),
-        "c": Node(0.1, 0.0, CLAMPED),
+        "c": Node(0.1, 0.0, CLAMPED_SUPPORT),
         "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
     }
     beams = {
@@ -99,10 +99,10 @@ def zoo(x: Any) -> Network:
         "a": Node(0, 0, Support(True, True, True, displacement=(0.0, x[16], 0.0))),
         "b": Node(x[0], x[1]),
         "bb": Node(0.05 + x[3], 0.022),
-        "c": Node(0.1, 0.0, CLAMPED),
+        "c": Node(0.1, 0.0, CLAMPED_SUPPORT),
         "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
         "e": Node(0.12, 0.05, slider_support(x[17], rotates=True)),
-        "f": Node(-0.02, 0.06, CLAMPED),
+        "f": Node(-0.02, 0.06, CLAMPED_SUPPORT),
     }
     beams = {
         "ab": Beam("a", "b", section, Polynomial((0.0, x[23])), end_offset=(x[4], x[5])),

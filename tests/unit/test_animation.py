@@ -11,9 +11,9 @@ from PIL import Image
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.families import family
-from cfmkit.plots.animation import MILLISECONDS, animation, frames
+from cfmkit.plots.animation import FRAME_DURATION, animation, frames
 from cfmkit.plots.figures import moving_of
-from cfmkit.plots.poses_in_one_svg import POSES
+from cfmkit.plots.poses_in_one_svg import N_FILM_POSES
 
 SPEC = "configs/slider_crank_li2019.yaml"
 
@@ -27,9 +27,9 @@ def solved():
 def test_a_gif_goes_there_and_back_and_repeats_byte_by_byte(solved):
     content = animation(*solved, "gif")
     image = Image.open(io.BytesIO(content))
-    assert image.n_frames == 2 * POSES - 2
+    assert image.n_frames == 2 * N_FILM_POSES - 2
     assert image.size == (960, 400)
-    assert image.info["duration"] == MILLISECONDS
+    assert image.info["duration"] == FRAME_DURATION
     assert image.info["loop"] == 0
     assert animation(*solved, "gif") == content
 

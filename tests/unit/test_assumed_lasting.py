@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cfmkit.cli.main import main
-from cfmkit.stock import MATERIALS
+from cfmkit.stock import MATERIALS_BY_NAME
 from cfmkit.stock.assumed_lasting import ASSUMED_DATA, steel
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
@@ -15,7 +15,7 @@ STEELS = ("steel-1.4310", "steel-304", "steel-s235")
 
 
 def test_only_materials_of_the_library_are_assumed_to_last():
-    assert set(ASSUMED_DATA) <= set(MATERIALS)
+    assert set(ASSUMED_DATA) <= set(MATERIALS_BY_NAME)
 
 
 @pytest.mark.parametrize("name", ASSUMED_DATA)

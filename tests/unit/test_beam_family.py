@@ -20,7 +20,7 @@ from cfmkit.elastica.mechanics.march import engine
 from cfmkit.errors import DataError, InputError, SpecError
 from cfmkit.families import family
 from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
-from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as SURFACE
+from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as SURFACE
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 

@@ -19,17 +19,17 @@ from cfmkit.families.beam.shaping.design import find_blocking, missed_by, optimi
 from cfmkit.families.beam.shaping.multistart import explore
 from cfmkit.families.beam.shaping.report import judge_design, write_design
 from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.search import Found, StartBudget, flatten, searched, verify
+from cfmkit.families.beam.shaping.search import Found, StartBudget, flatten, search_start, verify
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     NetworkScatter,
-    audited,
+    audit_design,
     half_band,
     lines_cross,
     scatter_within_tolerances,
     strict_share,
 )
 from cfmkit.families.beam.shaping.sqp_program import Flattest, ForceRatio, Shaping, Widest
-from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
+from cfmkit.families.beam.shaping.task import STRESS_MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
 from cfmkit.families.run_control import Run
 from cfmkit.numerics.monotone_interpolation import ThroughPoints
@@ -123,7 +123,7 @@ def test_table_3_has_the_half_band_that_its_range_says() -> None:
     """Computed by two other solvers, with stretching and shear, too."""
     task = lan()
     found, variables = found_of(task, table_3(task)), Variables(task, 2)
-    assert audited(variables, found).sound
+    assert audit_design(variables, found).sound
     design = judge_design(load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"]), task, found)
     assert design.half_band == pytest.approx(0.0309, abs=1e-4)
     assert metric(design.spec, "strict_range_fraction") == pytest.approx(0.479, abs=1e-3)
@@ -225,7 +225,7 @@ def test_the_search_limits_the_stress_that_the_analysis_judges() -> None:
     rows = [one for one in program.limits(view) if one.name == "stress"]
     worst = max(float((1 - one.values).max()) for one in rows) * task.limits.stress
     path = view.response.path
-    assert worst == pytest.approx(float(path.peak_stress(axial=True).value.max()), rel=MARGIN)
+    assert worst == pytest.approx(float(path.peak_stress(axial=True).value.max()), rel=STRESS_MARGIN)
     assert worst > 1.01 * float(path.peak_stress(axial=False).value.max())
 
 
@@ -392,7 +392,7 @@ def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -
         monkeypatch.setattr(multistart, name, lambda _task, _seed, _index, plan: flat)
     for name in ("widen", "nearer", "refine"):
         monkeypatch.setattr(multistart, name, lambda _task, found, _plan: found)
-    monkeypatch.setattr(multistart, "audited", lambda _variables, _found: None)
+    monkeypatch.setattr(multistart, "audit_design", lambda _variables, _found: None)
     told: list[float] = []
     for orders in ((1, 3), (1, 3, 4)):
         told.clear()
@@ -415,9 +415,9 @@ def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
     def nearer(_task: Task, found: Found, _plan: StartBudget) -> Found:
         return replace(found, start=led[found.objective], objective=0.02)
 
-    monkeypatch.setattr(multistart, "searched", lambda _task, _seed, _index, plan: near)
+    monkeypatch.setattr(multistart, "search_start", lambda _task, _seed, _index, plan: near)
     monkeypatch.setattr(multistart, "widen", lambda _task, found, _plan: found)
-    monkeypatch.setattr(multistart, "audited", lambda _variables, _found: None)
+    monkeypatch.setattr(multistart, "audit_design", lambda _variables, _found: None)
     monkeypatch.setattr(multistart, "searched_far", searched_far)
     monkeypatch.setattr(multistart, "nearer", nearer)
     task = replace(lan("range"), orders=(1, 3))
@@ -447,7 +447,7 @@ def test_no_time_means_no_start_and_nothing_noted() -> None:
     late = StartBudget(clock=Clock(0.0))
     result = explore(lan(), late, (2, 1), "x", Run(notes=notes))
     assert (result.found, result.missing, notes.keys) == ({}, 2, {})
-    assert searched(lan(), 0, 0, late) is None
+    assert search_start(lan(), 0, 0, late) is None
 
 
 @pytest.mark.parametrize("steps", [0, 1, 3])

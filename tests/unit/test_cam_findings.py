@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cam_support import MM, analyze, at, cam, fixed, message, names
 
-from cfmkit.families.cam.findings import FINDINGS, finding
+from cfmkit.families.cam.findings import CAM_FINDINGS, finding
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.results import Status
 
@@ -30,7 +30,7 @@ def test_nothing_is_wrong_with_a_cam_whose_roller_fits():
 def test_a_finding_needs_a_name_that_is_explained():
     with pytest.raises(KeyError):
         finding("no_such_thing", "")
-    assert all(len(meaning) > 20 for meaning in FINDINGS.values())
+    assert all(len(meaning) > 20 for meaning in CAM_FINDINGS.values())
 
 
 # --- (1) the brace ------------------------------------------------------------------------------------------

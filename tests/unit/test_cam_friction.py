@@ -13,7 +13,7 @@ from scipy.optimize import root
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.figures import figures
-from cfmkit.families.cam.scalar_results import QUANTITIES
+from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.rows import values_of_one
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
@@ -131,9 +131,9 @@ def test_a_smallest_contact_force_that_is_nowhere_finite_is_unknown():
     """Zero would say that a roller leaves the cam."""
     solution = analyze(cam(mounting={"elevation": "0 deg", "roll": "0 deg"}, analysis__points=11)).state
     least = np.concatenate([state.least_contact[1:] for state in (solution.up, solution.down)])
-    assert values_of_one(QUANTITIES, solution)["contact_force_least"].value == least.min()
+    assert values_of_one(SCALAR_QUANTITIES, solution)["contact_force_least"].value == least.min()
     up, down = (replace(state, least_contact=np.full(11, np.nan)) for state in (solution.up, solution.down))
-    assert values_of_one(QUANTITIES, replace(solution, up=up, down=down))["contact_force_least"].value is None
+    assert values_of_one(SCALAR_QUANTITIES, replace(solution, up=up, down=down))["contact_force_least"].value is None
 
 
 def test_hanging_down_the_weight_helps_by_what_it_hinders_standing_up():
@@ -293,13 +293,13 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
 
 def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():
     from cfmkit.export.contours import polygons
-    from cfmkit.families.cam.clearance import BESIDE, nearest_pairs
+    from cfmkit.families.cam.clearance import BESIDE_FLANKS_PAIR, nearest_pairs
     from cfmkit.families.cam.outline import drawing
 
     wide = {"base_width": "60 mm", "tool_radius": "20 mm"}
     found = analyze(cam(roller_radius="10 mm", plate=wide, envelope={"gap": "1 mm"}))
     assert "parts_touch" not in {one.name for one in found.warnings}
-    gap, states = nearest_pairs(found.state)[BESIDE], found.state.states
+    gap, states = nearest_pairs(found.state)[BESIDE_FLANKS_PAIR], found.state.states
     assert gap.min() > -1e-9
     outline = polygons(drawing(found.spec).contours[:1], "cut", 4000)[0]
     for at in (0, len(gap) // 8):

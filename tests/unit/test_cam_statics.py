@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from cfmkit.families.cam.mechanism_from_spec import assemble, hanging_weights
-from cfmkit.families.cam.statics import GRAVITY
+from cfmkit.families.cam.statics import STANDARD_GRAVITY
 from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=60)
@@ -98,7 +98,7 @@ def test_without_friction_the_force_is_the_change_of_energy(mechanism, share):
         masses = spec.mechanism.masses
         slider = ends.y + np.sqrt(spec.mechanism.brace_length**2 - ends.x**2)
         middle = 0.5 * (ends.y + slider)
-        energy += GRAVITY * (2 * masses.roller * ends.y + 2 * masses.brace * middle + masses.slider * slider)
+        energy += STANDARD_GRAVITY * (2 * masses.roller * ends.y + 2 * masses.brace * middle + masses.slider * slider)
     assert work == pytest.approx(energy[1] - energy[0], rel=1e-6, abs=1e-9 * np.abs(energy).max())
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.numerics.chebyshev_panels import MOST, NODES, resolve_panels
+from cfmkit.numerics.chebyshev_panels import MAX_PLACES, N_PANEL_NODES, resolve_panels
 
 
 def test_smooth_functions_and_one_with_a_corner_are_resolved() -> None:
@@ -24,6 +24,6 @@ def test_halving_ends_with_noise_that_no_panel_resolves() -> None:
         return 1.0 + 1e-3 * rng.standard_normal((1, len(x)))
 
     (found,) = resolve_panels(noise, np.array([0.0, 1.0]), (1e-8,), 20)
-    assert max(rounds) <= 2 * MOST
-    assert MOST / NODES < len(found.ends) - 1 <= 2 * MOST / NODES
+    assert max(rounds) <= 2 * MAX_PLACES
+    assert MAX_PLACES / N_PANEL_NODES < len(found.ends) - 1 <= 2 * MAX_PLACES / N_PANEL_NODES
     assert found.evaluate(np.array([0.3]))[0] == pytest.approx(1.0, abs=0.02)

@@ -12,7 +12,7 @@ import pytest
 from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.bounds_and_rounding import find_active_bounds, round_within_bounds
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
-from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, from_record, run_stage
+from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock, OneStart, Stage, from_record, run_stage
 from cfmkit.families.run_control import Run
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Status
@@ -128,7 +128,7 @@ class Recorder:
 
 def test_what_a_start_found_is_the_same_read_from_its_record() -> None:
     found = Optimum(np.array([0.1, 1 / 3]), np.inf, np.zeros(0), SearchEnding.STUCK, 7, 1e-5)
-    record = json.loads(json.dumps(OneStart(lambda _: found, NEVER)(3)))
+    record = json.loads(json.dumps(OneStart(lambda _: found, UNLIMITED_CLOCK)(3)))
     assert not record["late"]
     again = from_record(Optimum, record["found"])
     assert again.z.tolist() == found.z.tolist()
@@ -144,9 +144,11 @@ def squared(number: int) -> dict[str, Any]:
 def test_finished_starts_are_noted_and_not_done_again() -> None:
     notes, reported = Recorder(), []
     means = Run(notes=notes)
-    first = run_stage(Stage(squared, (0, 1), "x"), means, NEVER, lambda records: reported.append(len(records)))
-    again = run_stage(Stage(squared, (0, 1, 2), "x"), means, NEVER, lambda _: None)
-    other = run_stage(Stage(squared, (0, 1), "y"), means, NEVER, lambda _: None)
+    first = run_stage(
+        Stage(squared, (0, 1), "x"), means, UNLIMITED_CLOCK, lambda records: reported.append(len(records))
+    )
+    again = run_stage(Stage(squared, (0, 1, 2), "x"), means, UNLIMITED_CLOCK, lambda _: None)
+    other = run_stage(Stage(squared, (0, 1), "y"), means, UNLIMITED_CLOCK, lambda _: None)
     assert (first.reused, again.reused, other.reused) == (0, 2, 0)
     assert {job: record["found"] for job, record in again.records.items()} == {0: 0, 1: 1, 2: 4}
     assert reported == [0, 1, 2]
@@ -156,7 +158,7 @@ def test_late_no_start_is_begun_and_one_that_ran_out_of_time_is_not_noted() -> N
     notes = Recorder()
     means = Run(notes=notes)
     assert run_stage(Stage(squared, (0, 1), "x"), means, Clock(0.0), lambda _: None).records == {}
-    late = run_stage(Stage(lambda _: {"found": {}, "late": True}, (0,), "x"), means, NEVER, lambda _: None)
+    late = run_stage(Stage(lambda _: {"found": {}, "late": True}, (0,), "x"), means, UNLIMITED_CLOCK, lambda _: None)
     assert list(late.records) == [0]
     assert notes.keys == {}
 
@@ -165,12 +167,12 @@ def test_processes_that_die_are_told_once_a_reason() -> None:
     def dying(_work: Any, jobs: Any, _stopping: Any) -> Any:
         yield from ((job, Lost(Status.CRASHED, "out of memory")) for job in jobs)
 
-    outcome = run_stage(Stage(squared, (0, 1), "x"), Run(executor=dying), NEVER, lambda _: None)
+    outcome = run_stage(Stage(squared, (0, 1), "x"), Run(executor=dying), UNLIMITED_CLOCK, lambda _: None)
     assert (dict(outcome.records), outcome.lost) == ({}, ("out of memory",))
 
 
 def test_the_shortest_budget_ends_the_time() -> None:
-    assert Clock.from_budgets(None, None) == NEVER
-    assert not NEVER.late()
+    assert Clock.from_budgets(None, None) == UNLIMITED_CLOCK
+    assert not UNLIMITED_CLOCK.late()
     assert Clock.from_budgets(None, -1.0, 100.0).late()
     assert not Clock.from_budgets(50.0, 100.0).late()

@@ -8,7 +8,7 @@ import cfmkit
 from cfmkit.cli.output import Terminal
 from cfmkit.documents import run_document, sweep_document
 from cfmkit.documents.document import (
-    BLANK,
+    BLANK_LINE,
     CellGrid,
     Document,
     GridColumn,
@@ -76,7 +76,7 @@ def test_records_are_listed_below_their_heading_and_not_at_all_where_there_are_n
 
 
 def test_text_and_data_are_printed_as_they_are(printed):
-    assert printed(BLANK, Verbatim("a  \nb"), JsonText({"c": 1})) == '\na  \nb{\n  "c": 1\n}\n'
+    assert printed(BLANK_LINE, Verbatim("a  \nb"), JsonText({"c": 1})) == '\na  \nb{\n  "c": 1\n}\n'
 
 
 def test_of_each_folder_one_file_is_named_on_a_short_page():

@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit import families
 from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
-from cfmkit.runs.editor_schema import LINE, metric_names, schema
+from cfmkit.runs.editor_schema import SCHEMA_LINE_START, metric_names, schema
 
 pytestmark = pytest.mark.lists
 
@@ -43,8 +43,8 @@ def test_new_and_examples_write_the_schema_that_their_first_line_names(tmp_path,
     assert main(["examples", "cam_as_built", "--json"]) == 0
     for spec in ("vcfm.yaml", "cam_as_built.yaml"):
         first = Path(spec).read_text().splitlines()[0]
-        assert first.startswith(LINE)
-        assert json.loads(Path(first.removeprefix(LINE)).read_text())["$defs"]["Requirement"]
+        assert first.startswith(SCHEMA_LINE_START)
+        assert json.loads(Path(first.removeprefix(SCHEMA_LINE_START)).read_text())["$defs"]["Requirement"]
         cfmkit.load(spec)
     assert main(["examples", "--schema"]) == 2
 
@@ -53,10 +53,10 @@ def test_a_file_of_its_own_on_request(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["new", "cam", "--no-schema", "--json"]) == 0
     assert [one.name for one in tmp_path.iterdir()] == ["cam.yaml"]
-    assert not Path("cam.yaml").read_text().startswith(LINE)
+    assert not Path("cam.yaml").read_text().startswith(SCHEMA_LINE_START)
     capsys.readouterr()
     assert main(["new", "cam", "--out", "-"]) == 0
-    assert LINE not in capsys.readouterr().out
+    assert SCHEMA_LINE_START not in capsys.readouterr().out
 
 
 def completed(text, **named):

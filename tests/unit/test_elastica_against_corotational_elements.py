@@ -17,7 +17,7 @@ from corotational import recheck
 from lan_2010 import half
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -121,7 +121,7 @@ def _polygon(network: Network, drive: Displacement, per_beam: int) -> tuple[Poly
     held = []
     for k, n in enumerate(names):
         support = network.nodes[n].support
-        if support == CLAMPED:
+        if support == CLAMPED_SUPPORT:
             held += [3 * k, 3 * k + 1, 3 * k + 2]
         elif support.across:
             held += [3 * k, 3 * k + 2]
@@ -150,7 +150,7 @@ def test_lan_s_network_agrees_with_corotational_elements() -> None:
 def test_a_v_beam_on_its_stable_branch_agrees_with_corotational_elements() -> None:
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
     }
     # a slightly bent beam has no bifurcation: both programs follow the same branch
@@ -168,7 +168,7 @@ def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elem
     """Forces and stability there, and on the symmetric branch that is left."""
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
     }
     network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, THICK))})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -37,7 +37,7 @@ def pressed(points: Any, tolerance: float, branch: Any = "stable", section: Sect
 
 def turned(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
     """Return the path of the same half, pressed and released."""
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
     leaf = Network(nodes, {"v": Beam("wall", "d", section)})
     return trace(leaf, Displacement("d", -np.pi / 2, points), Control(tolerance=tolerance, branch=branch))
 
@@ -143,9 +143,9 @@ def whole(points: Any, sections: Any = (LEAF, LEAF), **control: Any) -> Path:
     """Return the path of both halves with a shuttle that neither turns nor moves aside."""
     across = LENGTH * np.cos(ANGLE)
     nodes = {
-        "left": Node(-across, 0, CLAMPED),
+        "left": Node(-across, 0, CLAMPED_SUPPORT),
         "d": Node(0, RISE, slider_support(np.pi / 2)),
-        "right": Node(across, 0, CLAMPED),
+        "right": Node(across, 0, CLAMPED_SUPPORT),
     }
     beams = {"one": Beam("left", "d", sections[0]), "two": Beam("right", "d", sections[1])}
     return trace(Network(nodes, beams), Displacement("d", -np.pi / 2, points), Control(**control))
@@ -194,7 +194,7 @@ def test_leaves_that_are_nearly_equal_buckle_one_after_the_other(factor: float, 
 
 
 def test_a_given_first_step_does_not_keep_a_bifurcation_from_being_found() -> None:
-    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
     leaf = Network(nodes, {"v": Beam("wall", "d", LEAF)})
     for step in (0.3, 0.1, 0.01):
         path = trace(leaf, Displacement("d", -np.pi / 2, REGULAR), Control(tolerance=1e-6, first_step=step))
@@ -216,7 +216,7 @@ def test_as_many_points_as_asked_for_are_always_allowed() -> None:
 @pytest.mark.parametrize("count", [9, 61])
 def test_bifurcations_between_two_points_of_the_primary_path_are_told_one_by_one(count: int) -> None:
     """Of a V of two leaves three modes become unstable and stable again; with 9 points two of them in one step."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(40e-3, 3e-3), "c": Node(80e-3, 0, CLAMPED)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(40e-3, 3e-3), "c": Node(80e-3, 0, CLAMPED_SUPPORT)}
     leaf = Section(2e9, 6e-3, 0.5e-3)
     net = Network(nodes, {"x": Beam("a", "b", leaf), "y": Beam("b", "c", leaf)})
     path = trace(net, Displacement("b", -np.pi / 2, np.linspace(0, 9.3e-3, count)[1:]), Control(branch="primary"))
@@ -238,7 +238,7 @@ def test_coarse_points_do_not_lead_from_the_primary_path_onto_a_branch(
     rise: float, thickness: float, travel: float, points: int
 ) -> None:
     """A step over two bifurcations of these V, or the first behind the third, had come to another branch."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(40e-3, 1e-3 * rise), "c": Node(80e-3, 0, CLAMPED)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(40e-3, 1e-3 * rise), "c": Node(80e-3, 0, CLAMPED_SUPPORT)}
     leaf = Section(2e9, 6e-3, 1e-3 * thickness)
     net = Network(nodes, {"x": Beam("a", "b", leaf), "y": Beam("b", "c", leaf)})
     drive = Displacement("b", -np.pi / 2, np.linspace(0, 1e-3 * travel, points)[1:])

@@ -11,8 +11,8 @@ import pytest
 from batch_networks import bent, last_effort, standing, two_leaves
 
 from cfmkit.elastica import (
-    PINNED,
-    STRAIGHT,
+    PINNED_SUPPORT,
+    STRAIGHT_SHAPE,
     Control,
     Displacement,
     Network,
@@ -62,10 +62,10 @@ def test_networks_of_one_topology_are_followed_together_within_the_tolerance() -
 @pytest.mark.skipif(engine() != "C", reason="networks are followed together by compiled code")
 def test_networks_are_traced_by_themselves_if_they_buckle_or_differ_in_their_make_up() -> None:
     leaves = two_leaves()
-    straight = {name: replace(beam, shape=STRAIGHT) for name, beam in leaves.beams.items()}
+    straight = {name: replace(beam, shape=STRAIGHT_SHAPE) for name, beam in leaves.beams.items()}
     columns = replace(leaves, beams=straight)
     sprung = replace(leaves, springs=(SlideSpring("d", 0.0, 100.0),))
-    pinned = replace(leaves, nodes=leaves.nodes | {"b": Node(0, 0.01, PINNED)})
+    pinned = replace(leaves, nodes=leaves.nodes | {"b": Node(0, 0.01, PINNED_SUPPORT)})
     others = [columns, sprung, pinned, two_leaves(thick=0.7)]
     path = trace(two_leaves(1), LEAVES)
     together = follow_alike(path, others, Control())

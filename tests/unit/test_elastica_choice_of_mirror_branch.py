@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, slider_support, trace
+from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Control, Displacement, Network, Node, Section, slider_support, trace
 
 
 def side_of_leaf(change: float, sign: int) -> float:
     """Return to which side of its chord the middle of a V-beam's leaf lies beyond the first bifurcation."""
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "shuttle": Node(0.0299250, 4.265e-3 * (1 + change), slider_support(np.pi / 2)),
     }
     section = Section(1.477e9, 3.6e-3, 1.00998e-3, shear=True, poisson_ratio=0.3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cfmkit.cli.main import main
-from cfmkit.elastica import CLAMPED, Beam, Network, Node, PathStatus, Rotation, Section, arc, gradient, trace
+from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Network, Node, PathStatus, Rotation, Section, arc, gradient, trace
 
 LAN = Path(__file__).parents[2] / "configs" / "beam_lan2010.yaml"
 CHORD = 0.1
@@ -18,7 +18,7 @@ CHORD = 0.1
 def coil(turns: float, chord: Any = CHORD) -> Network:
     """Return a coil between a clamp and a free node."""
     beam = Beam("a", "b", Section(2e9, 1e-2, 1e-4), arc(2 * np.pi * turns))
-    return Network({"a": Node(0.0, 0.0, CLAMPED), "b": Node(chord, 0.0)}, {"coil": beam})
+    return Network({"a": Node(0.0, 0.0, CLAMPED_SUPPORT), "b": Node(chord, 0.0)}, {"coil": beam})
 
 
 @pytest.mark.parametrize("turns", [2.25, 10.25, 40.25, 160.25, 900.25])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -34,7 +34,7 @@ def leaves(many: Any, count: int, thickness: float = 7e-4, angle: float = 8.0, s
     nodes, beams = {"d": Node(0, rise, support)}, {}
     for i, factor in enumerate(factors):
         down = 5e-3 * (i // 2)
-        nodes[f"w{i}"] = Node((-1 if i % 2 == 0 else 1) * across, -down, CLAMPED)
+        nodes[f"w{i}"] = Node((-1 if i % 2 == 0 else 1) * across, -down, CLAMPED_SUPPORT)
         beams[f"b{i}"] = Beam(f"w{i}", "d", Section(1477e6, 6e-3, thickness * factor), end_offset=(0.0, -down))
     return Network(nodes, beams), Displacement("d", -np.pi / 2, np.linspace(0.05, 2.1, count) * rise)
 
@@ -151,7 +151,7 @@ def test_columns_under_one_platform_bear_its_load_together(many: int, factor: fl
         nodes, beams = {"d": Node(0, 0.1, SHUTTLE)}, {}
         for i in range(count):
             x = 0.02 * (i - 0.5 * (count - 1))
-            nodes[f"w{i}"] = Node(x, 0, CLAMPED)
+            nodes[f"w{i}"] = Node(x, 0, CLAMPED_SUPPORT)
             section = Section(2e9, 1e-2, 1e-3 * (factor if i else 1.0))
             beams[f"b{i}"] = Beam(f"w{i}", "d", section, end_offset=(x, 0.0))
         drive = Loading((PointLoad("d", fy=-count * critical),), np.linspace(0.1, 1.3, 13))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -40,7 +40,7 @@ EXACT = Control(tolerance=1e-9)
 TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
 
 
-def cantilever(*contacts, nodes=2, support=CLAMPED, y=0.0, angle=0.0):
+def cantilever(*contacts, nodes=2, support=CLAMPED_SUPPORT, y=0.0, angle=0.0):
     """Return a straight cantilever of length 1 with even nodes; the last one is `tip`, the middle one `mid`."""
     names = ["root", *(f"n{k}" for k in range(1, nodes - 1)), "tip"]
     if nodes == 3:
@@ -152,7 +152,7 @@ def shoot(moment, force, curvature):
 )
 def test_a_curved_leaf_on_a_disc_solves_the_equations_of_shooting(curvature, centre, radius, load):
     end = np.sin(curvature) / curvature, (1 - np.cos(curvature)) / curvature
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(*end)}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(*end)}
     pad = NodeOnObstacle("disc", "tip", circle(centre, radius - 0.03), 0.03)
     net = Network(nodes, {"leaf": Beam("root", "tip", SECTION, arc(curvature))}, contacts=(pad,))
     path = trace(net, Loading((PointLoad("tip", *load),), np.array([0.5, 1.0])), Control(tolerance=1e-10))

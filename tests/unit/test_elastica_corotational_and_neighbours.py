@@ -9,7 +9,7 @@ import pytest
 from corotational import recheck
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -35,10 +35,10 @@ def frame(thickness: float = 1.2e-3, bend: float = 0.7, springs: tuple[TorsionSp
     """Return curved and tapered beams with a linked node, a turned frame and an offset."""
     section = Section(2e9, 8e-3, Taper(np.array([0, 0.5, 1]), np.array([1e-3, thickness, 1.1e-3])), shear=True)
     nodes = {
-        "a": Node(0, 0, CLAMPED),
+        "a": Node(0, 0, CLAMPED_SUPPORT),
         "b": Node(0.05, 0.02),
         "bb": Node(0.055, 0.025),
-        "c": Node(0.1, 0.0, CLAMPED),
+        "c": Node(0.1, 0.0, CLAMPED_SUPPORT),
         "d": Node(0.06, 0.08, slider_support(np.pi / 2)),
     }
     beams = {
@@ -88,7 +88,7 @@ def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: Pa
 
 def test_elements_find_an_unstable_equilibrium_unstable() -> None:
     straight = Network(
-        {"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0.0, slider_support(0.0))},
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.1, 0.0, slider_support(0.0))},
         {"x": Beam("a", "d", Section(2e9, 8e-3, Taper(np.array([0, 1.0]), np.array([1e-3, 1.05e-3]))))},
     )
     pressed = Displacement("d", np.pi, np.array([1e-6, 2e-3]))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
-    FREE,
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
     Beam,
     Displacement,
     Link,
@@ -32,12 +32,12 @@ MODULUS, WIDTH, THICKNESS, LENGTH = 200e9, 10e-3, 1e-3, 0.1
 RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12
 
 
-def straight(end: Support = FREE, axial: bool = True) -> Network:
+def straight(end: Support = FREE_SUPPORT, axial: bool = True) -> Network:
     beam = Beam("root", "tip", Section(MODULUS, WIDTH, THICKNESS, axial=axial))
-    return Network({"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, end)}, {"x": beam})
+    return Network({"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, end)}, {"x": beam})
 
 
-@pytest.mark.parametrize(("end", "factor"), [(FREE, 3.0), (slider_support(0.0), 12.0)], ids=["free", "guided"])
+@pytest.mark.parametrize(("end", "factor"), [(FREE_SUPPORT, 3.0), (slider_support(0.0), 12.0)], ids=["free", "guided"])
 @pytest.mark.parametrize("axial", [True, False])
 def test_a_straight_beam_resists_across_as_the_closed_form_says(end: Support, factor: float, axial: bool) -> None:
     """3 or 12 EI/L^3, as the support leaves the rotation; what guides the node across is taken away."""
@@ -61,7 +61,7 @@ def test_it_is_what_a_small_push_across_meets_in_any_pose() -> None:
     def path(shift: float) -> tuple[float, np.ndarray]:
         top = Support(across=True, direction=np.pi / 2, displacement=(0.0, shift, 0.0))
         nodes = {
-            "a": Node(0, 0, CLAMPED),
+            "a": Node(0, 0, CLAMPED_SUPPORT),
             "top": Node(0.05, 0.02, top),
             "eye": Node(0.055, 0.03),
         }
@@ -87,7 +87,7 @@ def test_it_does_not_depend_on_whether_a_displacement_or_a_force_drives() -> Non
 def eighty_beams() -> Path:
     """Eighty beams in a row, hardly pulled."""
     places = np.linspace(0.0, LENGTH, 81)
-    nodes = {f"n{k}": Node(float(x), 0, FREE if k else CLAMPED) for k, x in enumerate(places)}
+    nodes = {f"n{k}": Node(float(x), 0, FREE_SUPPORT if k else CLAMPED_SUPPORT) for k, x in enumerate(places)}
     beams = {f"b{k}": Beam(f"n{k}", f"n{k + 1}", Section(MODULUS, WIDTH, THICKNESS)) for k in range(80)}
     return trace(Network(nodes, beams), Loading((PointLoad("n80", fx=1e-6),), np.array([1.0])))
 

@@ -7,7 +7,7 @@ import pytest
 from functional_paths import functional_path
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Displacement,
     Link,
@@ -33,7 +33,7 @@ CURVE = CurveSpring("tip", np.pi / 2, (-5e-3, 0.0, 5e-3, 1e-2, 2e-2), (-2.0, 0.0
 def leaf(*springs: object, arm: bool = False) -> Network:
     """Return a guided leaf; with an arm the spring acts at the arm's end."""
     nodes = {
-        "a": Node(0, 0, CLAMPED),
+        "a": Node(0, 0, CLAMPED_SUPPORT),
         "b": Node(0.1, 0, slider_support(np.pi / 2)),
         "tip": Node(0.11 if arm else 0.1, 0),
     }
@@ -63,14 +63,14 @@ def test_a_straight_curve_is_a_linear_spring() -> None:
 def test_gradient_and_hessian_are_the_derivatives_of_the_energy() -> None:
     network = discretise(leaf(CURVE, arm=True), Loading((PointLoad("b", fy=1.0),), np.array([0.5])), 4)
     (spring,) = network.springs
-    from cfmkit.elastica.mechanics.terms import TERMS
+    from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 
     for seed in range(6):
         z = 0.1 * np.random.default_rng(seed).standard_normal(network.size)
-        term = TERMS[CurveSpring](network, spring, z, 1.0, 0.0)
+        term = ENERGY_TERMS[CurveSpring](network, spring, z, 1.0, 0.0)
         for k, unknown in enumerate(term.unknowns):
             stepped = z + 1e-30j * np.eye(network.size)[unknown]
-            moved = TERMS[CurveSpring](network, spring, stepped, 1.0, 0.0)
+            moved = ENERGY_TERMS[CurveSpring](network, spring, stepped, 1.0, 0.0)
             assert moved.energy.imag / 1e-30 == pytest.approx(term.gradient[k], rel=1e-10, abs=1e-12)
             assert moved.gradient.imag / 1e-30 == pytest.approx(term.hessian[:, k], rel=1e-10, abs=1e-10)
         tangent = energy.hessian(network, z, 0.3)

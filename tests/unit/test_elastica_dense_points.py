@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -24,7 +24,7 @@ MM = 1e-3
 def pressed(points, sign=1):
     section = Section(1477e6, 6 * MM, 1 * MM, shear=True, poisson_ratio=0.3)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "shuttle": Node(35 * MM * np.cos(np.radians(7)), 35 * MM * np.sin(np.radians(7)), slider_support(np.pi / 2)),
     }
     return trace(
@@ -61,7 +61,7 @@ def test_leaves_that_lie_almost_flat_or_hardly_buckle_keep_their_stable_branch(l
     """A leaf of rise h and thickness h/Q buckles and straightens at 2h/3 (1 -/+ sqrt(1 - (pi/Q)^2)), nearly."""
     rise = 4.265 * MM
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "shuttle": Node(np.sqrt((length * MM) ** 2 - rise**2), rise, slider_support(np.pi / 2)),
     }
     leaf = Beam("wall", "shuttle", Section(1477e6, 6 * MM, rise / slenderness))

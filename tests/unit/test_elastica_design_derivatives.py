@@ -11,7 +11,7 @@ from equilibria import equilibria
 from varied_networks import LAN, X, arms, lan, pushed, turned
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -88,9 +88,9 @@ def hooked(x: Any) -> Any:
     section = Section(2e9, 10e-3, x[0], shear=True)
     nodes = {
         "arm": Node(5e-3, 0.0),
-        "a": Node(0.0, 0.0, CLAMPED),
+        "a": Node(0.0, 0.0, CLAMPED_SUPPORT),
         "b": Node(30e-3, 20e-3 * x[3], slider_support(-np.pi / 2)),
-        "c": Node(60e-3, 0.0, CLAMPED),
+        "c": Node(60e-3, 0.0, CLAMPED_SUPPORT),
     }
     beams = {
         "hook": Beam("arm", "b", section, Polynomial((0.0, x[1], x[2])), end_offset=(1e-3, 2e-3)),

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -34,13 +34,13 @@ PUSH = Loading((PointLoad("t", fy=-1.0),), np.linspace(0.05, 2.0, 40))
 
 def arch(rise: float = 0.02) -> Network:
     """Return a pinned cosine arch: pushed at its top it sways off before its limit point."""
-    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, rise), "b": Node(0.2, 0, PINNED)}
+    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "t": Node(0.1, rise), "b": Node(0.2, 0, PINNED_SUPPORT)}
     beams = {"x": Beam("a", "t", SECTION, CosineArch(rise, 0.5)), "y": Beam("t", "b", SECTION, CosineArch(-rise, 0.5))}
     return Network(nodes, beams)
 
 
 def strip(**support: Any) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 0.0)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(0.1, 0.0)}
     return Network(nodes, {"x": Beam("a", "t", SECTION)}, **support)
 
 
@@ -76,7 +76,9 @@ def test_on_request_the_same_arch_is_followed_through_bifurcations_and_folds() -
 
 def test_a_turn_beyond_its_limit_point_ends_there() -> None:
     """The end of a pinned arc is turned until the arc snaps; by arc length the limit point is passed."""
-    bow = Network({"a": Node(0, 0, PINNED), "b": Node(0.1, 0, PINNED)}, {"x": Beam("a", "b", SECTION, arc(1.5))})
+    bow = Network(
+        {"a": Node(0, 0, PINNED_SUPPORT), "b": Node(0.1, 0, PINNED_SUPPORT)}, {"x": Beam("a", "b", SECTION, arc(1.5))}
+    )
     turned = Rotation("a", np.linspace(0.1, 3, 30))
     path = trace(bow, turned)
     passed = trace(bow, turned, Control(through_folds=True, most_points=60))
@@ -88,7 +90,7 @@ def test_a_turn_beyond_its_limit_point_ends_there() -> None:
 
 def test_a_path_that_goes_far_behind_its_start_has_left_its_range() -> None:
     """Half an arch in its symmetric mode pulls back, after its limit point, nearly as hard as it pushed before."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 2e-3, slider_support(UP))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(0.1, 2e-3, slider_support(UP))}
     half = Network(nodes, {"x": Beam("a", "t", Section(1e9, 1e-2, 2e-4), CosineArch(2e-3, 0.5))})
     load = Loading((PointLoad("t", fy=-1.0),), np.array([3e-4, 1e-3]))
     path = trace(half, load, Control(branch="primary", through_folds=True))
@@ -107,7 +109,7 @@ def test_a_path_keeps_to_its_number_of_points() -> None:
     assert f"{path.drive[-1]:.6g}" in path.message
 
 
-@pytest.mark.parametrize("nodes", [(Node(0, 0), Node(0.1, 0)), (Node(0, 0, PINNED), Node(0.1, 0))])
+@pytest.mark.parametrize("nodes", [(Node(0, 0), Node(0.1, 0)), (Node(0, 0, PINNED_SUPPORT), Node(0.1, 0))])
 def test_a_network_that_nothing_holds_has_no_start(nodes: tuple[Node, Node]) -> None:
     loose = Network(dict(zip("at", nodes, strict=True)), {"x": Beam("a", "t", SECTION)})
     path = trace(loose, Loading((PointLoad("t", fy=1.0),), np.array([1.0])))
@@ -117,7 +119,7 @@ def test_a_network_that_nothing_holds_has_no_start(nodes: tuple[Node, Node]) -> 
 
 def test_an_inextensible_arc_is_pulled_until_it_is_taut() -> None:
     section = Section(2e9, 8e-3, 1e-3, axial=False)
-    bow = Network({"a": Node(0, 0, CLAMPED), "t": Node(0.1, 0)}, {"x": Beam("a", "t", section, arc(0.5))})
+    bow = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(0.1, 0)}, {"x": Beam("a", "t", section, arc(0.5))})
     path = trace(bow, Displacement("t", 0.0, np.linspace(1e-4, 2e-3, 20)), Control(tolerance=1e-3))
     straight = 0.1 * (0.25 / np.sin(0.25) - 1)
     assert path.status is not PathStatus.COMPLETE
@@ -129,11 +131,11 @@ def test_an_inextensible_arc_is_pulled_until_it_is_taut() -> None:
 def test_a_path_does_not_end_where_its_mesh_is_too_coarse_for_a_beam_drawn_taut(tolerance: float) -> None:
     """A leaf pulled off its wall, and a clamped beam pushed sideways: forces only grow, there is no limit point."""
     leaf = Network(
-        {"w": Node(0, 0, CLAMPED), "d": Node(0.0347, 4.87e-3, slider_support(UP))},
+        {"w": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.0347, 4.87e-3, slider_support(UP))},
         {"x": Beam("w", "d", Section(1477e6, 6e-3, 7e-4))},
     )
     section = Section(2e11, 8e-3, 3.46e-3)
-    nodes = {"a": Node(0, 0, CLAMPED), "m": Node(0.04, 0), "b": Node(0.1, 0, CLAMPED)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "m": Node(0.04, 0), "b": Node(0.1, 0, CLAMPED_SUPPORT)}
     beam = Network(nodes, {"x": Beam("a", "m", section), "y": Beam("m", "b", section)})
     for network, drive in (
         (leaf, Displacement("d", UP, np.linspace(0.1, 1, 10) * 4.87e-3)),
@@ -148,7 +150,7 @@ def test_a_path_does_not_end_where_its_mesh_is_too_coarse_for_a_beam_drawn_taut(
 def test_a_batch_keeps_what_each_path_reached_and_why_it_ended(workers: int) -> None:
     """Among them a network that cannot exist and one with a place that is not a number."""
     closed = Network(strip().nodes, {"x": Beam("a", "t", SECTION, arc(2 * np.pi))})
-    nowhere = Network({"a": Node(0, 0, CLAMPED), "t": Node(float("nan"), 0.0)}, {"x": Beam("a", "t", SECTION)})
+    nowhere = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(float("nan"), 0.0)}, {"x": Beam("a", "t", SECTION)})
     networks = [strip(), arch(), closed, nowhere, strip()]
     found = list(trace_many(networks, PUSH, workers=workers))
     assert [one.status for one in found] == ["COMPLETE", "JUMPS", "INVALID", "INVALID", "COMPLETE"]
@@ -161,7 +163,7 @@ def test_a_batch_keeps_what_each_path_reached_and_why_it_ended(workers: int) -> 
 
 def test_constant_loads_beyond_a_limit_point_say_at_which_share() -> None:
     """The limit load itself is that of the same load as a drive."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 4e-3, slider_support(UP))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(0.1, 4e-3, slider_support(UP))}
     half = Network(nodes, {"x": Beam("a", "t", Section(1e9, 1e-2, 1.6e-3), CosineArch(4e-3, 0.5))})
     found = trace(half, Loading((PointLoad("t", fy=-1.0),), np.array([10.0])), Control(branch="primary"))
     assert found.status is PathStatus.LIMIT_POINT

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
-    FREE,
-    PINNED,
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -50,7 +50,7 @@ def frame(section: Section | None = None, turn: float = 0.0, size: float = 1.0, 
     section = section or Section(2e9, 8e-3 * size, _scaled(TAPER, size), shear=True)
     sign = -1.0 if mirrored else 1.0
 
-    def at(x: float, y: float, support: Support = FREE) -> Node:
+    def at(x: float, y: float, support: Support = FREE_SUPPORT) -> Node:
         c, s = np.cos(turn), np.sin(turn)
         support = dataclasses.replace(support, direction=sign * support.direction + turn)
         y *= sign
@@ -62,10 +62,10 @@ def frame(section: Section | None = None, turn: float = 0.0, size: float = 1.0, 
         return size * (c * x - s * y), size * (s * x + c * y)
 
     nodes = {
-        "a": at(0, 0, CLAMPED),
+        "a": at(0, 0, CLAMPED_SUPPORT),
         "b": at(0.05, 0.03),
         "bb": at(0.055, 0.03),
-        "c": at(0.09, 0.0, PINNED),
+        "c": at(0.09, 0.0, PINNED_SUPPORT),
         "d": at(0.06, 0.07, slider_support(UP)),
     }
     beams = {
@@ -138,7 +138,9 @@ def test_a_scaled_network_has_scaled_forces(reference: Path, size: float) -> Non
 def test_the_modulus_scales_the_force() -> None:
     soft, hard = (
         trace(
-            Network({"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0)}, {"x": Beam("a", "d", Section(e, 1e-2, 1e-3))}),
+            Network(
+                {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.1, 0)}, {"x": Beam("a", "d", Section(e, 1e-2, 1e-3))}
+            ),
             Displacement("d", UP, [0.03]),
             TIGHT,
         ).effort[-1]
@@ -209,7 +211,7 @@ def test_shapes_by_points_approach_the_exact_arc() -> None:
     section = Section(2e9, 8e-3, 1e-3)
 
     def force(shape: object) -> float:
-        nodes = {"a": Node(*circle[0], CLAMPED), "d": Node(*circle[-1], slider_support(0.0))}
+        nodes = {"a": Node(*circle[0], CLAMPED_SUPPORT), "d": Node(*circle[-1], slider_support(0.0))}
         network = Network(nodes, {"x": Beam("a", "d", section, shape)})  # type: ignore[arg-type]
         return float(trace(network, Displacement("d", np.pi, [5e-3]), TIGHT).effort[-1])
 
@@ -262,7 +264,7 @@ def test_a_slide_spring_pulls_along_its_direction_only() -> None:
 
 
 def test_a_cosine_arch_fits_its_span_exactly() -> None:
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0.0, CLAMPED), "e": Node(0.1, 0.05)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.1, 0.0, CLAMPED_SUPPORT), "e": Node(0.1, 0.05)}
     beams = {
         "x": Beam("a", "d", Section(1e9, 1e-2, 1e-3), CosineArch(0.004)),
         "y": Beam("d", "e", Section(1e9, 1e-2, 1e-3)),

@@ -11,7 +11,7 @@ from beam_equilibrium import Judge, mean_motion
 from beam_networks import drives, network
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     LineLoad,
@@ -101,7 +101,7 @@ def pulled_strip(thin: float) -> Path:
     """Return a clamped strip whose thickness at a quarter of its length is `thin` [m], its end pulled."""
     thickness = Taper(np.linspace(0, 1, 5), np.array([1e-3, thin, 0.9e-3, 1.1e-3, 1e-3]))
     section = Section(1.8e9, 5e-3, thickness, shear=True)
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.12, 0.0, Support(rotation=True))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.12, 0.0, Support(rotation=True))}
     net = Network(nodes, {"ab": Beam("a", "b", section)})
     return trace(net, Loading((PointLoad("b", 2.0, 0.1),), np.linspace(0.1, 1.0, 10)), Control(tolerance=1e-7))
 

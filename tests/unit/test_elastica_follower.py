@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     LineSpring,
@@ -29,7 +29,7 @@ from cfmkit.elastica import (
 
 LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
 EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
-NODES = {"foot": Node(0, 0, CLAMPED), "top": Node(LENGTH, 0)}
+NODES = {"foot": Node(0, 0, CLAMPED_SUPPORT), "top": Node(LENGTH, 0)}
 
 
 def column(loads: Any = ()) -> Network:
@@ -102,7 +102,7 @@ def test_two_columns_under_partly_tangential_loads_diverge_both() -> None:
 
 def two_columns(loads: Any) -> Network:
     """Return two columns side by side whose tops a weak spring joins."""
-    nodes = NODES | {"other": Node(0, LENGTH, CLAMPED), "end": Node(LENGTH, LENGTH)}
+    nodes = NODES | {"other": Node(0, LENGTH, CLAMPED_SUPPORT), "end": Node(LENGTH, LENGTH)}
     section = Section(2e9, 8e-3, 1e-3, axial=False)
     beams = {"one": Beam("foot", "top", section), "two": Beam("other", "end", section)}
     weak = LineSpring("top", "end", 1e-3 * RIGIDITY / LENGTH**3)

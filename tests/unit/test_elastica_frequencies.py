@@ -12,9 +12,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from cfmkit.elastica import (
-    CLAMPED,
-    FREE,
-    PINNED,
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -40,9 +40,9 @@ UNIT = np.sqrt(RIGIDITY / (PER_LENGTH * LENGTH**4)) / (2 * np.pi)
 WHOLE = NetworkMasses({"x": DENSITY})
 
 
-def beam(end: Support = FREE, axial: bool = False, pin: bool = False) -> Network:
+def beam(end: Support = FREE_SUPPORT, axial: bool = False, pin: bool = False) -> Network:
     section = Section(MODULUS, WIDTH, THICKNESS, axial=axial)
-    start = PINNED if pin else CLAMPED
+    start = PINNED_SUPPORT if pin else CLAMPED_SUPPORT
     return Network({"root": Node(0, 0, start), "tip": Node(LENGTH, 0, end)}, {"x": Beam("root", "tip", section)})
 
 
@@ -152,7 +152,7 @@ def test_a_stubby_beam_has_the_frequencies_of_timoshenko() -> None:
     """Shear and the inertia of sections, as the boundary-value problem has them; slenderness 20."""
     length = 20 * THICKNESS
     section = Section(MODULUS, WIDTH, THICKNESS, axial=True, shear=True)
-    net = Network({"root": Node(0, 0, CLAMPED), "tip": Node(length, 0)}, {"x": Beam("root", "tip", section)})
+    net = Network({"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(length, 0)}, {"x": Beam("root", "tip", section)})
     found = frequencies(functional_path(net, Loading((PointLoad("tip", fx=1.0),), np.array([1e-9])), 8), WHOLE, 3)
     area, second = WIDTH * THICKNESS, WIDTH * THICKNESS**3 / 12
     slip = 5 / 6 * MODULUS / 2.6 * area
@@ -181,13 +181,13 @@ def test_a_coil_of_many_turns_has_the_frequencies_of_seven_beams() -> None:
     places = radius * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
     names = ["a", *(f"m{k}" for k in range(1, pieces)), "b"]
     nodes = {
-        name: Node(*place, CLAMPED if name == "a" else FREE)
+        name: Node(*place, CLAMPED_SUPPORT if name == "a" else FREE_SUPPORT)
         for name, place in zip(names, (places - places[0]).tolist(), strict=True)
     }
     beams = {f"x{k}": Beam(names[k], names[k + 1], section, arc(sweep / pieces)) for k in range(pieces)}
     chain = trace(Network(nodes, beams), drive, Control(tolerance=1e-9))
     known = frequencies(chain, NetworkMasses(dict.fromkeys(beams, DENSITY)), 3, [len(chain) - 1])
-    ends = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}
+    ends = {"a": Node(0.0, 0.0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}
     coil = functional_path(Network(ends, {"x": Beam("a", "b", section, arc(sweep))}), drive, 10)
     found = frequencies(coil, WHOLE, 3)
     assert found.held[0] == pytest.approx(known.held[0], rel=1e-6)

@@ -9,7 +9,7 @@ import pytest
 from varied_networks import KINDS, X, loaded, pushed, turned
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -108,7 +108,7 @@ def test_a_variable_that_changes_the_make_up_is_refused() -> None:
     def build(x: Any) -> Network:
         joint = "pin" if np.iscomplexobj(x) else "rigid"
         beam = Beam("a", "b", Section(2e9, 8e-3, 1e-3), Polynomial((0.0, x[0])), end_joint=joint)  # type: ignore[arg-type]
-        return Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0, slider_support(np.pi / 2))}, {"ab": beam})
+        return Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0, slider_support(np.pi / 2))}, {"ab": beam})
 
     path = trace(build(np.array([0.3])), Displacement("b", np.pi / 2, np.array([1e-3])))
     with pytest.raises(InputError, match="changes the make-up of the network"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -76,7 +76,7 @@ def one_beam(shape: Callable[[Any], Any], thickness: Any, closure: Any = "rotsca
             given = Taper(stations, given.values * x[2])
         else:
             given = given * x[2]
-        nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1 * x[1], 0.02, slider_support(np.pi / 2))}
+        nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.1 * x[1], 0.02, slider_support(np.pi / 2))}
         return Network(nodes, {"ad": Beam("a", "d", Section(2e9, 8e-3, given, shear=True), shape(x[0]), closure)})
 
     return build

@@ -7,8 +7,8 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -30,7 +30,7 @@ TRAVEL = np.arange(1, 13) * 0.5e-3
 def pressed(imperfection: float = 0.0, thickness: float = 1e-3) -> Path:
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
     }
     network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
@@ -89,7 +89,7 @@ LENGTH = 0.1
 def column(slenderness: float, clamped: bool, cut: float | None = None, arm: float = 0.0) -> Network:
     """Return a straight column, perhaps of two beams, which may be held by rigid arms at the node between them."""
     section = Section(2e9, 10e-3, LENGTH * np.sqrt(12) / slenderness)
-    ends = (CLAMPED, slider_support(0.0)) if clamped else (PINNED, slider_support(0.0, rotates=True))
+    ends = (CLAMPED_SUPPORT, slider_support(0.0)) if clamped else (PINNED_SUPPORT, slider_support(0.0, rotates=True))
     nodes = {"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}
     if cut is None:
         return Network(nodes, {"x": Beam("a", "b", section)})
@@ -143,7 +143,7 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
 def test_a_column_that_does_not_stretch_buckles_under_a_displacement_once_it_is_bent(clamped: bool) -> None:
     """The perfect one is rigid until its critical load. Bent by 1e-5 of its length it is nearly so: closed form."""
     section = Section(2e9, 10e-3, 1e-3, axial=False)
-    ends = (CLAMPED, slider_support(0.0)) if clamped else (PINNED, slider_support(0.0, rotates=True))
+    ends = (CLAMPED_SUPPORT, slider_support(0.0)) if clamped else (PINNED_SUPPORT, slider_support(0.0, rotates=True))
     net = Network({"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}, {"x": Beam("a", "b", section)})
     modulus = np.sin(np.array([20.0, 50.0, 80.0]) * np.pi / 360) ** 2  # of the integrals, by the steepest slope
     shortened = 2 * (1 - ellipe(modulus) / ellipk(modulus)) * LENGTH
@@ -161,7 +161,11 @@ def test_a_column_that_does_not_stretch_buckles_under_a_displacement_once_it_is_
 def test_a_beam_that_is_pulled_and_does_not_stretch_has_no_mode() -> None:
     """It is looked at under a pull up to 1e5 EI/L^2, and nothing buckles."""
     section = Section(2e9, 10e-3, 1e-3, axial=False)
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, slider_support(0.0)), "c": Node(LENGTH / 2, LENGTH / 2)}
+    nodes = {
+        "a": Node(0, 0, CLAMPED_SUPPORT),
+        "b": Node(LENGTH, 0, slider_support(0.0)),
+        "c": Node(LENGTH / 2, LENGTH / 2),
+    }
     net = Network(nodes, {"x": Beam("a", "b", section), "y": Beam("a", "c", section)})
     path = trace(net, Displacement("b", 0.0, np.array([1e-3])), Control(imperfection=1e-5))
     assert path.status is PathStatus.NO_START
@@ -185,7 +189,10 @@ def test_a_strip_that_does_not_stretch_is_straight_up_to_its_critical_load(
 ) -> None:
     """Its poses change by rounding only, which leads nowhere."""
     c, s = np.cos(direction), np.sin(direction)
-    nodes = {"a": Node(0, 0, PINNED), "b": Node(LENGTH * c, LENGTH * s, slider_support(direction, rotates=True))}
+    nodes = {
+        "a": Node(0, 0, PINNED_SUPPORT),
+        "b": Node(LENGTH * c, LENGTH * s, slider_support(direction, rotates=True)),
+    }
     network = Network(nodes, {"x": Beam("a", "b", Section(2e9, 10e-3, 0.3e-3, axial=False))})
     critical = np.pi**2 * 2e9 * 10e-3 * 0.3e-3**3 / 12 / LENGTH**2
     load = PointLoad("b", fx=-critical * c, fy=-critical * s)

@@ -19,7 +19,7 @@ from batch_networks import two_leaves
 
 import cfmkit
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -41,7 +41,7 @@ from cfmkit.elastica.mechanics.designs import NetworkDesigns, raise_designs, set
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
 from cfmkit.elastica.mechanics.march import (
-    SWITCH,
+    WITHOUT_C_VARIABLE,
     CompiledEquations,
     engine,
     equations,
@@ -131,7 +131,7 @@ def test_factors_count_what_dense_eigenvalues_count(seed: int) -> None:
 
 def coil(turns: float, degree: int) -> Discretisation:
     beam = Beam("a", "b", Section(2e9, 1e-2, 1e-4), arc(2 * np.pi * turns))
-    net = Network({"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}, {"coil": beam})
+    net = Network({"a": Node(0.0, 0.0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"coil": beam})
     return discretise(net, Rotation("b", np.array([1.0])), degree)
 
 
@@ -151,7 +151,9 @@ def test_a_coil_of_twenty_turns_is_factored_with_its_inertia() -> None:
 def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> None:
     """At the load at which the element alone is singular its unknowns cannot be eliminated first."""
     stiff = Section(2e9, 1e-2, 1e-3, axial=False)
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)})
+    net = Network(
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)}
+    )
     rigidity = 2e9 * 1e-2 * 1e-9 / 12
     network = discretise(net, Loading((PointLoad("b", fx=-1.0),), np.array([1.0])), 8, pieces=4)
     alone = 4 * np.pi**2 * rigidity / 0.025**2
@@ -164,7 +166,9 @@ def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> 
 
 
 def test_factors_under_following_loads_solve_and_count_real_eigenvalues() -> None:
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})
+    net = Network(
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+    )
     network = discretise(net, Loading((PointLoad("b", fx=-1.0, follows=True),), np.array([30.0])), 8, pieces=2)
     own = equations(network)
     free = 2 * random_state(network, 1)[network.free]
@@ -227,7 +231,9 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
 
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})
+    net = Network(
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+    )
     own = kind(discretise(net, Loading((PointLoad("b", fy=1.0),), np.array([1.0])), 8))
     border = np.zeros(own.n + 1)
     border[np.flatnonzero(own.mesh.free == own.mesh.bodies["b"][2])] = 1.0
@@ -240,7 +246,7 @@ def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
     net = Network(
-        {"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, slider_support(0.0))},
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0, slider_support(0.0))},
         {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))},
     )
     critical = 4 * np.pi**2 * 1e-6 / 12 / 0.1  # shortening of a column, both ends clamped, axial strain (t/L)^2 pi^2/3
@@ -255,7 +261,7 @@ TARGETS = np.linspace(0, 5e-3, 11)[1:]
 
 def leaf(thickness: float, taper: bool = False) -> tuple[Network, Displacement]:
     thick = Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.08, 0.03, slider_support(0.0, rotates=False))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.08, 0.03, slider_support(0.0, rotates=False))}
     net = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, thick), Polynomial((0.0, 1.0, -0.8)))})
     return net, Displacement("b", np.pi, TARGETS)
 
@@ -298,7 +304,7 @@ def test_designs_of_a_batch_may_differ_in_their_springs() -> None:
 def test_states_of_a_batch_lead_to_those_of_a_higher_degree(monkeypatch: pytest.MonkeyPatch, numpy_only: bool) -> None:
     """Efforts of designs solved from states of a lower degree are those of a march with the higher one."""
     if numpy_only:
-        monkeypatch.setenv(SWITCH, "1")
+        monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
     designs, chosen = leaves(2), [3, 9]
     mesh, fine = designs.template, raise_degree(designs.template, 12)
     _, _, states = march_many(designs, TARGETS, chosen=chosen)
@@ -325,7 +331,7 @@ def test_several_threads_march_at_once() -> None:
 
 def test_numpy_takes_over_without_the_compiled_module(monkeypatch: pytest.MonkeyPatch) -> None:
     compiled_efforts = march_many(leaves(2), TARGETS)[0]
-    monkeypatch.setenv(SWITCH, "1")
+    monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
     assert engine() == "numpy"
     assert type(equations(discretise(*leaf(1e-3), 8))) is NumpyEquations
     efforts, codes, _ = march_many(leaves(2), TARGETS)

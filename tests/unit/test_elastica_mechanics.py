@@ -10,7 +10,7 @@ import pytest
 from scipy.special import ellipk
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -60,7 +60,7 @@ def effort(network: Discretisation, free: Any, drive: float) -> float:
 
 def column(clamped: bool = True) -> tuple[Network, Displacement]:
     support = slider_support(0.0, rotates=not clamped)
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, support)}, {"x": Beam("a", "b", STRIP)})
+    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0, support)}, {"x": Beam("a", "b", STRIP)})
     return net, Displacement("b", np.pi, np.linspace(1e-4, 1.3e-3, 5) * LENGTH)
 
 
@@ -93,7 +93,7 @@ def test_equilibria_of_one_high_degree_have_the_forces_of_a_trace(seed: int) -> 
 
 def test_a_pulled_strip_converges_spectrally() -> None:
     load = Loading((PointLoad("b", fy=0.3),), np.array([1.0]))
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
+    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
     tips = []
     for degree in (3, 5, 7, 14):
         network = discretise(net, load, degree)
@@ -119,7 +119,9 @@ def test_negative_pivots_count_unstable_directions_beyond_buckling() -> None:
 
 def test_a_column_that_does_not_stretch_is_stable_below_its_critical_load() -> None:
     stiff = Section(2e9, 1e-2, 1e-3, axial=False)
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)})
+    net = Network(
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0, slider_support(0.0))}, {"x": Beam("a", "b", stiff)}
+    )
     critical = 4 * np.pi**2 * 2e9 * 1e-2 * 1e-9 / 12 / LENGTH**2  # both ends clamped
     network = discretise(net, Loading((PointLoad("b", fx=-critical),), np.array([1.0])), 10)
     counts = []
@@ -134,7 +136,7 @@ def test_a_column_that_does_not_stretch_is_stable_below_its_critical_load() -> N
 
 def test_a_buckled_strut_has_the_load_of_the_elliptic_integral() -> None:
     stiff = Section(2e9, 1e-2, 1e-3, axial=False)
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", stiff)})
+    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", stiff)})
     turn = 1.0  # rotation of the loaded end [rad]
     load = (2e9 * 1e-2 * 1e-9 / 12) / LENGTH**2 * ellipk(np.sin(turn / 2) ** 2) ** 2
     network = discretise(net, Loading((PointLoad("b", fx=-load),), np.array([1.0])), 14)

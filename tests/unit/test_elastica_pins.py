@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -28,7 +28,7 @@ FINE = Control(tolerance=1e-10)
 SECTION = Section(2e9, 8e-3, 1e-3)
 PUSH = Displacement("c", -np.pi / 2, np.array([2e-3, 6e-3]))
 NODES = {
-    "a": Node(0.0, 0.0, CLAMPED),
+    "a": Node(0.0, 0.0, CLAMPED_SUPPORT),
     "b": Node(0.05, 0.03),
     "p": Node(0.05, 0.03),
     "c": Node(0.1, 0.05, slider_support(np.pi / 2)),

@@ -10,7 +10,7 @@ import pytest
 from beam_networks import drives, network
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -32,7 +32,7 @@ LENGTH = 35e-3
 
 def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path:
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "d": Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), slider_support(np.pi / 2)),
     }
     leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
@@ -121,7 +121,7 @@ def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1.7e-5, 1e-6])
 def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float) -> None:
     half, rise = 0.06, 0.012
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED_SUPPORT)}
     section = Section(2e9, 8e-3, rise / 12)
     beams = {
         "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
@@ -148,7 +148,7 @@ def test_a_mesh_too_coarse_for_the_constant_loads_is_refined(tolerance: float) -
 def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
     """Where no node moves in the mode, by the moment at the clamp; else by the node's rotation."""
     angle, rise, half = np.radians(7), 0.006, 0.03
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED_SUPPORT)}
     section = Section(2e9, 8e-3, rise / 10)
     beams = {
         "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
@@ -175,7 +175,7 @@ def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(t
     """
     angle, length, stiff = np.radians(8), 0.05, Section(2e9, 8e-3, 1e-3, axial=False)
     across, up = length * np.cos(angle), length * np.sin(angle)
-    nodes = {"left": Node(-across, 0, CLAMPED), "apex": Node(0, up), "right": Node(across, 0, CLAMPED)}
+    nodes = {"left": Node(-across, 0, CLAMPED_SUPPORT), "apex": Node(0, up), "right": Node(across, 0, CLAMPED_SUPPORT)}
     beams = {"one": Beam("left", "apex", stiff), "two": Beam("right", "apex", stiff)}
     root = 4.493409457909064
     force = 2 * np.sin(angle) * root**2 * 2e9 * 8e-3 * 1e-9 / 12 / length**2

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk, ellipkinc
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -35,7 +35,7 @@ LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
 EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
 STIFF = 50 * EULER / LENGTH  # of the tendon
 RIGID = Section(2e9, 8e-3, 1e-3, axial=False)
-NODES = {"foot": Node(0, 0, CLAMPED), "top": Node(LENGTH, 0)}
+NODES = {"foot": Node(0, 0, CLAMPED_SUPPORT), "top": Node(LENGTH, 0)}
 
 
 def column(springs: Any, loads: Any = ()) -> Network:

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import fsolve
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -28,7 +28,7 @@ UP = np.pi / 2
 
 def pulled(thickness: float, rise: float, direction: float, travel: float, bow: float = 0.0) -> Path:
     """Return the path of a clamped strip whose far end, `rise` higher, is guided along a direction."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, rise, slider_support(direction))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, rise, slider_support(direction))}
     section = Section(MODULUS, WIDTH, thickness, axial=True)
     beam = Beam("a", "b", section, CosineArch(bow, 1.0)) if bow else Beam("a", "b", section)
     drive = Displacement("b", direction, np.linspace(0, travel, 6)[1:])

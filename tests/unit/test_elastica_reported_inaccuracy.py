@@ -7,8 +7,8 @@ import pytest
 
 import cfmkit.elastica.tracing.trace as tracing
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -29,14 +29,14 @@ BENDING = Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
 def v_beam() -> Network:
     length, angle = 35e-3, np.radians(7)
     nodes = {
-        "wall": Node(0, 0, CLAMPED),
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
         "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
     }
     return Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 1e-3))})
 
 
 def strip() -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, 0)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.05, 0)}
     return Network(nodes, {"x": Beam("a", "d", Section(2e9, 8e-3, 1e-3))})
 
 
@@ -76,10 +76,10 @@ def test_a_path_on_which_nothing_bears_a_load_is_as_accurate_as_its_poses(tolera
     """A strip on pins is turned by one end: forces are rounding, and no mesh makes them agree."""
     stiff, soft = Section(88e9, 8e-3, 1.2e-3), Section(1.8e9, 8e-3, 0.4e-3)
     nodes = {
-        "hinge": Node(0.0186, 0.0337, PINNED),
+        "hinge": Node(0.0186, 0.0337, PINNED_SUPPORT),
         "end": Node(0.0185, 0.0788),
         "joint": Node(0.0532, 0.0035),
-        "wall": Node(0.0733, 0.0398, CLAMPED),
+        "wall": Node(0.0733, 0.0398, CLAMPED_SUPPORT),
     }
     beams = {
         "arm": Beam("joint", "hinge", stiff),

@@ -10,7 +10,7 @@ import pytest
 from functional_paths import beam_stress, functional_path
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Displacement,
     Loading,
@@ -36,7 +36,7 @@ def assert_near(found: Any, known: Any, tolerance: float = 1e-6) -> None:
 
 def test_sections_of_a_cantilever_are_those_of_statics() -> None:
     """A force across the tip: the moment is the force times the arm of the bent beam, whatever its shape."""
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
+    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
     force = 2 * RIGIDITY / LENGTH**2
     path = functional_path(net, Loading((PointLoad("b", fy=1.0),), np.array([force])), 12, 2)
     seen, line = path.sections("x"), path.shape("x", 0)
@@ -52,7 +52,7 @@ def test_sections_of_a_cantilever_are_those_of_statics() -> None:
 
 def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() -> None:
     """An arch that is pressed, pinned at both ends: most bent inside, wherever it is cut."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0.2 * LENGTH, slider_support(0.0))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0.2 * LENGTH, slider_support(0.0))}
     found = []
     for pieces in (1, 3):
         beam = Beam("a", "b", STRIP, Polynomial((0.0, 1.0, -0.7)), start_joint="pin", end_joint="pin")
@@ -68,7 +68,7 @@ def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() 
 
 
 def test_the_effort_of_a_moment_drive_is_the_rotation() -> None:
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
+    net = Network({"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}, {"x": Beam("a", "b", STRIP)})
     moment = 2.0 * RIGIDITY / LENGTH
     path = functional_path(net, Loading((PointLoad("b", moment=1.0),), np.array([moment])), 12)
     assert path.effort[0] == pytest.approx(2.0, rel=1e-10)
@@ -79,7 +79,7 @@ def test_the_effort_of_a_moment_drive_is_the_rotation() -> None:
 
 def test_the_stiffness_across_a_guided_leaf_is_that_without_its_guide() -> None:
     """A straight leaf moved along its width: the tip gives way along its length by stretch and by bending alone."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, slider_support(np.pi / 2, rotates=False))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0, slider_support(np.pi / 2, rotates=False))}
     path = functional_path(
         Network(nodes, {"x": Beam("a", "b", STRIP)}), Displacement("b", np.pi / 2, np.array([1e-7])), 10
     )
@@ -97,7 +97,7 @@ def test_a_node_that_a_link_moves_has_no_reaction() -> None:
 
 def arch(points: int, load: bool = False) -> tuple[Network, Displacement | Loading]:
     """An arch that is pressed flat: its force has a largest and a smallest value on the way."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0.02, slider_support(np.pi / 2, rotates=False))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0.02, slider_support(np.pi / 2, rotates=False))}
     net = Network(nodes, {"x": Beam("a", "b", STRIP, Polynomial((0.0, 0.9, -0.4)))})
     if load:
         return net, Loading((PointLoad("b", fy=1.0),), np.linspace(0, 1.5, points)[1:])

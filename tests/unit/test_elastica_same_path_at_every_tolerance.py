@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
-    FREE,
-    PINNED,
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -39,10 +39,10 @@ def arch(rng: Any) -> tuple[Network, Any]:
         (Polynomial(), Polynomial()),
         (arc(-rng.uniform(0.1, 0.8)),) * 2,
     ]
-    ends = [CLAMPED if rng.integers(2) else PINNED for _ in range(2)]
+    ends = [CLAMPED_SUPPORT if rng.integers(2) else PINNED_SUPPORT for _ in range(2)]
     nodes = {
         "a": Node(0, 0, ends[0]),
-        "t": Node(HALF, rise, FREE if rng.integers(2) else slider_support(np.pi / 2)),
+        "t": Node(HALF, rise, FREE_SUPPORT if rng.integers(2) else slider_support(np.pi / 2)),
         "b": Node(2 * HALF, 0, ends[1]),
     }
     one, two = forms[int(rng.integers(3))]
@@ -86,7 +86,7 @@ def leaf(rng: Any) -> tuple[Network, Displacement]:
     """Return half a V-beam, slender enough to buckle, and a drive that presses it through."""
     angle = np.radians(rng.uniform(2, 20))
     rise = 35e-3 * np.sin(angle)
-    nodes = {"w": Node(0, 0, CLAMPED), "d": Node(35e-3 * np.cos(angle), rise, slider_support(np.pi / 2))}
+    nodes = {"w": Node(0, 0, CLAMPED_SUPPORT), "d": Node(35e-3 * np.cos(angle), rise, slider_support(np.pi / 2))}
     beams = {"v": Beam("w", "d", Section(1477e6, 6e-3, rise / rng.uniform(3, 15)))}
     points = np.linspace(0, rng.uniform(0.5, 2.3), int(rng.integers(4, 40)))[1:] * rise
     return Network(nodes, beams), Displacement("d", -np.pi / 2, points)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -37,7 +37,7 @@ EXACT = Control(tolerance=1e-9)
 TIP_LOAD = (PointLoad("tip", 0.0, -1.0),)
 
 
-def leaf(*contacts, support=CLAMPED, at=(0.0, 0.0), angle=0.0, section=THIN):
+def leaf(*contacts, support=CLAMPED_SUPPORT, at=(0.0, 0.0), angle=0.0, section=THIN):
     """Return a straight leaf of length 1 from `root` to `tip`."""
     end = at[0] + np.cos(angle), at[1] + np.sin(angle)
     nodes = {"root": Node(*at, support), "tip": Node(*end)}
@@ -164,7 +164,7 @@ def test_a_pinned_column_between_walls_touches_lies_flat_and_buckles_again():
 
 
 def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(1, 1, Support(False, False, True))}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(1, 1, Support(False, False, True))}
     net = Network(
         nodes, {"leaf": Beam("root", "tip", THIN, arc(np.pi / 2))}, contacts=(side("floor", line((0, -HALF), 0)),)
     )
@@ -179,7 +179,7 @@ def test_a_ring_between_plates_has_the_forces_of_shooting_and_lies_flat():
 @pytest.mark.slow
 def test_a_snap_is_caught_by_a_disc_where_the_path_becomes_stable_again():
     held = Support(True, True, True, displacement=(-0.02, 0, 0))
-    nodes = {"root": Node(0, 0, CLAMPED), "mid": Node(0.5, 0), "tip": Node(1, 0, held)}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "mid": Node(0.5, 0), "tip": Node(1, 0, held)}
     beams = {"leaf": Beam("root", "mid", THIN), "other": Beam("mid", "tip", THIN)}
     net = Network(nodes, beams, contacts=(side("pin", circle((0.25, -0.07), 0.05 - HALF)),))
     drive = Loading((PointLoad("mid", 0, -1.0, 0.02),), np.array([2.0, 10, 20]))

@@ -17,8 +17,8 @@ from scipy.optimize import brentq, root
 from scipy.special import ellipe, ellipk
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -39,7 +39,9 @@ RNG = np.random.default_rng(0)
 def strip(slenderness: float, ends: str, axial: bool = True) -> tuple[Network, float]:
     """A straight strip of 100 mm, and its bending rigidity; pinned, or clamped and guided."""
     thickness = 0.1 * math.sqrt(12) / slenderness
-    start, end = (PINNED, Support(False, True, False)) if ends == "pinned" else (CLAMPED, slider_support(0.0))
+    start, end = (
+        (PINNED_SUPPORT, Support(False, True, False)) if ends == "pinned" else (CLAMPED_SUPPORT, slider_support(0.0))
+    )
     section = Section(2e9, 10e-3, thickness, axial=axial)
     nodes = {"a": Node(0, 0, start), "b": Node(0.1, 0, end)}
     return Network(nodes, {"strip": Beam("a", "b", section)}), 2e9 * 10e-3 * thickness**3 / 12

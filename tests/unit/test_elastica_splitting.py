@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -28,7 +28,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
-from cfmkit.elastica.model.beam import GAUSS
+from cfmkit.elastica.model.beam import BEAM_QUADRATURE
 from cfmkit.elastica.model.beam_fits import BeamFits, beam_end_at
 
 DRIVE = Displacement("d", -np.pi / 2, np.array([2e-3, 6e-3]))
@@ -39,10 +39,10 @@ def whole() -> Network:
     """Curved, tapered and straight beams with an offset, a pin, a linked node, a spring, dead loads."""
     section = Section(2e9, 8e-3, Taper(np.array([0, 0.4, 1]), np.array([1.0e-3, 1.4e-3, 0.9e-3])), shear=True)
     nodes = {
-        "a": Node(0, 0, CLAMPED),
+        "a": Node(0, 0, CLAMPED_SUPPORT),
         "b": Node(0.05, 0.03),
         "bb": Node(0.055, 0.03),
-        "c": Node(0.09, 0.0, PINNED),
+        "c": Node(0.09, 0.0, PINNED_SUPPORT),
         "d": Node(0.06, 0.07, slider_support(np.pi / 2)),
     }
     beams = {
@@ -70,7 +70,7 @@ def cut(net: Network, name: str, u: float) -> Network:
     """Return the network with one beam cut at a fraction of its length."""
     beam = net.beams[name]
     fitted, angle = BeamFits(net)[name], np.polynomial.Polynomial(beam.shape.coefficients)  # type: ignore[union-attr]
-    places, weights = GAUSS
+    places, weights = BEAM_QUADRATURE
     along = fitted.angle(u * places, 0.5)
     x, y = (
         float(start + u * fitted.length * weights @ f(along))

@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -34,7 +34,7 @@ SECTION = Section(2e9, 8e-3, 1e-3)
 def half_arch(ratio: float) -> tuple[Network, float]:
     """Return half a clamped cosine arch whose rise is `ratio` times its thickness, and the rise [m]."""
     rise = 2e-3
-    nodes = {"wall": Node(0, 0, CLAMPED), "middle": Node(0.1, rise, slider_support(UP))}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "middle": Node(0.1, rise, slider_support(UP))}
     return Network(
         nodes, {"half": Beam("wall", "middle", Section(1e9, 1e-2, rise / ratio), CosineArch(rise, 0.5))}
     ), rise
@@ -59,7 +59,7 @@ def test_the_end_of_a_branch_is_located_though_the_path_it_left_turns_back(ratio
 @pytest.mark.parametrize("force", [0.2, 0.24])
 def test_a_constant_load_on_a_segment_that_is_too_long_makes_the_mesh_finer(force: float) -> None:
     """The toggle sways off at 0.257 N: until then there is an equilibrium."""
-    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, 0.01), "b": Node(0.2, 0, PINNED)}
+    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "t": Node(0.1, 0.01), "b": Node(0.2, 0, PINNED_SUPPORT)}
     beams = {"x": Beam("a", "t", SECTION), "y": Beam("t", "b", SECTION)}
     network = Network(nodes, beams, loads=(PointLoad("t", fy=-force),))
     assert trace(network, Displacement("t", 0.0, np.array([1e-5]))).status is PathStatus.COMPLETE
@@ -68,7 +68,7 @@ def test_a_constant_load_on_a_segment_that_is_too_long_makes_the_mesh_finer(forc
 @pytest.mark.parametrize("loads", [(), (PointLoad("d", fy=1e-6),)])
 def test_a_spring_may_be_prestressed_by_a_large_turn(loads: tuple[PointLoad, ...]) -> None:
     """A torsion spring of 0.05 N m/rad bends the end of a cantilever: the end moment is k (2 - turn)."""
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, 0)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "d": Node(0.05, 0)}
     springs = (TorsionSpring(None, "d", 0.05, 2.0),)
     network = Network(nodes, {"x": Beam("a", "d", SECTION)}, springs=springs, loads=loads)
     path = trace(network, Displacement("d", 0.0, np.array([-1e-4])), Control(tolerance=1e-9))
@@ -78,7 +78,7 @@ def test_a_spring_may_be_prestressed_by_a_large_turn(loads: tuple[PointLoad, ...
 
 
 def test_a_mechanism_that_nothing_holds_says_so() -> None:
-    nodes = {"a": Node(0, 0, PINNED), "b": Node(0.1, 0.0)}
+    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "b": Node(0.1, 0.0)}
     network = Network(nodes, {"x": Beam("a", "b", SECTION)}, springs=(TorsionSpring("a", "b", 1.0, 0.1),))
     path = trace(network, Displacement("b", 0.0, np.array([1e-3])))
     assert path.status is PathStatus.NO_START
@@ -89,7 +89,7 @@ def test_a_mechanism_that_nothing_holds_says_so() -> None:
 @pytest.mark.parametrize("off", [1e-7, 1e-6, 1e-5])
 def test_a_point_beside_a_bifurcation_does_not_lead_to_the_path_that_crosses(off: float, branch: str) -> None:
     rise = 0.02
-    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, rise), "b": Node(0.2, 0, PINNED)}
+    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "t": Node(0.1, rise), "b": Node(0.2, 0, PINNED_SUPPORT)}
     beams = {"x": Beam("a", "t", SECTION, CosineArch(rise, 0.5)), "y": Beam("t", "b", SECTION, CosineArch(-rise, 0.5))}
     network = Network(nodes, beams)
 
@@ -116,7 +116,7 @@ EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot
 
 def pressed(ratio: float, section: Section = SECTION) -> Network:
     """Return a column under a constant load of so many times Euler's."""
-    nodes = {"foot": Node(0, 0, CLAMPED), "top": Node(LENGTH, 0)}
+    nodes = {"foot": Node(0, 0, CLAMPED_SUPPORT), "top": Node(LENGTH, 0)}
     return Network(nodes, {"column": Beam("foot", "top", section)}, loads=(PointLoad("top", fx=-ratio * EULER),))
 
 
@@ -157,7 +157,7 @@ def test_constant_loads_beyond_a_bifurcation_as_the_control_says() -> None:
 def test_a_displacement_held_from_the_start_beyond_a_bifurcation() -> None:
     """A guided column shortened by its support, then driven sideways at its middle: buckled from the start."""
     short = Support(True, True, True, displacement=(-2e-3, 0.0, 0.0))
-    nodes = {"foot": Node(0, 0, CLAMPED), "middle": Node(0.05, 0), "top": Node(0.1, 0, short)}
+    nodes = {"foot": Node(0, 0, CLAMPED_SUPPORT), "middle": Node(0.05, 0), "top": Node(0.1, 0, short)}
     beams = {"one": Beam("foot", "middle", SECTION), "two": Beam("middle", "top", SECTION)}
     drive = Loading((PointLoad("middle", fy=1e-9),), np.array([1.0]))
     paths = [trace(Network(nodes, beams), drive, Control(tolerance=1e-7, sign=sign)) for sign in (1, -1)]

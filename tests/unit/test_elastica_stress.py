@@ -10,7 +10,7 @@ from functional_paths import beam_stress
 from scipy.integrate import solve_ivp
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -30,7 +30,7 @@ TAPER = Taper(np.array([0, 0.35, 1]), np.array([1.1e-3, 0.8e-3, 1.2e-3]))
 
 
 def pressed(shape: object, thickness: object, travel: float, tolerance: float = 1e-7) -> Path:
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.08, 0.02, slider_support(UP, rotates=True))}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.08, 0.02, slider_support(UP, rotates=True))}
     beam = Beam("a", "b", Section(2e9, 8e-3, thickness), shape)  # type: ignore[arg-type]
     drive = Displacement("b", -UP, np.linspace(0, travel, 41))
     return trace(Network(nodes, {"x": beam}), drive, Control(tolerance=tolerance))

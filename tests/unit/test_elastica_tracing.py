@@ -11,8 +11,8 @@ import pytest
 from network_cases import differences, from_json, observe, read_cases
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -70,7 +70,9 @@ EULER = 4 * np.pi**2 * 2e9 * 1e-2 * 1e-9 / 12 / 0.1**2  # clamped at both ends
 
 def test_a_straight_column_that_does_not_stretch_is_pressed_beyond_its_critical_load() -> None:
     """Its force is that of a column under a load, which may stretch a little or not at all."""
-    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, slider_support(0.0))}, {"x": Beam("a", "b", STIFF)})
+    net = Network(
+        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0, slider_support(0.0))}, {"x": Beam("a", "b", STIFF)}
+    )
     path = trace(net, Displacement("b", np.pi, np.array([1e-3, 1e-2, 3e-2])))
     assert path.status is PathStatus.COMPLETE
     assert path.stable.all()
@@ -99,7 +101,9 @@ def test_a_network_that_nothing_bears_has_no_start() -> None:
 
 def test_a_step_along_the_arc_does_not_lead_to_the_mirror_image() -> None:
     """Bent by 3.5e-5 of its length a column that does not stretch buckles to that side, whatever the steps."""
-    net = Network({"a": Node(0, 0, PINNED), "b": Node(0.1, 0, slider_support(0.0, True))}, {"x": Beam("a", "b", STIFF)})
+    net = Network(
+        {"a": Node(0, 0, PINNED_SUPPORT), "b": Node(0.1, 0, slider_support(0.0, True))}, {"x": Beam("a", "b", STIFF)}
+    )
     drive = Displacement("b", np.pi, np.array([1e-3, 0.015, 0.03]))
     sides = [trace(net, drive, Control(imperfection=size)).motion("a")[-1, 2] for size in (3.5e-6, 3.5e-5, -3.5e-6)]
     assert sides[0] == pytest.approx(sides[1], rel=1e-2)
@@ -130,7 +134,11 @@ def test_leaves_on_a_shuttle_that_may_turn_end_at_a_limit_point() -> None:
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-7])
 def test_an_arch_of_two_straight_beams_that_do_not_stretch_buckles_to_the_same_side(tolerance: float) -> None:
     """It is rigid at rest, so that it reaches many critical loads at once; both beams buckle in their first modes."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.05, 0.0173, slider_support(np.pi / 2)), "b": Node(0.1, 0, PINNED)}
+    nodes = {
+        "a": Node(0, 0, CLAMPED_SUPPORT),
+        "t": Node(0.05, 0.0173, slider_support(np.pi / 2)),
+        "b": Node(0.1, 0, PINNED_SUPPORT),
+    }
     net = Network(nodes, {"x": Beam("a", "t", STIFF), "y": Beam("t", "b", STIFF)})
     path = trace(net, Displacement("t", -np.pi / 2, np.linspace(1e-3, 8e-3, 4)), Control(tolerance))
     assert path.status is PathStatus.COMPLETE, path.message
@@ -159,7 +167,7 @@ def test_a_path_that_is_raised_is_that_of_its_degree() -> None:
 
 
 def test_forces_of_a_mechanism_that_bears_nothing_are_no_error() -> None:
-    nodes = {"hinge": Node(0, 0, PINNED), "end": Node(0.05, 0.0)}
+    nodes = {"hinge": Node(0, 0, PINNED_SUPPORT), "end": Node(0.05, 0.0)}
     net = Network(nodes, {"strip": Beam("end", "hinge", STIFF)})
     path = trace(net, Rotation("end", np.array([-0.3, -0.9])), Control(1e-9))
     assert path.status is PathStatus.COMPLETE, path.message

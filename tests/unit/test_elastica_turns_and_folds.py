@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
-    PINNED,
+    CLAMPED_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     CosineArch,
@@ -34,7 +34,7 @@ def leaves(count: int) -> Network:
     across = 35e-3 * np.cos(np.radians(8.0))
     nodes, beams = {"d": Node(0, RISE, slider_support(np.pi / 2))}, {}
     for k in range(count):
-        nodes[f"w{k}"] = Node(across * (-1) ** k, 0, CLAMPED)
+        nodes[f"w{k}"] = Node(across * (-1) ** k, 0, CLAMPED_SUPPORT)
         beams[f"b{k}"] = Beam(f"w{k}", "d", Section(1477e6, 6e-3, 7e-4))
     return Network(nodes, beams)
 
@@ -49,12 +49,12 @@ def pressed(points: object, tolerance: float, count: int = 1, **control: object)
 
 def toggle(shift: float) -> Network:
     """Return two clamped bars, one longer by a shift."""
-    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 0.012), "b": Node(0.2 + shift, 0, CLAMPED)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(0.1, 0.012), "b": Node(0.2 + shift, 0, CLAMPED_SUPPORT)}
     return Network(nodes, {"x": Beam("a", "t", SECTION), "y": Beam("t", "b", SECTION)})
 
 
 def arch() -> Network:
-    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, 0.02), "b": Node(0.2, 0, PINNED)}
+    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "t": Node(0.1, 0.02), "b": Node(0.2, 0, PINNED_SUPPORT)}
     beams = {"x": Beam("a", "t", SECTION, CosineArch(0.02, 0.5)), "y": Beam("t", "b", SECTION, CosineArch(-0.02, 0.5))}
     return Network(nodes, beams)
 

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from cfmkit.elastica import (
-    CLAMPED,
-    FREE,
-    PINNED,
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
+    PINNED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -44,10 +44,10 @@ TINY = np.array([1e-9])
 WHOLE = NetworkMasses({"x": DENSITY})
 
 
-def beam(end: Support = FREE, axial: bool = False, shear: bool = False, pin: bool = False) -> Network:
+def beam(end: Support = FREE_SUPPORT, axial: bool = False, shear: bool = False, pin: bool = False) -> Network:
     """Return a straight beam along x from a clamp, or from a pin, to its end."""
     section = Section(MODULUS, WIDTH, THICKNESS, axial=axial, shear=shear)
-    start = PINNED if pin else CLAMPED
+    start = PINNED_SUPPORT if pin else CLAMPED_SUPPORT
     return Network({"root": Node(0, 0, start), "tip": Node(LENGTH, 0, end)}, {"x": Beam("root", "tip", section)})
 
 
@@ -93,9 +93,9 @@ def test_a_flywheel_on_a_light_beam_turns_and_swings_as_two_masses_do() -> None:
 @pytest.mark.parametrize(
     ("end", "pin", "equation"),
     [
-        (CLAMPED, False, lambda x: np.cos(x) - 1 / np.cosh(x)),
-        (PINNED, False, lambda x: np.sin(x) - np.cos(x) * np.tanh(x)),
-        (PINNED, True, np.sin),
+        (CLAMPED_SUPPORT, False, lambda x: np.cos(x) - 1 / np.cosh(x)),
+        (PINNED_SUPPORT, False, lambda x: np.sin(x) - np.cos(x) * np.tanh(x)),
+        (PINNED_SUPPORT, True, np.sin),
     ],
     ids=["clamped", "clamped and pinned", "pinned"],
 )
@@ -118,7 +118,7 @@ def test_a_stubby_beam_has_the_frequencies_of_timoshenko() -> None:
     """Shear and the inertia of sections, as the boundary-value problem has them; slenderness 20."""
     length = 20 * THICKNESS
     section = Section(MODULUS, WIDTH, THICKNESS, axial=True, shear=True)
-    net = Network({"root": Node(0, 0, CLAMPED), "tip": Node(length, 0)}, {"x": Beam("root", "tip", section)})
+    net = Network({"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(length, 0)}, {"x": Beam("root", "tip", section)})
     path = trace(net, Loading((PointLoad("tip", fx=1.0),), TINY))
     found = frequencies(path, WHOLE, 3).free[-1]
     area, second = WIDTH * THICKNESS, WIDTH * THICKNESS**3 / 12
@@ -206,7 +206,9 @@ def test_a_curved_thin_arch_keeps_its_frequencies_when_it_is_cut_in_three() -> N
     def arch(pieces: int) -> Path:
         angles = np.linspace(0.0, 1.2, pieces + 1)
         places = LENGTH * np.stack([np.sin(angles), 1 - np.cos(angles)], axis=1)
-        nodes = {f"n{k}": Node(*place, CLAMPED if k == 0 else Support()) for k, place in enumerate(places.tolist())}
+        nodes = {
+            f"n{k}": Node(*place, CLAMPED_SUPPORT if k == 0 else Support()) for k, place in enumerate(places.tolist())
+        }
         section = Section(MODULUS, WIDTH, 0.1 * THICKNESS)
         beams = {f"b{k}": Beam(f"n{k}", f"n{k + 1}", section, arc(1.2 / pieces)) for k in range(pieces)}
         force = PointLoad(f"n{pieces}", fy=2e-3 * RIGIDITY / LENGTH**2)
@@ -257,7 +259,7 @@ def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(sh
 def test_a_strip_pulled_taut_swings_as_a_stiff_string(slenderness: float) -> None:
     """n/2l sqrt(T/m) (1 + 2 e + (4 + n^2 pi^2/2) e^2) with e = sqrt(EI/T)/l, of its stretched length [Morse 1948]."""
     thick, strain = LENGTH / slenderness, 1e-3
-    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, slider_support(0.0))}
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(LENGTH, 0, slider_support(0.0))}
     net = Network(nodes, {"x": Beam("root", "tip", Section(MODULUS, WIDTH, thick))})
     path = trace(net, Displacement("tip", 0.0, np.array([strain * LENGTH])))
     found = frequencies(path, WHOLE, 3, [len(path) - 1]).held[0]

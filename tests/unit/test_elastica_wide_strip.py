@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -34,7 +34,7 @@ FINE = Control(tolerance=1e-9)
 
 
 def cantilever(section: Section, turn: float = 0.0) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0)}
     return Network(nodes, {"x": Beam("a", "b", section, arc(turn))})
 
 
@@ -104,7 +104,12 @@ def test_a_strip_without_poissons_ratio_and_a_narrow_one_are_beams():
 def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
     narrow, wide = Section(E, 2e-3, T), Section(E, B, T, poisson_ratio=NU, shear=True, wide=True)
     tapered = Section(E, B, TAPER, poisson_ratio=NU, wide=True)
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.05, 0.03), "c": Node(0.1, 0, CLAMPED), "d": Node(0.05, 0, CLAMPED)}
+    nodes = {
+        "a": Node(0, 0, CLAMPED_SUPPORT),
+        "b": Node(0.05, 0.03),
+        "c": Node(0.1, 0, CLAMPED_SUPPORT),
+        "d": Node(0.05, 0, CLAMPED_SUPPORT),
+    }
     beams = {"x": Beam("a", "b", wide, arc(0.9)), "y": Beam("b", "c", tapered), "z": Beam("b", "d", narrow)}
     drive = Displacement("b", 0.3, np.array([0.002, 0.004]))
     found = trace(Network(nodes, beams), drive, Control())
@@ -121,7 +126,7 @@ def test_derivatives_are_those_of_differences(tapered):
     def build(x: Any) -> Network:
         taper = Taper(np.array([0.0, 0.4, 1.0]), np.array([x[2], 0.7 * x[2], x[2]]) * 1e-3)
         section = Section(x[0] * 1e9, x[1] * 1e-3, taper if tapered else x[2] * 1e-3, poisson_ratio=x[3], wide=True)
-        nodes = {"a": Node(0, 0, CLAMPED), "b": Node(x[4] * 1e-2, 0.02), "c": Node(0.1, 0, CLAMPED)}
+        nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(x[4] * 1e-2, 0.02), "c": Node(0.1, 0, CLAMPED_SUPPORT)}
         beams = {
             "ab": Beam("a", "b", section, arc(x[5])),
             "bc": Beam("b", "c", Section(2e9, 4e-3, x[2] * 1e-3)),
@@ -151,7 +156,7 @@ def test_derivatives_are_those_of_differences(tapered):
 
 def test_a_tape_that_is_bent_back_ends_where_it_would_snap():
     thin = Section(2e11, 25e-3, 0.1e-3, axial=False, poisson_ratio=0.3, wide=True)
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.02, 0)}
+    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.02, 0)}
     network = Network(nodes, {"x": Beam("a", "b", thin, arc(-5.0))})
     found = trace(network, Loading((PointLoad("b", 0, 0, 1.0),), np.array([0.2])), Control())
     assert found.status is not PathStatus.COMPLETE

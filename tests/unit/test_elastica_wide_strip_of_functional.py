@@ -12,7 +12,7 @@ import pytest
 from functional_paths import beam_stress, functional_path
 
 from cfmkit.elastica import (
-    CLAMPED,
+    CLAMPED_SUPPORT,
     Beam,
     Control,
     Displacement,
@@ -37,7 +37,11 @@ def strips(x: Any) -> tuple[Network, Displacement]:
     thickness = Taper(np.array([0.0, 0.4, 1.0]), np.array([1.0, 0.8, 1.1]) * x[0] * 1e-3)
     wide = Section(x[2], x[1], thickness, poisson_ratio=x[3], wide=True)
     narrow = Section(x[2], 5e-3, x[0] * 1e-3, poisson_ratio=x[3])
-    nodes = {"a": Node(0, 0, CLAMPED), "c": Node(0.12, 0, CLAMPED), "b": Node(0.06, 0.02, slider_support(np.pi / 2))}
+    nodes = {
+        "a": Node(0, 0, CLAMPED_SUPPORT),
+        "c": Node(0.12, 0, CLAMPED_SUPPORT),
+        "b": Node(0.06, 0.02, slider_support(np.pi / 2)),
+    }
     beams = {
         "w": Beam("a", "b", wide, Polynomial((0.0, x[4], -0.5))),
         "n": Beam("c", "b", narrow, Polynomial((0.0, -x[4], 0.5))),

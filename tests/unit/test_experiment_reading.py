@@ -220,7 +220,7 @@ def test_a_single_column_with_decimal_commas_is_not_taken_for_two(tmp_path):
 
 
 def test_a_file_that_does_not_end_is_refused_before_it_fills_the_memory(monkeypatch):
-    monkeypatch.setattr(reading, "LARGEST", 1_000_000)
+    monkeypatch.setattr(reading, "MAX_FILE_BYTES", 1_000_000)
     with pytest.raises(DataError, match="zero: is larger than 1 MB"):
         read_recording("/dev/zero")
 

@@ -13,7 +13,7 @@ import pytest
 import cfmkit
 from cfmkit import families
 from cfmkit.families import entry_point_plugins
-from cfmkit.families.base import INTERFACE
+from cfmkit.families.base import INTERFACE_VERSION
 
 pytestmark = pytest.mark.lists
 
@@ -84,7 +84,7 @@ def test_of_a_package_that_is_on_the_path_twice_the_first_one_counts(site, tmp_p
         ("RECORD = 1\n", "it cannot be imported: AttributeError"),
         ("FAMILY = {}\n", "broken_one:FAMILY is a dict, not a Family"),
         (packages.record("other"), "its record is called 'other'"),
-        (packages.record("broken", 99), f"is for interface 99, this cfmkit has interface {INTERFACE}"),
+        (packages.record("broken", 99), f"is for interface 99, this cfmkit has interface {INTERFACE_VERSION}"),
         (packages.record("broken", None), "its record does not state its interface"),
         (packages.RECORD + "FAMILY = replace(SPARE, wheels=3)\n", "unexpected keyword argument 'wheels'"),
     ],

@@ -15,7 +15,7 @@ from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm, form_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.parts import to_scale
 
-SIZE = style.MM
+SIZE = style.INCHES_PER_MM
 
 
 def made(scaled=False):

@@ -9,7 +9,7 @@ import pytest
 
 from cfmkit import families
 from cfmkit.cli.commands import names, parse, program
-from cfmkit.cli.main import EPILOG, TEXT, _accept_global_options, main
+from cfmkit.cli.main import HELP_EPILOG, HELP_TEXT, _accept_global_options, main
 from cfmkit.cli.show_topics import READ_FIRST, explain
 
 pytestmark = pytest.mark.lists
@@ -26,7 +26,7 @@ def test_the_example_of_a_help_is_a_command_that_is_understood(name):
     command = EXAMPLES[name].partition(" > ")[0]
     program_name, verb, *_ = words = shlex.split(command)
     assert (program_name, verb) == ("cfmkit", name)
-    assert parse(program(_accept_global_options, TEXT, EPILOG), words[1:]) is not None
+    assert parse(program(_accept_global_options, HELP_TEXT, HELP_EPILOG), words[1:]) is not None
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

@@ -184,7 +184,7 @@ def test_rows_of_a_requirement_hold_just_as_long_as_the_metric_keeps_it(requirem
 @pytest.fixture
 def few(monkeypatch):
     """Judge by few parts: what is tested is where the search goes."""
-    monkeypatch.setattr(redesign, "CHECKED", 60)
+    monkeypatch.setattr(redesign, "N_CHECKED_PARTS", 60)
 
 
 def test_a_strip_is_moved_until_nine_of_ten_parts_are_good(few):
@@ -303,7 +303,7 @@ class TwoLimits:
     def __init__(self):
         self.rows = SimpleNamespace(matrix=np.eye(3), constant=np.zeros(3))
         self.parts = SimpleNamespace(nominal=np.zeros(2), seed=0, draw=self.draw)
-        self._fresh_errors = self.draw(redesign.CHECKED, redesign.SEARCH_SEED + 1)
+        self._fresh_errors = self.draw(redesign.N_CHECKED_PARTS, redesign.SEARCH_SEED + 1)
 
     checked = redesign.PartNumbers.count_good_parts
 

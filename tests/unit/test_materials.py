@@ -8,20 +8,20 @@ from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.runs.specfile import bind
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.stock import MATERIALS, Material, UnknownMaterial, material, materials
+from cfmkit.stock import MATERIALS_BY_NAME, Material, UnknownMaterial, material, materials
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
-EVERY = pytest.mark.parametrize("item", MATERIALS.values(), ids=lambda item: item.name)
+EVERY = pytest.mark.parametrize("item", MATERIALS_BY_NAME.values(), ids=lambda item: item.name)
 
 
 def test_no_two_entries_of_the_library_share_a_name():
-    entries = (*materials._METALS, *materials._PLASTICS, *materials._PAPERS)
-    assert len({item.name for item in entries}) == len(entries) == len(MATERIALS)
+    entries = (*materials._METAL_LIST, *materials._PLASTIC_LIST, *materials._PUBLISHED_LIST)
+    assert len({item.name for item in entries}) == len(entries) == len(MATERIALS_BY_NAME)
 
 
 def test_an_alias_is_never_the_name_of_another_material():
-    assert not {alias for item in MATERIALS.values() for alias in item.aliases} & set(MATERIALS)
+    assert not {alias for item in MATERIALS_BY_NAME.values() for alias in item.aliases} & set(MATERIALS_BY_NAME)
 
 
 @EVERY
@@ -61,7 +61,9 @@ def test_the_page_says_in_words_where_no_spread_is_stated(capsys: pytest.Capture
     assert main(["show", "materials"]) == 0
     shown = capsys.readouterr().out
     assert shown.count("none stated") == sum(
-        ends is None for item in MATERIALS.values() for ends in (item.scatter.poisson_ratio, item.scatter.density)
+        ends is None
+        for item in MATERIALS_BY_NAME.values()
+        for ends in (item.scatter.poisson_ratio, item.scatter.density)
     )
 
 
@@ -86,7 +88,7 @@ def test_printed_plastics_scatter_more_than_any_steel(name: str):
         low, high = item.scatter.youngs_modulus
         return (high - low) / item.youngs_modulus
 
-    steels = [item for key, item in MATERIALS.items() if key.startswith("steel")]
+    steels = [item for key, item in MATERIALS_BY_NAME.items() if key.startswith("steel")]
     assert width(material(name)) > 2 * max(map(width, steels))
 
 
@@ -134,7 +136,7 @@ def test_a_near_miss_is_named(typed: str, meant: str):
 def test_a_name_that_resembles_nothing_gets_the_whole_list():
     with pytest.raises(UnknownMaterial) as caught:
         material("wool")
-    assert all(name in str(caught.value) for name in MATERIALS)
+    assert all(name in str(caught.value) for name in MATERIALS_BY_NAME)
 
 
 def test_an_unknown_material_is_an_invalid_value_for_the_command_line_and_a_value_error_for_validators():
@@ -145,7 +147,7 @@ def test_an_unknown_material_is_an_invalid_value_for_the_command_line_and_a_valu
 
 def test_the_library_cannot_be_changed():
     with pytest.raises(TypeError):
-        MATERIALS["pla"] = material("abs")  # type: ignore[index]
+        MATERIALS_BY_NAME["pla"] = material("abs")  # type: ignore[index]
 
 
 EVERYWHERE = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from cfmkit.numerics.where_condition_ends import NARROW, last_places
+from cfmkit.numerics.where_condition_ends import BRACKET_RTOL, last_places
 
 ROOT = 0.3 + 0.4 * np.arange(12) / 11
 CURVES = {
@@ -29,7 +29,7 @@ def test_ends_are_found_to_a_billionth_of_a_step_or_better(name, way):
     zero, one = np.zeros((4, 3)), np.ones((4, 3))
     found = last_places(excess, *((zero, one) if way > 0 else (one, zero)))
     # Where the excess is as flat as a cube, rounding hides 1e-5; the condition holds there all the same.
-    apart = 1e-4 if name == "a flat touch" else 3 * NARROW
+    apart = 1e-4 if name == "a flat touch" else 3 * BRACKET_RTOL
     np.testing.assert_allclose(found.ravel(), ROOT, atol=apart)
     assert (excess(found.reshape(-1, 1), np.arange(12)) <= 1e-14).all()
 
@@ -46,7 +46,7 @@ def test_smooth_ends_take_few_calls_and_only_those_that_are_left():
     wanted = [
         brentq(lambda x, k=k: np.exp(rate[k] * x) - np.exp(rate[k] * root[k]), 0, 1, xtol=1e-15) for k in range(500)
     ]
-    np.testing.assert_allclose(found, wanted, atol=3 * NARROW)
+    np.testing.assert_allclose(found, wanted, atol=3 * BRACKET_RTOL)
     assert len(sizes) <= 4
     assert sum(sizes) < 50 * 500
 

@@ -7,12 +7,12 @@ import pytest
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import MeasuringFrame, Window
-from cfmkit.metrics.metric_definitions import TABLE
+from cfmkit.metrics.metric_definitions import METRIC_TABLE
 from cfmkit.metrics.metric_values import survey
-from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.ranges_many import RANGE_FUNCTIONS, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import ManyWindows, Spread
 
-DEFINED = {item.name: item for item in TABLE}
+DEFINED = {item.name: item for item in METRIC_TABLE}
 COUNT, POINTS = 300, 41
 
 
@@ -42,14 +42,14 @@ def alone(motion, efforts, window, name, until=np.inf):
 
 
 @pytest.mark.parametrize("window", [None, (0.2, 0.8)])
-@pytest.mark.parametrize("name", [*RANGES, "rms_to_target"])
+@pytest.mark.parametrize("name", [*RANGE_FUNCTIONS, "rms_to_target"])
 def test_a_range_of_many_curves_is_that_of_each(name, window):
     motion, effort = curves(1)
     motion[:, -1] = 1.0
     low, high = (np.full(COUNT, end) for end in window) if window else (motion[:, 0], motion[:, -1])
     many = ManyBranches(motion, effort, low, high)
     with np.errstate(all="ignore"):
-        found = rms_to_target(many, np.full(COUNT, 10.0)) if name == "rms_to_target" else RANGES[name](many)
+        found = rms_to_target(many, np.full(COUNT, 10.0)) if name == "rms_to_target" else RANGE_FUNCTIONS[name](many)
     wanted = [alone(motion[k], [effort[k]], Window(*window) if window else None, name) for k in range(COUNT)]
     assert np.allclose(found, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
     assert np.ptp(found[np.isfinite(found)]) > 0.01
@@ -75,7 +75,7 @@ OF_EFFORTS = ("force_mean", "force_sd", "force_max", "force_min", "force_ripple"
 
 def metric_of(name, many, target):
     """Return a metric of many curves by its definition."""
-    (function,) = (one.of_rows for one in TABLE if one.name == name)
+    (function,) = (one.of_rows for one in METRIC_TABLE if one.name == name)
     return function(SimpleNamespace(many=many, curves=SimpleNamespace(target=np.full(len(many.effort), target))))
 
 

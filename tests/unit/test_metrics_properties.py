@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cfmkit.curves import Column, Curve
 from cfmkit.metrics import BranchTrace, MeasuringFrame, Window, measure, restrict
-from cfmkit.metrics.branches_cut_to_window import TOLERANCE, _cut_folded
+from cfmkit.metrics.branches_cut_to_window import WINDOW_RTOL, _cut_folded
 
 PROPERTY = settings(deadline=None, max_examples=60)
 
@@ -213,7 +213,7 @@ def test_the_fast_cut_of_straight_branches_agrees_with_the_general_one(points, p
     span = motion.max() - motion.min()
     window = Window(motion.min() + part[0] * span, motion.min() + part[1] * span)
     trace = BranchTrace("load", motion, effort, lambda: effort * 2)
-    fast, general = restrict(trace, window), _cut_folded(trace, window, TOLERANCE * (window.hi - window.lo))
+    fast, general = restrict(trace, window), _cut_folded(trace, window, WINDOW_RTOL * (window.hi - window.lo))
     for name in ("motion", "effort", "stress"):
         assert getattr(fast, name) == pytest.approx(getattr(general, name), rel=1e-12)
 

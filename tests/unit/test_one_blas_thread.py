@@ -7,7 +7,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from cfmkit.elastica.vibration import frequencies
-from cfmkit.numerics.one_blas_thread import CHOSEN, one_blas_thread
+from cfmkit.numerics.one_blas_thread import THREAD_VARIABLES, one_blas_thread
 from cfmkit.solid.adaptive_solution import DrivenPart
 
 
@@ -20,7 +20,7 @@ def threads() -> set[int]:
 @pytest.mark.parametrize(("variable", "within"), [(None, {1}), ("OMP_NUM_THREADS", {2})])
 def test_blas_has_one_thread_inside_unless_the_environment_says_how_many(monkeypatch, variable, within):
     assert np.linalg.norm(np.eye(2)) > 0
-    for name in CHOSEN:
+    for name in THREAD_VARIABLES:
         monkeypatch.delenv(name, raising=False)
     if variable is not None:
         monkeypatch.setenv(variable, "2")

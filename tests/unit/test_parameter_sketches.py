@@ -13,7 +13,7 @@ from cfmkit import families
 from cfmkit.cli.main import main
 from cfmkit.errors import UsageError
 from cfmkit.families.base import read_packaged
-from cfmkit.runs.dimension_drawing import FORMATS, read_dimensions, read_drawing
+from cfmkit.runs.dimension_drawing import DRAWING_SUFFIXES, read_dimensions, read_drawing
 from cfmkit.specs.keys_and_schema import keys
 
 OWN = ["beam", "cam", "slider-crank", "vcfm"]
@@ -82,14 +82,14 @@ def test_a_drawing_is_small_and_its_text_is_text(name):
 @own_drawings
 def test_png_and_pdf_show_the_drawing_as_it_is_now(name):
     files = read_drawing(families.family(name))
-    assert tuple(files) == FORMATS
+    assert tuple(files) == DRAWING_SUFFIXES
     digest = hashlib.sha256(files[".svg"]).hexdigest().encode()
     assert files[".png"].startswith(b"\x89PNG")
     assert files[".pdf"].startswith(b"%PDF")
     assert [ending for ending in (".png", ".pdf") if digest not in files[ending]] == []  # tools/print_drawings.py
 
 
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", DRAWING_SUFFIXES)
 def test_show_copies_the_drawing_and_replaces_nothing(tmp_path, monkeypatch, capsys, ending):
     monkeypatch.chdir(tmp_path)
     assert main(["show", "cam", "--figure"]) == 0

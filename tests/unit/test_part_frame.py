@@ -92,10 +92,10 @@ def test_a_solid_that_comes_to_its_frame_ends_there():
     from cfmkit.export.contours import polygon
     from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
     from cfmkit.solid.path_following import PathEnd
-    from cfmkit.solid.plane_stress_law import LAWS
+    from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     strip = polygon([(0.0, 0.0), (0.05, 0.0), (0.05, 0.001), (0.0, 0.001)], "cut")
-    law = LAWS["st-venant-kirchhoff"](2e9, 0.3)
+    law = MATERIAL_LAWS["st-venant-kirchhoff"](2e9, 0.3)
     root = HeldOrDriven("root", (np.array([[0.0, 0.0], [0.0, 0.001]]),), np.zeros(2))
     tip = HeldOrDriven(
         "tip", (np.array([[0.05, 0.0], [0.05, 0.001]]),), np.array([0.05, 0.0005]), np.array([0.0, -1.0, 0.0]),

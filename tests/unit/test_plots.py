@@ -23,7 +23,18 @@ from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import plot_curve
 from cfmkit.plots.figures import figures
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.style import BAND, GREY, INK, LINES, OCHRE, TAN, TROUBLE, new_figure, png, style
+from cfmkit.plots.style import (
+    BAND_GREEN,
+    LINE_COLOURS,
+    LINE_TAN,
+    SPRING_OCHRE,
+    TEXT_GREY,
+    TEXT_INK,
+    TROUBLE_RED,
+    new_figure,
+    png,
+    style,
+)
 from cfmkit.results import Result, Status
 from cfmkit.specs.spec import Spec
 
@@ -150,18 +161,18 @@ def lightness_and_hue(rgb):
 
 @pytest.mark.parametrize("sight", SIGHT)
 def test_line_colours_differ_for_every_kind_of_colour_vision(sight):
-    seen = [lightness_and_hue(np.array(SIGHT[sight]) @ linear(color)) for color in LINES]
+    seen = [lightness_and_hue(np.array(SIGHT[sight]) @ linear(color)) for color in LINE_COLOURS]
     assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 30
 
 
 @pytest.mark.parametrize("sight", SIGHT)
-@pytest.mark.parametrize("other", [*(line for line in LINES if line != TAN), GREY])
+@pytest.mark.parametrize("other", [*(line for line in LINE_COLOURS if line != LINE_TAN), TEXT_GREY])
 def test_springs_differ_from_the_lines_beside_them_for_every_kind_of_colour_vision(sight, other):
-    spring, beside = (lightness_and_hue(np.array(SIGHT[sight]) @ linear(color)) for color in (OCHRE, other))
-    assert np.linalg.norm(spring - beside) > (28 if other == GREY else 30)  # what is grey is dashed, too
+    spring, beside = (lightness_and_hue(np.array(SIGHT[sight]) @ linear(color)) for color in (SPRING_OCHRE, other))
+    assert np.linalg.norm(spring - beside) > (28 if other == TEXT_GREY else 30)  # what is grey is dashed, too
 
 
-@pytest.mark.parametrize("color", [*LINES, OCHRE, BAND, TROUBLE, GREY, INK])
+@pytest.mark.parametrize("color", [*LINE_COLOURS, SPRING_OCHRE, BAND_GREEN, TROUBLE_RED, TEXT_GREY, TEXT_INK])
 def test_every_colour_of_text_stands_out_from_paper(color):
     luminance = np.array([0.2126, 0.7152, 0.0722]) @ linear(color)
     assert 1.05 / (luminance + 0.05) > 3.0

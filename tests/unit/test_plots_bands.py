@@ -10,7 +10,7 @@ from cfmkit.curves import Curve
 from cfmkit.plots.bands_from_requirements import bands_of, limits_on
 from cfmkit.plots.curve_with_enlarged_band import choose_enlarged_range, loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.style import BAND, TROUBLE
+from cfmkit.plots.style import BAND_GREEN, TROUBLE_RED
 from cfmkit.results import Quantity
 
 UP = 50.0 * 1.02
@@ -51,7 +51,7 @@ def test_the_band_of_a_ripple_is_that_of_the_branch_named_or_the_worst():
     assert worst.high < load.high
 
 
-@pytest.mark.parametrize(("limit", "met", "color"), [("5 %", True, BAND), ("1 %", False, TROUBLE)])
+@pytest.mark.parametrize(("limit", "met", "color"), [("5 %", True, BAND_GREEN), ("1 %", False, TROUBLE_RED)])
 def test_a_band_says_in_words_and_colour_whether_it_is_kept(limit, met, color):
     result = result_of({"metric": "force_ripple", "max": limit, "over": (0.02, 0.1)})
     ax = plot_curve(result, axes())

@@ -7,7 +7,7 @@ import pytest
 
 import cfmkit
 from cfmkit.documents.run_outcome import report_on
-from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes, length_in_words
+from cfmkit.plots.workshop_drawing import PAPER_SCALES, drawing_figure, holes, length_in_words
 from cfmkit.runs.files_a_run_writes import files, part_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -26,7 +26,7 @@ def test_every_part_is_drawn_to_a_scale_of_paper_with_its_dimensions(name):
     ax = figure.axes[0]
     width = np.ptp(ax.get_xlim())
     scale = figure.get_size_inches()[0] * 25.4 * ax.get_position().width / width
-    assert min(abs(scale / one - 1) for one in (*SCALES, *(1 / one for one in SCALES))) < 1e-9
+    assert min(abs(scale / one - 1) for one in (*PAPER_SCALES, *(1 / one for one in PAPER_SCALES))) < 1e-9
     found = texts(figure)
     assert "overall" in found
     assert "sheet" in found

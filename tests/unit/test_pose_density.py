@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cfmkit.export.contours import polygon
-from cfmkit.solid.meshed_part import ALLOWED, HeldOrDriven, Part, _check_interval, refine_path, rings_of
-from cfmkit.solid.plane_stress_law import LAWS
+from cfmkit.solid.meshed_part import MAX_EFFORT_ERROR, HeldOrDriven, Part, _check_interval, refine_path, rings_of
+from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def leaf():
     up = t * np.array([-way[1], way[0]]) / np.hypot(*way)
     corners = [start - up, end - up, end + up, start + up]
     outline = polygon([(float(x), float(y)) for x, y in corners], "cut")
-    law = LAWS["st-venant-kirchhoff"](2e9, 0.3)
+    law = MATERIAL_LAWS["st-venant-kirchhoff"](2e9, 0.3)
     driven = np.array([0.0, -1.0, 0.0])
     shuttle = HeldOrDriven("shuttle", (np.array([start - up, start + up]),), start, driven)
     wall = HeldOrDriven("wall", (np.array([end - up, end + up]),), end)
@@ -49,8 +49,8 @@ def off(course, many):
 def test_poses_are_added_until_the_curve_is_that_of_many_poses(leaf, many):
     few = thinned(many)
     course, between = refine_path(leaf.problem, few)
-    assert off(few, many) > 2 * ALLOWED  # so few poses do not do
-    assert off(course, many) <= min(ALLOWED, between)
+    assert off(few, many) > 2 * MAX_EFFORT_ERROR  # so few poses do not do
+    assert off(course, many) <= min(MAX_EFFORT_ERROR, between)
     assert len(few.poses) < len(course.poses) <= 2 * len(few.poses)
 
 
@@ -67,7 +67,7 @@ def test_added_poses_are_equilibria_in_order_of_travel_and_keep_the_requested_on
     stops = [0.0, 0.003, 0.006, 0.009]
     dense = leaf.densely(stops)
     travel = dense.course.travel
-    assert dense.between <= ALLOWED
+    assert dense.between <= MAX_EFFORT_ERROR
     assert (np.diff(travel) > 0).all()
     assert set(stops) <= set(travel.tolist())
     assert dense.peaks[0].shape == travel.shape

@@ -12,8 +12,8 @@ from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import run_design
 from cfmkit.specs.spec import Requirement
-from cfmkit.stock.materials import MATERIALS
-from cfmkit.stock.processes import PROCESSES
+from cfmkit.stock.materials import MATERIALS_BY_NAME
+from cfmkit.stock.processes import PROCESSES_BY_NAME
 from cfmkit.studies.parts import requirement_rows
 from cfmkit.studies.parts.assumed_errors import assume_errors, tolerances
 from cfmkit.studies.parts.near_parts import expected_shares, expected_yield
@@ -24,7 +24,7 @@ STRIP = "configs/slider_crank_strip.yaml"
 
 
 def test_every_process_has_a_reason_and_a_size():
-    for one in PROCESSES.values():
+    for one in PROCESSES_BY_NAME.values():
         assert one.reason
         assert 0 < one.position < 1e-3
         assert 0 < one.thickness < one.least_feature
@@ -60,7 +60,7 @@ def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
 def test_what_is_assumed_is_of_the_materials_that_beams_have():
     """The process was that of a material no beam has, and its modulus was drawn, which changes nothing."""
     spec = cfmkit.load("configs/beam_lan2010.yaml")
-    bands = {name: one.scatter.youngs_modulus for name, one in MATERIALS.items()}
+    bands = {name: one.scatter.youngs_modulus for name, one in MATERIALS_BY_NAME.items()}
     paths = [f"mechanism.beams.{name}.material" for name in spec.mechanism.beams]
 
     def found(top, *own):

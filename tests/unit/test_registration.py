@@ -8,7 +8,7 @@ from flanks import Errors, flanks, measured, parameters, profile
 
 from cfmkit.numerics.rigid_point_registration import feet, gaps_across, register, registered_where_it_is, turn_points
 from cfmkit.numerics.robust_statistics import neighbour_noise
-from cfmkit.numerics.smoothing_spline import smoothed
+from cfmkit.numerics.smoothing_spline import fit_smoothing_spline
 
 ANGLE, SHIFT = -0.3, (-1.49579067, 0.80784298)
 """Printed in the note: deg and mm."""
@@ -173,29 +173,31 @@ X = np.linspace(0.0, 0.15, 300)
 @pytest.mark.parametrize("noise", [0.5e-6, 2e-6, 10e-6])
 def test_the_residuals_of_the_smoothing_spline_are_as_large_as_the_stated_noise(noise):
     values = 20e-6 * np.sin(2 * np.pi * X / 0.02) + np.random.default_rng(0).normal(0, noise, 300)
-    found = smoothed(X, values, noise)
+    found = fit_smoothing_spline(X, values, noise)
     assert found.residual == pytest.approx(noise, rel=1e-3)
 
 
 def test_its_derivative_is_nearer_to_the_truth_than_that_of_interpolation():
     values = 20e-6 * np.sin(2 * np.pi * X / 0.02) + np.random.default_rng(0).normal(0, 2e-6, 300)
     truth = 20e-6 * 2 * np.pi / 0.02 * np.cos(2 * np.pi * X / 0.02)
-    errors = [np.sqrt(np.mean((smoothed(X, values, noise).evaluate(X, 1) - truth) ** 2)) for noise in (0.0, 2e-6)]
+    errors = [
+        np.sqrt(np.mean((fit_smoothing_spline(X, values, noise).evaluate(X, 1) - truth) ** 2)) for noise in (0.0, 2e-6)
+    ]
     assert errors[1] < 0.15 * errors[0]
 
 
 def test_noise_larger_than_the_signal_leaves_a_straight_line():
-    found = smoothed(X, 3 * X + 1e-9 * np.sin(40 * X), 1e-3)
+    found = fit_smoothing_spline(X, 3 * X + 1e-9 * np.sin(40 * X), 1e-3)
     assert np.abs(found.evaluate(X, 2)).max() < 1e-3
     assert found.evaluate(X, 1) == pytest.approx(np.full(300, 3.0), abs=1e-3)
 
 
 def test_without_noise_the_points_are_met():
     values = np.sin(40 * X)
-    assert smoothed(X, values, 0.0).evaluate(X) == pytest.approx(values, abs=1e-12)
+    assert fit_smoothing_spline(X, values, 0.0).evaluate(X) == pytest.approx(values, abs=1e-12)
 
 
 @pytest.mark.parametrize("places", [[0, 1, 2], [0, 1, 1, 2, 3, 4], [3, 2, 1, 0, -1]])
 def test_too_few_or_unordered_points_are_refused(places):
     with pytest.raises(ValueError, match="increasing order"):
-        smoothed(np.array(places, dtype=float), np.zeros(len(places)), 1.0)
+        fit_smoothing_spline(np.array(places, dtype=float), np.zeros(len(places)), 1.0)

@@ -18,12 +18,12 @@ def linear(points):
 
 def sobol_setup():
     points = sobol.sample(0, 256, 2, 0)
-    return linear(points), lambda outputs: sobol.analyze(outputs, 0), sobol.NAMES
+    return linear(points), lambda outputs: sobol.analyze(outputs, 0), sobol.INDEX_NAMES
 
 
 def morris_setup():
     points = morris.sample(0, 20, 2, 0)
-    return linear(points), lambda outputs: morris.analyze(points, outputs, 0), morris.NAMES
+    return linear(points), lambda outputs: morris.analyze(points, outputs, 0), morris.INDEX_NAMES
 
 
 def tolerance_setup():
@@ -73,7 +73,7 @@ def test_a_failed_point_leaves_the_swing_of_its_own_parameter_open():
 
 
 def test_a_gradient_without_points_is_not_zero():
-    missing = np.full(local.LEVELS, np.nan)
+    missing = np.full(local.N_STEP_LEVELS, np.nan)
     assert np.isnan(local.slope(missing, missing, 1.0, 0.1).value)
     one = missing.copy()
     one[3] = 1.0

@@ -10,7 +10,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.studies.parts.allowed_tolerances import WIDEST, LimitsAlong, factors_that_keep
+from cfmkit.studies.parts.allowed_tolerances import MAX_TOLERANCE_FACTOR, LimitsAlong, factors_that_keep
 from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity.output import by_interval, yield_ok
 
@@ -43,8 +43,8 @@ def test_what_costs_eight_times_as_much_may_be_twice_as_wide():
 
 def test_an_error_that_moves_nothing_may_be_as_wide_as_is_looked_at():
     found = factors_that_keep(np.array([3.0]), in_proportion([[1.0, 0.0]]), ERRORS, np.ones(2), 0.95)
-    assert found.alone[1] == WIDEST
-    assert found.alone[0] < WIDEST
+    assert found.alone[1] == MAX_TOLERANCE_FACTOR
+    assert found.alone[0] < MAX_TOLERANCE_FACTOR
 
 
 def test_no_tolerance_helps_where_a_perfect_part_is_bad_or_another_error_is_too_large():
@@ -60,7 +60,7 @@ def test_limits_with_a_corner_are_followed_on_both_of_its_sides():
     corner, still = LimitsAlong(offsets, -abs(offsets)[:, None]), LimitsAlong(offsets, 0.0 * offsets[:, None])
     assert corner(np.array([-3.0, -0.5, 0.0, 2.0]))[:, 0] == pytest.approx([-3.0, -0.5, 0.0, -2.0])
     found = factors_that_keep(np.array([4.0]), (corner, still), ERRORS, np.ones(2), 0.95)
-    assert found.alone == pytest.approx([4 / TWO_SIDED, WIDEST], rel=0.02)
+    assert found.alone == pytest.approx([4 / TWO_SIDED, MAX_TOLERANCE_FACTOR], rel=0.02)
     assert found.share == pytest.approx(1.0, abs=1e-3)
 
 

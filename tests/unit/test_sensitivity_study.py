@@ -15,10 +15,10 @@ from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.plots.sensitivity import figures, short
-from cfmkit.plots.style import MM, png
+from cfmkit.plots.style import INCHES_PER_MM, png
 from cfmkit.results import Status
 from cfmkit.specs.sensitivity_methods import METHOD_NAMES
-from cfmkit.studies.engine import MISSING, run
+from cfmkit.studies.engine import ROW_MISSING, run
 from cfmkit.studies.parts.share import Share
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
@@ -76,7 +76,7 @@ def test_labels_of_axes_stay_clear_of_the_edges_of_the_picture(method):
     for name, draw in figures(study(method)).items():
         figure = draw()
         figure.canvas.draw()
-        room = 4.0 * MM * figure.dpi
+        room = 4.0 * INCHES_PER_MM * figure.dpi
         for axes in figure.axes:
             box = axes.xaxis.label.get_window_extent()
             assert room <= box.x0, name
@@ -187,7 +187,7 @@ def test_a_family_that_knows_its_gradient_is_asked_for_it(monkeypatch):
 def test_an_interrupted_study_states_nothing_but_keeps_its_rows():
     def stops(work):
         records = run(work)
-        records._places[work.step :] = MISSING  # what was under way when it was ended: whole jobs
+        records._places[work.step :] = ROW_MISSING  # what was under way when it was ended: whole jobs
         done.append(work.step)
         return records
 

@@ -15,7 +15,7 @@ from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.figures import figures
 from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
-from cfmkit.families.slider_crank.unit_springs import JOINTS, curves_along_slider
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES, curves_along_slider
 
 EQUAL = {
     "mechanism": {
@@ -238,7 +238,7 @@ def test_no_random_force_curve_holds_a_number_made_of_rounding():
         mechanism = {
             "crank_length": r1, "coupler_length": r2, "offset": link.offset, "unloaded_angle": start,
             "branch": "right" if link.branch > 0 else "left",
-            "springs": dict(zip(JOINTS, random.uniform(0.01, 1.0, 4).tolist(), strict=True)),
+            "springs": dict(zip(JOINT_NAMES, random.uniform(0.01, 1.0, 4).tolist(), strict=True)),
         }  # fmt: skip
         analysis = {"drive": "force", "travel": (-0.005, 0.005), "points": 41}
         about = {"family": "slider-crank", "mechanism": mechanism, "analysis": analysis}

@@ -152,7 +152,7 @@ def test_a_strip_that_breaks_its_stress_in_its_analysis_is_no_design() -> None:
 
 def test_a_strip_of_several_thicknesses_is_held_to_its_band_by_its_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
     """It had been a complete design within 1.59 % where 1 % were allowed, after the last reserve of the search."""
-    monkeypatch.setattr(printed, "RESERVES", printed.RESERVES[1:])
+    monkeypatch.setattr(printed, "SEARCH_RESERVES", printed.SEARCH_RESERVES[1:])
     about = "design.beam.nodes=2", "analysis.side=before", "analysis.points=31"
     refused = cfmkit.design(spec("taper_design", *about))
     assert refused.status is Status.INFEASIBLE
@@ -182,7 +182,7 @@ def test_a_strip_that_breaks_its_band_where_it_begins_is_searched_with_more_in_r
 def test_a_strip_that_keeps_its_limits_is_not_lost_to_a_second_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first search is repeated for a stroke that is said to be too short, and the second one breaks off."""
     answers, search = [Status.CRASHED], printed.search
-    monkeypatch.setattr(printed, "ENOUGH", 2.0)
+    monkeypatch.setattr(printed, "MIN_STROKE_SHARE", 2.0)
     monkeypatch.setattr(
         printed, "search", lambda *given: search(*given) if answers else Design(None, Status.CRASHED, "")
     )

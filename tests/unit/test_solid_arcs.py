@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cfmkit.export.union import OutlinePiece, merge_pieces
-from cfmkit.solid.boundary_and_element_sizes import GRADING, Ring, Sizes
+from cfmkit.solid.boundary_and_element_sizes import SIZE_GRADING, Ring, Sizes
 from cfmkit.solid.mesh import _lattice, mesh
 from cfmkit.solid.meshed_part import rings_of
 
@@ -23,8 +23,8 @@ def test_points_are_thrown_where_small_elements_are_wanted_and_nowhere_else():
     field = Sizes(spot[None], np.array([size]), 1e-3)
     points = _lattice((0.0, 0.0, 0.1, 0.1), field, size)
     assert len(points) < 20_000
-    wanted = np.hypot(*(points - spot).T) < size / GRADING  # sizes below twice that: a lattice of equal triangles
-    assert wanted.sum() == pytest.approx(np.pi / GRADING**2 / np.sqrt(0.75), rel=0.05)
+    wanted = np.hypot(*(points - spot).T) < size / SIZE_GRADING  # sizes below twice that: a lattice of equal triangles
+    assert wanted.sum() == pytest.approx(np.pi / SIZE_GRADING**2 / np.sqrt(0.75), rel=0.05)
 
 
 def test_a_small_fillet_is_meshed_in_its_corner_only():

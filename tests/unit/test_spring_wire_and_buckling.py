@@ -20,7 +20,7 @@ from cfmkit.stock.springs.helical_spring_formulas import END_CONDITION, Wound, b
 from cfmkit.stock.springs.made_to_measure import PIN_SHARE, extension_spring, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE, generic
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
-from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES, WireOutOfRange
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireOutOfRange
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -40,7 +40,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
     ],
 )
 def test_moduli_are_those_of_the_tables(name, young, shear):
-    wire = WIRES[name]
+    wire = WIRES_BY_NAME[name]
     assert (wire.youngs_modulus, wire.shear_modulus) == (young * 1e9, shear * 1e9)
 
 
@@ -66,12 +66,12 @@ def test_music_wire_is_within_the_values_that_shigley_prints_by_diameter():
     ],
 )
 def test_strengths_are_those_of_shigley(name, wire, strength):
-    assert WIRES[name].tensile_strength(1e-3 * wire) == pytest.approx(1e6 * strength, rel=1e-4)
+    assert WIRES_BY_NAME[name].tensile_strength(1e-3 * wire) == pytest.approx(1e6 * strength, rel=1e-4)
 
 
-@pytest.mark.parametrize("name", [name for name, wire in WIRES.items() if wire.strengths])
+@pytest.mark.parametrize("name", [name for name, wire in WIRES_BY_NAME.items() if wire.strengths])
 def test_a_wire_beyond_its_table_is_refused_by_name_and_range(name):
-    wire = WIRES[name]
+    wire = WIRES_BY_NAME[name]
     for diameter in (0.99 * wire.thinnest, 1.01 * wire.thickest):
         with pytest.raises(WireOutOfRange, match=rf"{name} is listed from .* to {1e3 * wire.thickest:g} mm"):
             wire.tensile_strength(diameter)
@@ -84,7 +84,7 @@ def test_a_wire_beyond_its_table_is_refused_by_name_and_range(name):
 
 def test_a_class_without_a_table_has_moduli_but_no_strength():
     with pytest.raises(WireOutOfRange, match="beryllium-copper has no tensile strength"):
-        WIRES["beryllium-copper"].tensile_strength(1e-3)
+        WIRES_BY_NAME["beryllium-copper"].tensile_strength(1e-3)
 
 
 def test_music_wire_that_is_too_thick_is_refused_and_other_wire_of_that_diameter_is_not():

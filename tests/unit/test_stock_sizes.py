@@ -9,7 +9,7 @@ import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.metrics import check
-from cfmkit.stock.processes import PROCESSES
+from cfmkit.stock.processes import PROCESSES_BY_NAME
 from cfmkit.stock.stock_series import ALL_SERIES, BALL_BEARINGS, SOCKET_SCREWS, bearings_of, screw_through, series_of
 from cfmkit.studies.stock_and_digits import decimals_of
 
@@ -112,7 +112,7 @@ def test_rounding_costs_no_requirement_that_was_met():
 
 
 def test_the_last_digit_is_at_most_a_tenth_of_the_deviation_of_the_process():
-    for process in PROCESSES.values():
+    for process in PROCESSES_BY_NAME.values():
         unit = 10.0 ** -decimals_of(process) * 1e-3
         deviation = min(process.thickness, process.position)
         assert unit <= 0.1 * deviation * (1 + 1e-9)

@@ -195,7 +195,7 @@ def test_an_error_at_any_single_change_is_an_output_error_and_the_old_files_are_
         if error is not None:
             assert isinstance(error, OutputError)
             assert "\n" not in str(error)
-            assert safe_disk_changes._REASONS[code] in str(error)
+            assert safe_disk_changes._ERROR_REASONS[code] in str(error)
             assert str(out) in str(error)
         assert recovered_set(out, tidy=system.last != "rmdir") == label
         outcomes.add(label)

@@ -147,22 +147,22 @@ def test_a_lock_file_that_loses_its_name_before_it_is_locked_is_not_a_lock(tmp_p
 
         def open(self, path, *rest):
             descriptor = real_open(path, *rest)
-            if str(path).endswith(lock.LOCK) and not opened:
+            if str(path).endswith(lock.LOCK_NAME) and not opened:
                 os.unlink(path)
             opened.append(path)
             return descriptor
 
     monkeypatch.setattr(safe_disk_changes, "system", Racing())
     with RunFolder(tmp_path):
-        assert [path.name for path in opened] == [lock.LOCK, lock.LOCK]
-        assert (tmp_path / lock.LOCK).read_text().split()[0] == str(os.getpid())
+        assert [path.name for path in opened] == [lock.LOCK_NAME, lock.LOCK_NAME]
+        assert (tmp_path / lock.LOCK_NAME).read_text().split()[0] == str(os.getpid())
 
 
 def test_a_lock_file_that_is_removed_during_the_run_stops_the_commit(tmp_path):
     run(tmp_path, a_csv=b"old")
     with RunFolder(tmp_path) as folder:
         folder.write("a.csv", b"new")
-        (tmp_path / lock.LOCK).unlink()
+        (tmp_path / lock.LOCK_NAME).unlink()
         with pytest.raises(OutputError, match="was removed during the run"):
             folder.commit(INFO)
     assert (tmp_path / "a.csv").read_bytes() == b"old"
@@ -170,9 +170,9 @@ def test_a_lock_file_that_is_removed_during_the_run_stops_the_commit(tmp_path):
 
 def test_the_end_of_a_run_does_not_remove_the_lock_of_another(tmp_path):
     with RunFolder(tmp_path):
-        (tmp_path / lock.LOCK).unlink()
-        (tmp_path / lock.LOCK).write_bytes(b"of another run")
-    assert (tmp_path / lock.LOCK).read_bytes() == b"of another run"
+        (tmp_path / lock.LOCK_NAME).unlink()
+        (tmp_path / lock.LOCK_NAME).write_bytes(b"of another run")
+    assert (tmp_path / lock.LOCK_NAME).read_bytes() == b"of another run"
 
 
 def test_runs_that_come_and_go_never_trip_over_each_other(tmp_path):
@@ -275,7 +275,7 @@ def test_without_file_locks_two_runs_in_one_process_conflict(tmp_path, no_locks)
 def test_no_lock_locks_nothing(tmp_path, monkeypatch):
     with RunFolder(tmp_path / "out"), lock.disable_locks():
         run(tmp_path / "out", a_csv=b"1")
-        assert (tmp_path / "out" / lock.LOCK).exists()
+        assert (tmp_path / "out" / lock.LOCK_NAME).exists()
     assert lock.NO_LOCK not in os.environ
     monkeypatch.setenv(lock.NO_LOCK, "1")
     with RunFolder(tmp_path / "out") as folder:
@@ -291,7 +291,7 @@ def test_no_lock_locks_nothing(tmp_path, monkeypatch):
 def test_a_lock_file_can_be_read_without_its_first_byte(tmp_path):
     """Windows lets no other process read the byte that is locked."""
     with RunFolder(tmp_path):
-        text = (tmp_path / lock.LOCK).read_bytes()
+        text = (tmp_path / lock.LOCK_NAME).read_bytes()
     assert text[1:] == f"{os.getpid()} {platform.node()}\n".encode()
 
 

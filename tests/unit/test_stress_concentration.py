@@ -11,7 +11,7 @@ from shoulder_fillets import handbook
 
 import cfmkit
 from cfmkit.arrays import read_only
-from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Path, Section, slider_support
+from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Displacement, Network, Node, Path, Section, slider_support
 from cfmkit.families.fem_results import FilletRow, fillet_table, largest_concentration
 from cfmkit.families.nominal_stress_beside_fillets import SolvedBeams, both_images, nominal_stresses, with_steps
 from cfmkit.solid.stress_along_fillets import FilletArc
@@ -78,7 +78,7 @@ REACH, RISE, THICK = 24.6e-3, 3.3e-3, 0.5e-3
 
 def leaf(**shuttle: bool) -> Network:
     section = Section(2e9, 10e-3, THICK, shear=True)
-    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(REACH, RISE, slider_support(0.5 * np.pi, **shuttle))}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "shuttle": Node(REACH, RISE, slider_support(0.5 * np.pi, **shuttle))}
     return Network(nodes, {"leaf": Beam("wall", "shuttle", section)})
 
 
@@ -115,7 +115,8 @@ def test_the_outer_fibres_of_a_section_have_the_axial_stress_less_and_more_the_b
 def cantilever() -> SolvedBeams:
     """A bar of 20 mm whose tip is pushed down by 0.01 mm."""
     network = Network(
-        {"root": Node(0, 0, CLAMPED), "tip": Node(20e-3, 0)}, {"bar": Beam("root", "tip", Section(2e9, 1e-2, 1e-3))}
+        {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(20e-3, 0)},
+        {"bar": Beam("root", "tip", Section(2e9, 1e-2, 1e-3))},
     )
     (path,) = both_images(network, lambda travel: Displacement("tip", -0.5 * np.pi, travel), np.array([1e-5]))
     return SolvedBeams(path)

@@ -12,7 +12,7 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, seconds
-from cfmkit.designing.run_many_starts import NEVER
+from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
@@ -20,7 +20,7 @@ from cfmkit.families.beam.proposals import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
-from cfmkit.families.slider_crank.proposals import PUSHED, _strip, largest_printed
+from cfmkit.families.slider_crank.proposals import PUSHED_PROPORTIONS, _strip, largest_printed
 from cfmkit.families.slider_crank.sprung_linkage_proposals import _turning, add_custom_springs
 from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
@@ -287,7 +287,7 @@ def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
 
 
 @pytest.mark.parametrize("crank", [0.02, 0.05, 0.12])
-@pytest.mark.parametrize("lengths", PUSHED)
+@pytest.mark.parametrize("lengths", PUSHED_PROPORTIONS)
 def test_the_largest_strip_of_some_proportions_just_fits_its_room(lengths, crank):
     """Pads of small parts are smaller, those of large ones are not larger: the box is that of the finished drawing."""
     keys = {"force": "0.5 N", "travel": "2 mm", "envelope": "[1 m, 1 m, 5 mm]"}
@@ -393,7 +393,7 @@ def test_a_candidate_whose_time_is_up_is_not_made():
 
 
 def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next_run(monkeypatch):
-    monkeypatch.setattr("cfmkit.studies.suggest.proposal_making_and_judging.LONGEST", 0.0)
+    monkeypatch.setattr("cfmkit.studies.suggest.proposal_making_and_judging.MAX_SEARCH_SECONDS", 0.0)
     asked = request()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     designed = next(one for one in offer.candidates if one.variant == "tapered strip")
@@ -527,7 +527,7 @@ def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
     asked = request(envelope="[26 mm, 20 mm, 12 mm]")
     propose = function_named(family("beam").propose)
     assert not propose(asked, Run()).candidates
-    found = {edge.key: confirm(asked, 0, NEVER, edge) for edge in edges(asked, ("beam",), 0, NEVER)}
+    found = {edge.key: confirm(asked, 0, UNLIMITED_CLOCK, edge) for edge in edges(asked, ("beam",), 0, UNLIMITED_CLOCK)}
     confirmed = {key: value for key, value in found.items() if value is not None}
     assert confirmed
     for key, value in confirmed.items():

@@ -137,7 +137,7 @@ def test_a_part_is_corrected_and_judged_until_the_finest_model_finds_nothing(bea
         return Proposal(name, variant, near.text, next(outcomes), model="solid", own="reissner")
 
     monkeypatch.setattr(judging, "judge_proposal", judge)
-    correct = {judging.FIDELITY: "solid"}
+    correct = {judging.FIDELITY_KEY: "solid"}
     monkeypatch.setattr(judging, "function_named", lambda _: lambda spec, _request: spec.replace(correct))
     candidate = replace(first("beam", asked), correct="it:is")
     found = make_proposal(ProposalJob("beam", candidate, asked, 0, near=near))

@@ -8,7 +8,7 @@ import pytest
 from sources import PACKAGE
 
 from cfmkit.cli.verbs.new import complete_template, template
-from cfmkit.cli.verbs.suggest import KEYS
+from cfmkit.cli.verbs.suggest import REQUEST_KEYS
 from cfmkit.families import family
 from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, SampleKind, sample_unit_cube
 from cfmkit.plots import sensitivity as sensitivity_pictures
@@ -55,7 +55,7 @@ def test_every_way_to_draw_fills_the_unit_cube_evenly(monkeypatch):
 
 
 def test_every_key_of_a_request_is_an_option_and_reaches_families_under_its_name():
-    assert set(KEYS) == set(SuggestBlock.model_fields)
+    assert set(REQUEST_KEYS) == set(SuggestBlock.model_fields)
     stated = {
         "force": "20 N", "travel": "10 mm", "ripple": "3 %", "envelope": "[100 mm, 90 mm, 20 mm]", "process": "laser",
         "adjustable": "[15 N, 25 N]", "hysteresis": "7 %", "springs": "custom", "safety": "1.7", "cycles": "12345",

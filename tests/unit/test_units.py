@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import InputError, QuantityError
 from cfmkit.specs.units import (
-    DIMENSIONS,
+    DIMENSIONS_BY_NAME,
     border_factor,
     border_unit,
     decimal_text,
@@ -27,10 +27,10 @@ from cfmkit.specs.units import (
     to_border,
     unit_table,
 )
-from cfmkit.specs.units.table import COMMON
+from cfmkit.specs.units.table import COMMON_UNIT_SIZES
 from cfmkit.specs.units.unit_size import border_size, unit_size
 
-READABLE = [name for name in DIMENSIONS if name != "text"]
+READABLE = [name for name in DIMENSIONS_BY_NAME if name != "text"]
 JSON_NUMBER = re.compile(r"[-+]?(0|[1-9][0-9]*|(?=\.[0-9]))(\.[0-9]*)?([eE][-+]?[0-9]+)?")
 
 
@@ -274,21 +274,21 @@ def test_decimal_text_reads_back_and_is_never_longer_than_repr(value: float) -> 
 
 @pytest.mark.parametrize("name", READABLE)
 def test_border_factors_agree_with_the_unit_registry(name: str) -> None:
-    item = DIMENSIONS[name]
+    item = DIMENSIONS_BY_NAME[name]
     size = border_size(name).factor
     assert item.down / item.up == pytest.approx(float(size), rel=1e-15)
-    assert size == COMMON[name, item.unit]
+    assert size == COMMON_UNIT_SIZES[name, item.unit]
     assert border_factor(name) == pytest.approx(1 / float(size), rel=1e-15)
 
 
-@pytest.mark.parametrize(("name", "unit"), [key for key in COMMON if key[1] not in ("1", "")])
+@pytest.mark.parametrize(("name", "unit"), [key for key in COMMON_UNIT_SIZES if key[1] not in ("1", "")])
 def test_what_needs_no_look_into_the_registry_agrees_with_it(name: str, unit: str) -> None:
-    assert COMMON[name, unit] == unit_size(unit).factor
+    assert COMMON_UNIT_SIZES[name, unit] == unit_size(unit).factor
 
 
 @pytest.mark.parametrize("name", READABLE)
 def test_the_example_of_a_dimension_is_of_that_dimension(name: str) -> None:
-    assert read_quantity(DIMENSIONS[name].example, name) > 0
+    assert read_quantity(DIMENSIONS_BY_NAME[name].example, name) > 0
 
 
 @pytest.mark.parametrize("name", READABLE)

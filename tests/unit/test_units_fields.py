@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from cfmkit.errors import QuantityError
 from cfmkit.specs import units
-from cfmkit.specs.units import DIMENSIONS, BareFloat, BareInt, Displacement, Length, MetricValue, Place, Ratio
+from cfmkit.specs.units import DIMENSIONS_BY_NAME, BareFloat, BareInt, Displacement, Length, MetricValue, Place, Ratio
 
 
 class Part(BaseModel):
@@ -104,7 +104,7 @@ def test_every_dimension_with_a_unit_has_a_field_type() -> None:
         for item in get_args(getattr(units, name))
         if isinstance(item, units.UnitField)
     }
-    assert names == set(DIMENSIONS) - {"count", "text"}
+    assert names == set(DIMENSIONS_BY_NAME) - {"count", "text"}
 
 
 @pytest.mark.parametrize("text", ["1e31 m", "1e-28 mm", "-1e34 mm"])

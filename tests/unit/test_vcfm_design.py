@@ -149,7 +149,7 @@ def test_a_preload_without_what_it_is_to_give_is_refused(tmp_path):
 @pytest.mark.parametrize("structure", ["cosine arches", "hybrid leaves", "folded spring"])
 def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_spring(structure):
     request = Request("force", 10.0, 9.9, 10.1, False, 2e-3, 0.05, (0.2, 0.2), adjustable=(8.0, 12.0))
-    words = proposals.STRUCTURES[structure][1].variant
+    words = proposals.STRUCTURE_BLOCKS[structure][1].variant
     candidates = proposals.propose(request, Run()).candidates
     chosen = next(one for one in candidates if one.variant.startswith(words))
     made = family("vcfm").design(chosen.spec.replace({"design.refine": False}), Run()).spec

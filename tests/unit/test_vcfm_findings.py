@@ -15,7 +15,7 @@ from cfmkit.errors import SpecError
 from cfmkit.families.findings import mpa
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.exact_model import ExactSampler
-from cfmkit.families.vcfm.findings import EXACT_FORM, FINDINGS, finding
+from cfmkit.families.vcfm.findings import EXACT_FORM, VCFM_FINDINGS, finding
 from cfmkit.families.vcfm.model import solve_rows
 from cfmkit.results import Status
 
@@ -523,7 +523,7 @@ def test_every_finding_is_explained_and_no_other_can_be_made():
     bought |= {"spring_buckles"}  # test_spring_wire_and_buckling.py
     curves = {"target_curve"}  # test_target_curve.py
     stops = {"contact_begins", "blocked"}  # test_end_stops.py
-    assert tested | designs | solids | wide | bought | curves | stops == set(FINDINGS)
+    assert tested | designs | solids | wide | bought | curves | stops == set(VCFM_FINDINGS)
     with pytest.raises(KeyError):
         finding("bad_luck", "")
 

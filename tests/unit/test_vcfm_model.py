@@ -22,13 +22,13 @@ from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
 from cfmkit.families.vcfm.leaves.laws_in_rows import stack_laws
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
-from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
+from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.part import leaf_thickness
-from cfmkit.families.vcfm.quantities import QUANTITIES
+from cfmkit.families.vcfm.quantities import SCALAR_QUANTITIES
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
 from cfmkit.metrics import Window, evaluate
 from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
@@ -91,7 +91,7 @@ def test_the_axial_root_solves_its_equation_everywhere():
     at = pose(np.radians(7), travel)
     stretch = (1 / 35) ** 2 / 3
     z = axial_root(at.shortening, at.turn, stretch)
-    assert (z < POLE).all()
+    assert (z < POLE_LOAD).all()
     assert stretch * z + at.turn**2 * compliance(z)[0] == pytest.approx(at.shortening, abs=1e-15, rel=1e-9)
 
 
@@ -222,7 +222,7 @@ RANGES = {
     "mechanism.material.youngs_modulus": "1200 MPa:2000 MPa",
 }
 IN_WINDOW = ("force_mean", "force_sd", "force_max", "force_min", "force_ripple", "half_band", "deviation_from_mean")
-NAMES = (*IN_WINDOW, "static_balance", *QUANTITIES)
+NAMES = (*IN_WINDOW, "static_balance", *SCALAR_QUANTITIES)
 
 
 @pytest.mark.parametrize("model", ["truss", "analytic"])
@@ -444,7 +444,7 @@ def test_exact_forces_do_not_depend_on_the_number_of_points():
 def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, slenderness, top):
     """Before thin leaves buckle, too: 1/500 of the rise at Q = 40. To 1e-6 of the peak, up to three times the rise."""
     from cfmkit.elastica import Control, Displacement, trace
-    from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
+    from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, leaf_network
     from cfmkit.families.vcfm.interpolated_equilibrium_path import trace_leaf
 
     rise = 4.265427 * MM
@@ -455,7 +455,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     found = trace_leaf(leaf_network(spec), "shuttle", top * rise)
     onset, draw = found.edges[1], np.random.default_rng(7)
     places = np.sort(np.concatenate([draw.uniform(0, onset, 20), draw.uniform(0, top * rise, 60)]))
-    path = trace(leaf_network(spec), Displacement("shuttle", DOWN, places), Control(tolerance=1e-8))
+    path = trace(leaf_network(spec), Displacement("shuttle", DOWN_ANGLE, places), Control(tolerance=1e-8))
     here = path.at_requested
     force, stress, _, buckled = found.evaluate(path.drive[here])
     peak = np.abs(path.effort[path.drive < rise]).max()
@@ -582,11 +582,11 @@ def test_a_step_of_the_thickness_is_drawn_with_the_smaller_one():
 @pytest.mark.parametrize("travel", [-1.0, 0.5, 2.0, 4.0])
 def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
     from cfmkit.elastica import Control, Displacement, trace
-    from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
+    from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, leaf_network
 
     spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
     drawn = parts(spec).leaf.bent_line(travel * MM)
-    drive = Displacement("shuttle", DOWN, travel * MM * np.linspace(0, 1, 7)[1:])
+    drive = Displacement("shuttle", DOWN_ANGLE, travel * MM * np.linspace(0, 1, 7)[1:])
     apart = []
     for sign in (1, -1):
         exact = trace(leaf_network(spec), drive, Control(sign=sign)).shape("leaf", -1)

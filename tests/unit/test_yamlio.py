@@ -187,7 +187,7 @@ def test_the_two_parsers_see_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     from cfmkit.specs.yamlio import tree_builder
 
     fast = tree_builder.read_text(GOOD)
-    monkeypatch.setattr(tree_builder, "_LOADERS", tree_builder._LOADERS[-1:])
+    monkeypatch.setattr(tree_builder, "_YAML_LOADERS", tree_builder._YAML_LOADERS[-1:])
     assert tree_builder.read_text(GOOD) == fast
 
 

@@ -149,11 +149,11 @@ def test_any_option_is_read_or_refused(option: str) -> None:
 @given(mutated())
 def test_the_fast_parser_and_the_one_in_python_never_read_one_text_differently(text: str) -> None:
     fast = tree_builder.read_text(text)
-    both, tree_builder._LOADERS[:] = list(tree_builder._LOADERS), tree_builder._LOADERS[-1:]
+    both, tree_builder._YAML_LOADERS[:] = list(tree_builder._YAML_LOADERS), tree_builder._YAML_LOADERS[-1:]
     try:
         slow = tree_builder.read_text(text)
     finally:
-        tree_builder._LOADERS[:] = both
+        tree_builder._YAML_LOADERS[:] = both
     if not fast.faults and not slow.faults:
         assert (fast.tree, fast.keys) == (slow.tree, slow.keys)
 

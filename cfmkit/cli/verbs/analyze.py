@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.comparison_of_fidelities import FidelityComparison
 
-PLACE = 20
-EXAMPLE = "cfmkit analyze cam.yaml --set mechanism.rolling_friction=0.004 --report"
+HELP_POSITION = 20
+HELP_EXAMPLE = "cfmkit analyze cam.yaml --set mechanism.rolling_friction=0.004 --report"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 
-PLACE = 26
-EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
+HELP_POSITION = 26
+HELP_EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
 
 
 @dataclass(frozen=True, kw_only=True)

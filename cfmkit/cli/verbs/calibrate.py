@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import Spec
 
-PLACE = 34
-EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_friction"
+HELP_POSITION = 34
+HELP_EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_friction"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +61,11 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Document:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.errors import UsageError
-    from cfmkit.numerics.least_squares import LOSSES
+    from cfmkit.numerics.least_squares import LOSS_NAMES
     from cfmkit.runs.run import Verb
 
-    if options.loss not in LOSSES:
-        raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
+    if options.loss not in LOSS_NAMES:
+        raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSS_NAMES)}")
     source = read_measured(options.data, options)
     bounds = [("--bounds", text) for text in options.bounds or ()]
     loss = [] if options.loss == CalibrateOptions.loss else [("--loss", options.loss)]
@@ -77,10 +77,10 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Document:
 def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters_to_fit import split_bounds
-    from cfmkit.numerics.least_squares import LOSSES
+    from cfmkit.numerics.least_squares import LOSS_NAMES
     from cfmkit.runs.measure_and_calibrate_api import calibrate
 
-    loss = next(name for name in LOSSES if name == options.loss)
+    loss = next(name for name in LOSS_NAMES if name == options.loss)
     bounds = split_bounds(options.bounds or ())
     return report(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
-from cfmkit.documents.document import BAD, GOOD, Document, Span, format_bounds, whole_line
+from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Span, format_bounds, whole_line
 from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.documents.document import TextLine
     from cfmkit.specs.spec import Spec
 
-PLACE = 40
-EXAMPLE = "cfmkit check specs/"
+HELP_POSITION = 40
+HELP_EXAMPLE = "cfmkit check specs/"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,9 +95,9 @@ def _lines(found: list[Checked], everything: bool) -> Iterator[TextLine]:
         name = f"{visible(item.file).ljust(wide)}  "
         if item.spec is None:
             count = len(item.failure.errors)
-            yield whole_line(name, Span("INVALID", BAD), f"  {count} problem{'s' if count > 1 else ''}")
+            yield whole_line(name, Span("INVALID", BAD_TONE), f"  {count} problem{'s' if count > 1 else ''}")
             continue
         about = f"       {item.spec.family}  {' '.join(item.spec.name.split())}"
-        yield whole_line(name, Span("ok", GOOD), about)
+        yield whole_line(name, Span("ok", GOOD_TONE), about)
         for one in item.spec.requirements if everything else ():
             yield whole_line(f"    {one.metric} {format_bounds({'min': one.min, 'max': one.max})}")

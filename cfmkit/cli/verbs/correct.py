@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
 
-PLACE = 36
-EXAMPLE = "cfmkit correct design.yaml loop.csv --tare start"
+HELP_POSITION = 36
+HELP_EXAMPLE = "cfmkit correct design.yaml loop.csv --tare start"
 
 
 @dataclass(frozen=True, kw_only=True)

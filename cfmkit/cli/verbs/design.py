@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.store import RunFolder
 
-PLACE = 10
-EXAMPLE = "cfmkit design cam.yaml --set design.force='80 N'"
+HELP_POSITION = 10
+HELP_EXAMPLE = "cfmkit design cam.yaml --set design.force='80 N'"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from cfmkit.documents.document import Block
 
 
-PLACE = 62
-EXAMPLE = "cfmkit docs --search creep"
+HELP_POSITION = 62
+HELP_EXAMPLE = "cfmkit docs --search creep"
 MAX_SECTIONS = 12
 """On the page of a search."""
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.cli.options import Common
-from cfmkit.documents.document import LABEL, Document, Field, Span, TextLine, Verbatim, field, record_table
+from cfmkit.documents.document import LABEL_TONE, Document, Field, Span, TextLine, Verbatim, field, record_table
 from cfmkit.store.lock import SOFT_LOCK
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Record = dict[str, Any]
 
-PLACE = 86
+HELP_POSITION = 86
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ def _packages() -> Iterator[Record]:
         needed = []
     for text in needed:
         extra = re.search(r"extra == ['\"]([^'\"]+)", text)
-        if extra and extra[1] not in _EXTRAS:
+        if extra and extra[1] not in _USER_EXTRAS:
             continue
         package = Requirement(text)
         try:
@@ -79,7 +79,7 @@ def _packages() -> Iterator[Record]:
         yield {"name": package.name, "version": found, "extra": extra[1] if extra else "", **needs}
 
 
-_EXTRAS = ("cluster",)
+_USER_EXTRAS = ("cluster",)
 """Optional parts that a user may want; those for tests and development are no matter of an installation."""
 
 
@@ -107,9 +107,9 @@ def _locks() -> Record:
 
 def _solver() -> Record:
     """Return what the beam engine runs on: "C" or "numpy"."""
-    from cfmkit.elastica.mechanics.march import SWITCH, engine
+    from cfmkit.elastica.mechanics.march import WITHOUT_C_VARIABLE, engine
 
-    return {"engine": engine(), "switched_off": SWITCH in os.environ}
+    return {"engine": engine(), "switched_off": WITHOUT_C_VARIABLE in os.environ}
 
 
 def _fonts() -> Record:
@@ -163,7 +163,7 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
-    yield TextLine((Span("cfmkit doctor", LABEL), Span("  what this installation has")))
+    yield TextLine((Span("cfmkit doctor", LABEL_TONE), Span("  what this installation has")))
     versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
     yield from record_table("versions", versions, (field("name"), field("version", wraps=True)))
     yield from record_table("packages", found["packages"], (field("name"), Field("version", _version)))

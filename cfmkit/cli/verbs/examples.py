@@ -6,20 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
-from cfmkit.documents.document import BAD, GOOD, Document, Paragraph, field, next_command, record_table
+from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Paragraph, field, next_command, record_table
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
 
-PLACE = 52
-EXAMPLE = "cfmkit examples cam"
+HELP_POSITION = 52
+HELP_EXAMPLE = "cfmkit examples cam"
 
-ALL = "all"
-QUICK = "quick"
+ALL_EXAMPLES = "all"
+QUICK_EXAMPLES = "quick"
 """All but those that search for a shape."""
 
-LONG = (
+DURATION_TEXT = (
     "{quick} examples take some seconds each, the last {long} search for shapes for many minutes; "
     "`cfmkit examples --run quick` leaves those out"
 )
@@ -63,7 +63,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Document:
         written = [str(path) for path in copy(options.name, options.out or ".", options.schema is not False)]
         verb = _verb(options.name, written[0])
         page = (
-            Paragraph("written", ", ".join(map(visible, written)), GOOD),
+            Paragraph("written", ", ".join(map(visible, written)), GOOD_TONE),
             next_command("cfmkit", verb, written[0]),
         )
         return Document({"files": written}, page)
@@ -98,14 +98,16 @@ def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> 
     from cfmkit.runs.batch import batch
     from cfmkit.runs.examples import example, examples
 
-    if name in (ALL, QUICK):
+    if name in (ALL_EXAMPLES, QUICK_EXAMPLES):
         mechanisms = [one for one in examples() if "/" not in one.name]
         chosen = sorted(mechanisms, key=lambda one: one.searches)
         searches = sum(one.searches for one in chosen)
-        if name == QUICK:
+        if name == QUICK_EXAMPLES:
             chosen = chosen[: len(chosen) - searches]
         else:
-            terminal.complain(() if terminal.quiet else (LONG.format(quick=len(chosen) - searches, long=searches),))
+            terminal.complain(
+                () if terminal.quiet else (DURATION_TEXT.format(quick=len(chosen) - searches, long=searches),)
+            )
     else:
         chosen = [example(name)]
     with TemporaryDirectory(prefix="cfmkit-examples-") as place, watching(terminal, "examples") as progress:
@@ -119,6 +121,6 @@ def _check_examples(name: str, options: ExamplesOptions, terminal: Terminal) -> 
     reported = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
     page = (
         *record_table("examples", records, (field("name"), field("status"), field("message", wraps=True))),
-        Paragraph("verdict", reported, BAD if wrong else GOOD),
+        Paragraph("verdict", reported, BAD_TONE if wrong else GOOD_TONE),
     )
     return Document({"message": reported, "examples": records}, page, found.exit_code)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.runs.explorer_server import ExplorerServer
 
-PLACE = 23
-EXAMPLE = "cfmkit explore cam.yaml"
+HELP_POSITION = 23
+HELP_EXAMPLE = "cfmkit explore cam.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +39,9 @@ def run(options: ExploreOptions, terminal: Terminal) -> Document:
     from cfmkit.errors import UsageError
     from cfmkit.runs.explorer import Explorer
     from cfmkit.runs.explorer_server import ExplorerServer
-    from cfmkit.runs.specfile import STDIN
+    from cfmkit.runs.specfile import STDIN_PATH
 
-    if options.spec == STDIN:
+    if options.spec == STDIN_PATH:
         raise UsageError("explore needs a file: it saves new files beside it")
     if options.port > 65535:
         raise UsageError(f"--port: {options.port} is not allowed: must be <= 65535")

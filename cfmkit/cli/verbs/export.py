@@ -12,8 +12,8 @@ from cfmkit.errors import ExitCode, sentence_of
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
 
-PLACE = 30
-EXAMPLE = "cfmkit export cam.yaml --kerf 0.2mm"
+HELP_POSITION = 30
+HELP_EXAMPLE = "cfmkit export cam.yaml --kerf 0.2mm"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
 
-PLACE = 32
-EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
+HELP_POSITION = 32
+HELP_EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +147,7 @@ def _numbers(report: MeasureReport, heading: str) -> PageTable:
 
 
 def _shown_warnings(report: MeasureReport) -> list[str]:
-    from cfmkit.experiment.coverage import UNKNOWN
+    from cfmkit.experiment.coverage import NOT_RECORDED_TEXT
 
     curve = report.source.raw[0]
     stems = ("mean", "sd", "max", "min")
@@ -158,7 +158,7 @@ def _shown_warnings(report: MeasureReport) -> list[str]:
     raw = report.numbers.raw
     names += [f"coverage[{branch}]" if several else "coverage" for branch in curve.branches]
     full = [name for name in names if name.startswith("coverage") and raw[name].value == 1.0]
-    unknown = [name for name in names if raw[name].reason.startswith(UNKNOWN)]
+    unknown = [name for name in names if raw[name].reason.startswith(NOT_RECORDED_TEXT)]
     return [name for name in names if name not in full and (raw[name].value is not None or name in unknown)]
 
 

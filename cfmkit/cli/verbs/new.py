@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
-from cfmkit.documents.document import GOOD, Document, Paragraph, Verbatim, next_command
+from cfmkit.documents.document import GOOD_TONE, Document, Paragraph, Verbatim, next_command
 from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.specs.keys_and_schema import Key
 
-PLACE = 50
-EXAMPLE = "cfmkit new cam -o mine.yaml"
+HELP_POSITION = 50
+HELP_EXAMPLE = "cfmkit new cam -o mine.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ def run(options: NewOptions, terminal: Terminal) -> Document:
             discard(target)  # both or none: a second try would find it in its way
             raise
     verb = "design" if record.design else "analyze"
-    page = Paragraph("written", ", ".join(map(visible, names)), GOOD)
+    page = Paragraph("written", ", ".join(map(visible, names)), GOOD_TONE)
     follow = next_command("cfmkit", verb, name)
     return Document({"family": options.family, "file": name, "files": names}, (page, follow))
 

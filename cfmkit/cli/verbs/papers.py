@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, argument, flag
 from cfmkit.documents.document import (
-    BAD,
-    BLANK,
-    FAINT,
-    GOOD,
-    LABEL,
+    BAD_TONE,
+    BLANK_LINE,
+    FAINT_TONE,
+    GOOD_TONE,
+    LABEL_TONE,
     Document,
     Field,
     Paragraph,
@@ -22,7 +22,7 @@ from cfmkit.documents.document import (
     record_table,
 )
 from cfmkit.errors import ExitCode
-from cfmkit.runs.papers import VERDICTS
+from cfmkit.runs.papers import VERDICT_MEANINGS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-PLACE = 64
-EXAMPLE = "cfmkit papers lan-2010"
+HELP_POSITION = 64
+HELP_EXAMPLE = "cfmkit papers lan-2010"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,10 @@ def run(options: PapersOptions, terminal: Terminal) -> Document:
             outcome = {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
             records.append(asdict(done.row) | {"command": done.row.command} | outcome)
             progress.add_finished(1, 0, False)
-    counts = {verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict) for verdict in VERDICTS}
+    counts = {
+        verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict)
+        for verdict in VERDICT_MEANINGS
+    }
     wrong = [one for one in records if one["trouble"]]
     reported = f"{sum(counts.values())} printed numbers; " + (
         f"{len(wrong)} verdicts do not hold" if wrong else "every verdict that was computed holds"
@@ -80,13 +83,15 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, v
     from cfmkit.cli.show_topics import references
 
     titles = {one["name"]: one["reference"] for one in references()}
-    yield TextLine((Span("cfmkit papers", LABEL), Span("  numbers of the papers, and the results here")))
+    yield TextLine((Span("cfmkit papers", LABEL_TONE), Span("  numbers of the papers, and the results here")))
     for paper in dict.fromkeys(one["paper"] for one in records):
         mine = [one for one in records if one["paper"] == paper]
         yield from _of_paper(f"{paper}: {titles.get(paper, '')}", mine, verbose)
-    yield BLANK
-    yield Paragraph("verdict", reported, BAD if "do not hold" in reported else GOOD)
-    named = [{"count": str(n), "verdict": verdict, "meaning": VERDICTS[verdict]} for verdict, n in counts.items()]
+    yield BLANK_LINE
+    yield Paragraph("verdict", reported, BAD_TONE if "do not hold" in reported else GOOD_TONE)
+    named = [
+        {"count": str(n), "verdict": verdict, "meaning": VERDICT_MEANINGS[verdict]} for verdict, n in counts.items()
+    ]
     yield from record_table("", named, (field("count"), field("verdict"), field("meaning", wraps=True)))
 
 
@@ -103,7 +108,7 @@ def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[
     yield from record_table(title, shown, fields)
     silent = sum(len(one["printed"]) for one in records) - sum(len(one["printed"]) for one in shown)
     if silent:
-        yield line(f"  and {silent} inputs, which are as printed (-v lists them)", FAINT)
+        yield line(f"  and {silent} inputs, which are as printed (-v lists them)", FAINT_TONE)
     reasons = [one for one in shown if one["why"] and (verbose or one["verdict"] in ("misprint", "disagrees"))]
     yield from record_table(
         "reasons", reasons, (field("place", ""), field("what", "", wraps=True), field("why", "", wraps=True))

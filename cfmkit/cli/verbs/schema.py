@@ -12,8 +12,8 @@ from cfmkit.documents.document import Document, JsonText, with_skipped_families
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
 
-PLACE = 70
-EXAMPLE = "cfmkit schema cam > cam.schema.json"
+HELP_POSITION = 70
+HELP_EXAMPLE = "cfmkit schema cam > cam.schema.json"
 
 
 @dataclass(frozen=True, kw_only=True)

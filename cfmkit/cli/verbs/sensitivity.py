@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.sensitivity.result_types import Findings
 
-PLACE = 24
-EXAMPLE = "cfmkit sensitivity cam.yaml --method tolerance --vary mechanism.roller_radius=normal:0.05mm --samples 400"
+HELP_POSITION = 24
+HELP_EXAMPLE = (
+    "cfmkit sensitivity cam.yaml --method tolerance --vary mechanism.roller_radius=normal:0.05mm --samples 400"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +125,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Document:
             study = found.setup.study
             point = run_study_in_folder.command_of_a_point(options, study.design)
             page = html_of_study.page(document_of(found), study.spec, found.setup.paths, kept, command, shown, point)
-            place.folder.write(html_of_study.NAME, page)
+            place.folder.write(html_of_study.REPORT_NAME, page)
         made = run_study_in_folder.Made(
             "sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count
         )

@@ -7,14 +7,22 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.documents.document import BLANK, GOOD, Document, Paragraph, field, record_table, with_skipped_families
+from cfmkit.documents.document import (
+    BLANK_LINE,
+    GOOD_TONE,
+    Document,
+    Paragraph,
+    field,
+    record_table,
+    with_skipped_families,
+)
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
 
-PLACE = 60
-EXAMPLE = "cfmkit show cam --figure"
+HELP_POSITION = 60
+HELP_EXAMPLE = "cfmkit show cam --figure"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +100,7 @@ def _copy_drawing(name: str | None, given: str) -> Document:
         write_new(path, files[path.suffix.lower()])
     page = (
         *record_table("", rows, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
-        BLANK,
-        Paragraph("written", visible(str(path)), GOOD),
+        BLANK_LINE,
+        Paragraph("written", visible(str(path)), GOOD_TONE),
     )
     return Document({"show": name, "dimensions": rows, "file": str(path)}, page)

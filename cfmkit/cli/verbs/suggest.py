@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.documents.document import Document
 
-PLACE = 5
-EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --envelope 100x100x20mm"
+HELP_POSITION = 5
+HELP_EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --envelope 100x100x20mm"
 
-BUDGET = "3min"
+DEFAULT_BUDGET = "3min"
 
-SPARE, WRITING = 4.0, 1.0
+FIGURES_RESERVE, WRITING_RESERVE = 4.0, 1.0
 """Before the end of the time budget no more figures are begun [s], those of one proposal take about two; and nothing
 but what was found is written."""
 
-WRITTEN = 0.1
+WRITING_SHARE = 0.1
 """Share of the time budget that is kept for files."""
 
 
@@ -102,7 +102,7 @@ class SuggestOptions(RequestOptions):
     ] = None
     time_budget: Annotated[
         str, option("--time-budget", metavar="TIME", shown=True, text="Time for the whole command: 60s, 10min.")
-    ] = BUDGET
+    ] = DEFAULT_BUDGET
     out: Out = None
     seed: Seed = 0
     jobs: Jobs = None
@@ -113,12 +113,12 @@ class SuggestOptions(RequestOptions):
     no_lock: NoLock = False
 
 
-KEYS = tuple(one.name for one in fields(RequestOptions) if one not in fields(Common))
+REQUEST_KEYS = tuple(one.name for one in fields(RequestOptions) if one not in fields(Common))
 """Options that are keys of a request."""
 
-LISTS = ("material", "adjustable", "prefer")
+LIST_KEYS = ("material", "adjustable", "prefer")
 
-BANDS = ("force", "torque")
+BAND_KEYS = ("force", "torque")
 """Keys that are a list where two values are given."""
 
 
@@ -157,9 +157,9 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
         with long_run(jobs, options.fresh, folder, plain, noting) as working:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
-            reserve = max(SPARE, WRITTEN * budget) if options.no_plots else RESERVE
+            reserve = max(FIGURES_RESERVE, WRITING_SHARE * budget) if options.no_plots else RESERVE
             found = suggest(block.request(), working, block.prefer, reserve)
-            deadlines = suggestion_files.Deadlines(Clock(ends - SPARE), Clock(ends - WRITING))
+            deadlines = suggestion_files.Deadlines(Clock(ends - FIGURES_RESERVE), Clock(ends - WRITING_RESERVE))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
             for name, content in suggestion_files.files(
                 found, block, working, not options.no_plots, deadlines, command
@@ -198,13 +198,15 @@ def keys(options: SuggestOptions) -> dict[str, str]:
     found = {}
     for one in fields(options):
         value = getattr(options, one.name)
-        if one.name not in KEYS or value is None or value == []:
+        if one.name not in REQUEST_KEYS or value is None or value == []:
             continue
         if isinstance(value, list):
             value = value[0] if len(value) == 1 else ",".join(part.strip().strip("[]") for part in value)
         if one.name == "envelope":
             value = parse_envelope(value)
-        elif (one.name in LISTS or (one.name in BANDS and _are_two(value))) and not value.strip().startswith("["):
+        elif (one.name in LIST_KEYS or (one.name in BAND_KEYS and _are_two(value))) and not value.strip().startswith(
+            "["
+        ):
             value = f"[{value}]"
         found["yield" if one.name == "made_well" else one.name] = value
     return found

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.summary import Summary
     from cfmkit.studies.sweep_request_and_files import SweepRequest
 
-PLACE = 22
-EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
+HELP_POSITION = 22
+HELP_EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +107,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
             shown = form.select_page_figures(makers, drawn)
             point = run_study_in_folder.command_of_a_point(options, work.study.design)
             page = html_of_study.page(found, spec, varied, kept, command, shown, point)
-            place.folder.write(html_of_study.NAME, page)
+            place.folder.write(html_of_study.REPORT_NAME, page)
         made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = run_study_in_folder.commit(place, made, terminal, code)
         run_study_in_folder.finish(place, [records])

@@ -39,8 +39,8 @@ GAP_ROUNDING, FORCE_ROUNDING = 1e-11, 1e-10
 SLIP_ROUNDING = 1e-13  # way of slip in one sample, in mean beam lengths, by which it may go back by rounding
 FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may close and open again
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
-FAR = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
-STEEP = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
+OPEN_GAP_STEPS = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
+MAX_SLOPE_STEPS = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
 NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
@@ -284,7 +284,7 @@ class PieceOfPath:
         moved = np.abs(chord[:, whole.motions]).max(axis=1)
         slope = np.abs(rate[:, whole.motions]).max(axis=1)
         dense = SAMPLES_PER_RADIUS * moved * whole.mesh.scales.length <= FEWEST_SAMPLES * self.smallest_radius
-        smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= STEEP * moved
+        smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= MAX_SLOPE_STEPS * moved
         s = np.linspace(0.0, 1.0, n_samples)[:, None, None]
         between = x[:-1] + s * s * (3 - 2 * s) * chord
         between = between + width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
@@ -366,7 +366,7 @@ class StepBetween:
     def _is_smooth(self) -> bool:
         width = abs(self.last.drive - self.first.drive)
         rates = (largest_motion(self.part.whole, at.rate) for at in (self.first, self.last))
-        return width > 0 and max(rates) * width <= STEEP * self.moved
+        return width > 0 and max(rates) * width <= MAX_SLOPE_STEPS * self.moved
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -382,7 +382,7 @@ class StepBetween:
         mesh, ends = self.part.whole.mesh, self.part.values(*self.interpolate(np.array([[0.0], [1.0]])))
         arms = np.hypot(*mesh.attachments.arm[[contact.place for contact in mesh.contacts]].T)
         reach = np.append(1.0 + arms, np.full(len(ends) - len(arms), 2.0))
-        return bool((ends > FAR * self.moved * reach[:, None]).all())
+        return bool((ends > OPEN_GAP_STEPS * self.moved * reach[:, None]).all())
 
     @cached_property
     def values(self) -> FloatArray:

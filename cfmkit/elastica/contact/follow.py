@@ -21,7 +21,7 @@ from cfmkit.elastica.contact.terms import slip_way
 from cfmkit.elastica.model.contact import FrictionState
 from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
 from cfmkit.numerics.continuation.folds import pass_fold
-from cfmkit.numerics.continuation.follow import LOCKED, follow, follow_on
+from cfmkit.numerics.continuation.follow import LOCKED_MESSAGE, follow, follow_on
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ SAME_PLACE = 1e-11  # share of the range within which a change is at a point
 MAX_CHANGES_AT_ONE_PLACE = 20
 FIRST_ARC = 0.1  # of the step before, behind a limit point at a change
 SHORTEST_STEP = 1e-6  # share of the range
-BLOCKED = "the drive is blocked by {names} at {{place}}"
-SNAPS = "the drive cannot go on at {{place}}, where {names} {what}: a limit point; follow it by through_folds"
+BLOCKED_MESSAGE = "the drive is blocked by {names} at {{place}}"
+SNAP_MESSAGE = "the drive cannot go on at {{place}}, where {names} {what}: a limit point; follow it by through_folds"
 BUCKLES_AWAY = "stability is lost at {place}, where a part that an obstacle holds buckles away from it"
 NO_FRICTION_STATE = "friction of {names} leaves no state that can go on at {{place}}: neither sticking nor slipping"
-LOSES = "stability is lost at {{place}}, where {names} {what}"
+STABILITY_LOSS_MESSAGE = "stability is lost at {{place}}, where {names} {what}"
 
 
 class EndOfPiece(NamedTuple):
@@ -159,10 +159,10 @@ def _follow(
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
-            yield PathStop(WhyStopped.LIMIT_POINT, place, SNAPS.format(names=names, what=what))
+            yield PathStop(WhyStopped.LIMIT_POINT, place, SNAP_MESSAGE.format(names=names, what=what))
             return
         if at.unstable > change.before and options.branch != "primary" and not options.through_folds:
-            yield PathStop(WhyStopped.JUMPS, place, LOSES.format(names=names, what=what))
+            yield PathStop(WhyStopped.JUMPS, place, STABILITY_LOSS_MESSAGE.format(names=names, what=what))
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
@@ -284,7 +284,7 @@ def _follow_part(
         assert at is not None
         yield item._replace(at=at)
         if previous is not None and part.is_locked(previous, at):
-            return EndOfPiece(PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED), walk, at)
+            return EndOfPiece(PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED_MESSAGE), walk, at)
         if item.target >= 0:
             walk = replace(walk, number=item.target + 1)
         walk, previous = replace(walk, branch=item.branch), at
@@ -313,8 +313,8 @@ def _enter(
     names = beyond.say(number)
     if at is None or not np.abs(at.rate).max(initial=0.0) < RIGID_RATE:
         if not begins:
-            return PathStop(WhyStopped.JUMPS, near.drive, LOSES.format(names=names, what="ends"))
-        return PathStop(WhyStopped.BLOCKED, near.drive, BLOCKED.format(names=beyond.say_all(number)))
+            return PathStop(WhyStopped.JUMPS, near.drive, STABILITY_LOSS_MESSAGE.format(names=names, what="ends"))
+        return PathStop(WhyStopped.BLOCKED, near.drive, BLOCKED_MESSAGE.format(names=beyond.say_all(number)))
     whole = beyond.grow(at)
     turned = bool(beyond.grows_along(whole, number) * sense < 0)
     return beyond, whole, (-sense if turned else sense), turned, 1
@@ -339,5 +339,7 @@ def _enter_friction(
     if chosen is not None:
         return chosen.piece, chosen.at, chosen.sense, chosen.sense != sense, chosen.n_states
     if is_jammed(beyond, change.at):
-        return PathStop(WhyStopped.BLOCKED, change.at.drive, BLOCKED.format(names=beyond.say_all(change.number)))
+        return PathStop(
+            WhyStopped.BLOCKED, change.at.drive, BLOCKED_MESSAGE.format(names=beyond.say_all(change.number))
+        )
     return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.say_rubbing()))

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.terms import TERMS, Contribution, force_along_direction
+from cfmkit.elastica.mechanics.terms import ENERGY_TERMS, Contribution, force_along_direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -98,4 +98,4 @@ def curve_spring(mesh: Discretisation, spring: Attached, z: Any, _share: Any, _d
     )
 
 
-TERMS[CurveSpring] = curve_spring
+ENERGY_TERMS[CurveSpring] = curve_spring

@@ -31,7 +31,7 @@ from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import with_places
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, slopes_of
 
@@ -205,7 +205,7 @@ def _term(acting: Acting, z: Any, drive: float) -> Contribution:
     network, attached = acting
     if isinstance(attached, ContactAt):
         return press(network, attached, z)
-    return TERMS[type(attached.item)](network, attached, z, 1.0, drive)
+    return ENERGY_TERMS[type(attached.item)](network, attached, z, 1.0, drive)
 
 
 def _term_slopes(own: Acting, at: Equilibria, motions: FloatArray) -> FloatArray:

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
 
-TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
+TABLE_NAMES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
 
-CURLING = ("rest", "curl", "hindrance")  # of wide strips
+CURLING_TABLES = ("rest", "curl", "hindrance")  # of wide strips
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def set_up(
         return _plain(template, origin, pairs)
     alone = make or (lambda net, drive: discretise(net, drive, template.degree, scales=template.scales))
     each = tuple(alone(*pair) for pair in pairs)
-    names = (*TABLES, *(CURLING if template.elements.curl is not None else ()))
+    names = (*TABLE_NAMES, *(CURLING_TABLES if template.elements.curl is not None else ()))
     stack = {name: np.array([getattr(one.elements, name) for one in each]) for name in names}
     places = {name: np.array([getattr(one.attachments, name) for one in each]) for name in ("origin", "arm", "frame")}
     return NetworkDesigns(template, len(pairs), stack, places, np.array([one.base for one in each]), each, pairs)

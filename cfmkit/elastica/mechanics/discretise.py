@@ -18,7 +18,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.element_cuts import (
-    TAUT,
+    TAUT_RATIO,
     MovingCuts,
     find_cuts,
     find_moving_cuts,
@@ -359,7 +359,7 @@ class _ArrayBuilder:
     def _cuts(self, name: str, beam: Beam) -> list[float]:
         """Return the parameters between which the elements of a beam lie."""
         tautness = self.tension.get(name, 0.0)
-        whole = self.pieces == 1 and tautness <= TAUT and turns_little(beam)
+        whole = self.pieces == 1 and tautness <= TAUT_RATIO and turns_little(beam)
         return [0.0, 1.0] if whole and is_plain(beam) else find_cuts(beam, self.fits[name], self.pieces, tautness)
 
     def _beam(self, beam: Beam, cuts: list[float], tables: Mapping[str, Any]) -> list[tuple[int, int]]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam_fits import BeamFits
 
 MAX_TURN = 3.0  # of an unloaded element [rad]; a basis of degree 10 integrates its sine to 1e-10
-TAUT = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
+TAUT_RATIO = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
 LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
 
@@ -38,7 +38,7 @@ def find_cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[flo
     smooth = itertools.pairwise(smooth_marks(beam, fitted))
     cuts = [left + (right - left) * k / count for left, right in smooth for k in range(count)]
     cuts.append(1.0)
-    return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
+    return _refine_ends(cuts, tautness) if tautness > TAUT_RATIO else cuts
 
 
 class CutLaw(NamedTuple):

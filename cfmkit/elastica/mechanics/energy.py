@@ -16,7 +16,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
-from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.numerics.dual_array import cos_sin, stack
 
@@ -88,7 +88,7 @@ def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
 
 def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
     for attached in (*mesh.springs, *mesh.loads):
-        yield TERMS[type(attached.item)](mesh, attached, z, share, drive)
+        yield ENERGY_TERMS[type(attached.item)](mesh, attached, z, share, drive)
     for contact in mesh.contacts:
         yield press(mesh, contact, z)
 
@@ -173,7 +173,7 @@ def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) ->
     e, at = mesh.elements, fields(mesh, z, drive, share)
     strain = e.axial * at.normal**2 + e.shear * at.shear**2
     beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
-    springs = (TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
+    springs = (ENERGY_TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
     return beams.sum() / 2 + sum(springs) + sum(press(mesh, contact, z).energy for contact in mesh.contacts)
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MAX_ROUNDS = 14  # of Newton's method
 LARGEST_CORRECTION = 50.0  # of a motion: beyond that Newton's method has left the path
 SAME_EQUILIBRIUM = 1e-7  # motions that differ by less are one
-STANDING = 1e-10  # motions that change by less stand: then forces may still change by 1e-3
+MOTION_RTOL = 1e-10  # motions that change by less stand: then forces may still change by 1e-3
 FORCE_CHANGE = 8.0  # of a section force in one step, in EI/L^2 of its element, besides half of what it was
 LAND_FROM = 1.3  # steps to a target from which on it is hit by one
 SHORTEST_STEP = 1e-13  # share of the range
@@ -233,7 +233,7 @@ class NumpyEquations:
                 effort = self._effort(old, old_way) + float(at.change @ step)
                 return MarchState(free, way, rate, self.count_unstable(at), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
-            rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < STANDING and largest < 1e-3)
+            rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < MOTION_RTOL and largest < 1e-3)
             stands = rounds and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
                 unstable = self.count_unstable(at)

@@ -44,19 +44,19 @@ if TYPE_CHECKING:
 
 MAX_DEGREE = 40
 """As in march.h: arrays of one element are on the stack."""
-SWITCH = "CFMKIT_WITHOUT_C"
+WITHOUT_C_VARIABLE = "CFMKIT_WITHOUT_C"
 """Environment variable that keeps everything in numpy, whatever its value."""
-KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
+COMPILED_TERMS = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
 """Springs and loads that march.c has; networks with others run on numpy."""
 
-COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
-ADDRESSES = (
+COUNT_FIELDS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
+ADDRESS_FIELDS = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
     "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
     "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
-OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESSES)
+OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESS_FIELDS)
 WHOLE_NUMBERS = frozenset(("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at"))
 
 
@@ -70,8 +70,8 @@ def _module() -> Any:
 
 
 def load_compiled() -> Any:
-    """Return the compiled module, None if it was not built, or is switched off by `SWITCH`."""
-    return None if SWITCH in os.environ else _module()
+    """Return the compiled module, None if it was not built, or is switched off by `WITHOUT_C_VARIABLE`."""
+    return None if WITHOUT_C_VARIABLE in os.environ else _module()
 
 
 def engine() -> str:
@@ -92,7 +92,7 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
     key = equations, ramp, load_compiled() is not None
     if key not in mesh.known:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
-        plain = kinds <= set(KNOWN) and mesh.degree <= MAX_DEGREE
+        plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif mesh.contacts:
@@ -115,8 +115,8 @@ class CompiledEquations(NumpyEquations):
         super().__post_init__()
         arrays = model_arrays(self)
         counts = model_counts(self.mesh, self.ramp)
-        row = np.array([*counts.values(), *(0 for _ in ADDRESSES)], np.int64)
-        self.code.place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
+        row = np.array([*counts.values(), *(0 for _ in ADDRESS_FIELDS)], np.int64)
+        self.code.place(row, len(COUNT_FIELDS), tuple(arrays.get(name) for name in ADDRESS_FIELDS))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
 
@@ -141,7 +141,7 @@ class CompiledEquations(NumpyEquations):
         object.__setattr__(other, "mesh", mesh)
         object.__setattr__(other, "arrays", {**self.arrays, name: array})
         object.__setattr__(other, "row", self.row.copy())
-        self.code.place(other.row, len(COUNTS) + ADDRESSES.index(name), (array,))
+        self.code.place(other.row, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name), (array,))
         return other
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
@@ -370,7 +370,9 @@ def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
     """Return a `Model` for each design: the template's, with addresses of its own, good as long as `kept` is."""
     rows = np.tile(own.row, (count, 1))
     for name, array in kept.items():
-        rows[:, len(COUNTS) + ADDRESSES.index(name)] = array.ctypes.data + array.strides[0] * np.arange(count)
+        rows[:, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name)] = array.ctypes.data + array.strides[0] * np.arange(
+            count
+        )
     return rows
 
 
@@ -380,7 +382,7 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     elements, points = mesh.elements.weight.shape
     follows = any(load.item.follows for load in mesh.loads)
     values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
-    return dict(zip(COUNTS, (*values, len(mesh.loads), int(ramp), int(follows)), strict=True))
+    return dict(zip(COUNT_FIELDS, (*values, len(mesh.loads), int(ramp), int(follows)), strict=True))
 
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import Border
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
-ROOM = 50  # states of a march besides two for each requested value, until it is looked at again
+N_SPARE_STATES = 50  # states of a march besides two for each requested value, until it is looked at again
 ROOM_IN_CONTACT = 8  # of a march with closed contacts, behind which it is seen whether one begins or ends
 FIRST_POWERS, N_POWERS, STIFF_SHARE = 8, 3, 1e-2
 """Powers by which the softest mode is estimated, and its flexibility as a share of a critical one's that is none."""
-MIX = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
+MODE_MIX_SHARE = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
 NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
 
 
@@ -96,7 +96,7 @@ class NetworkProblem:
         plan = MarchPlan(
             walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
             self.next_correction, on_branch=walk.branch is not None,
-            room=ROOM_IN_CONTACT if self.mesh.contacts else 2 * len(left) + ROOM,
+            room=ROOM_IN_CONTACT if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES,
         )  # fmt: skip
         marched = self.equations.march(here, left, plan)
         states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
@@ -137,7 +137,7 @@ class NetworkProblem:
         """Return the size of the smallest eigenvalue and its mode, better where another is known that is near."""
         if self.follows:
             return abs(float(self.modes(at, 1)[0][0])), None
-        vector = self._any_vector if near is None else near + MIX * self._any_vector
+        vector = self._any_vector if near is None else near + MODE_MIX_SHARE * self._any_vector
         rounds = FIRST_POWERS if near is None else N_POWERS
         flexibility, mode = self.equations.soften(at.x, at.drive, vector, rounds)
         return (1 / abs(flexibility) if flexibility else 0.0), mode

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
 
 
-def without_floor(mesh: Discretisation, elements: Any) -> Discretisation:
+def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
     axial, floored = mesh.elements.axial.copy(), mesh.floored.copy()
     axial[elements], floored[elements] = 0.0, False
@@ -33,4 +33,4 @@ def discretise_alike(
     It has the template's `cuts` if they are given: where they differ by complex steps only.
     """
     arrays = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=cuts)
-    return without_floor(arrays, np.flatnonzero(arrays.floored & ~template.floored))
+    return make_inextensible(arrays, np.flatnonzero(arrays.floored & ~template.floored))

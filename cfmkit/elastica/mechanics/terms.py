@@ -1,7 +1,7 @@
 """Energy terms of springs and loads: each a function that returns its gradient and Hessian by the unknowns it acts on.
 
 A term takes the network's arrays, what it is of (`Attached`), the poses of its places, all unknowns z and two factors:
-`share` of what is constant, `drive` of what grows with it. A new term is one function and a line in `TERMS`.
+`share` of what is constant, `drive` of what grows with it. A new term is one function and a line in `ENERGY_TERMS`.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def torsion_spring(mesh: Discretisation, spring: Attached, z: Any, share: Any, _
 
 
 Term = Callable[["Discretisation", "Attached", Any, Any, Any], Contribution]
-TERMS: dict[type, Term] = {
+ENERGY_TERMS: dict[type, Term] = {
     PointLoad: point_load,
     SlideSpring: slide_spring,
     LineSpring: line_spring,

@@ -75,7 +75,7 @@ def curling_share(z: Any) -> tuple[Any, Any, Any]:
 
 def _by_series(z: Any) -> tuple[Any, Any, Any]:
     g, first, second = 0.0 * z, 0.0 * z, 0.0 * z
-    for coefficient in reversed(SERIES):
+    for coefficient in reversed(SERIES_COEFFICIENTS):
         second = second * z + 2 * first
         first = first * z + g
         g = g * z + coefficient
@@ -102,7 +102,7 @@ def _quotient(top: list[float], below: list[float]) -> tuple[float, ...]:
     return tuple(found)
 
 
-SERIES = _quotient(
+SERIES_COEFFICIENTS = _quotient(
     [2 / factorial(4 * k + 2) for k in range(N_TERMS)], [1 / factorial(4 * k + 1) for k in range(N_TERMS)]
 )
 """Coefficients of g as a power series of th^4."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica.model.section import Taper
-from cfmkit.elastica.model.shapes import STRAIGHT, FittedShape, Shape, direction
+from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE, FittedShape, Shape, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,21 +24,23 @@ if TYPE_CHECKING:
 Joint = Literal["rigid", "pin"]
 Closure = Literal["rotscale", "raw"]
 
-SAME = 1e-12
+PARAMETER_TOL = 1e-12
 """Parameters of a shape that differ by less count as one place."""
 
-_SLIGHT = 1e-9  # [rad] an angle that is no corner; [1] a share of the complex step that is rounding
-_PANELS = 8  # of a smooth piece at least
-_COILED = 2.0  # mean turn of a panel [rad] up to which twelve nodes integrate its sine and cosine to about 1e-12
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-GAUSS = (
-    ((np.arange(_PANELS)[:, None] + 0.5 * (1 + _NODES)) / _PANELS).ravel(),
-    np.tile(0.5 * _WEIGHTS / _PANELS, _PANELS),
+_ANGLE_TOL = 1e-9  # [rad] an angle that is no corner; [1] a share of the complex step that is rounding
+_N_PANELS = 8  # of a smooth piece at least
+_MAX_PANEL_TURN = (
+    2.0  # mean turn of a panel [rad] up to which twelve nodes integrate its sine and cosine to about 1e-12
+)
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
+BEAM_QUADRATURE = (
+    ((np.arange(_N_PANELS)[:, None] + 0.5 * (1 + _GAUSS_NODES)) / _N_PANELS).ravel(),
+    np.tile(0.5 * _GAUSS_WEIGHTS / _N_PANELS, _N_PANELS),
 )
 """Places and weights of the quadrature over a whole smooth beam, parameter from 0 to 1."""
 
 
-_JOINTS = ("rigid", "pin")
+_JOINT_KINDS = ("rigid", "pin")
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Beam:
     start: str
     end: str
     section: Section
-    shape: Shape = STRAIGHT
+    shape: Shape = STRAIGHT_SHAPE
     closure: Closure = "rotscale"
     start_joint: Joint = "rigid"
     end_joint: Joint = "rigid"
@@ -75,8 +77,8 @@ class Beam:
         """Check the choices."""
         if self.closure not in ("rotscale", "raw"):
             raise InputError(f"closure must be 'rotscale' or 'raw', got {self.closure!r}")
-        if self.start_joint not in _JOINTS or self.end_joint not in _JOINTS:
-            wrong = self.end_joint if self.start_joint in _JOINTS else self.start_joint
+        if self.start_joint not in _JOINT_KINDS or self.end_joint not in _JOINT_KINDS:
+            wrong = self.end_joint if self.start_joint in _JOINT_KINDS else self.start_joint
             raise InputError(f"a joint is 'rigid' or 'pin', got {wrong!r}")
         if self.start == self.end:
             raise InputError(f"a beam needs two different nodes, got {self.start!r} twice")
@@ -108,13 +110,13 @@ class Fit:
         values = np.atleast_1d(np.asarray(t, dtype=float))
         panel = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
         half = 0.5 * (values - edges[panel])
-        places = edges[panel][..., None] + half[..., None] * (1 + _NODES)
+        places = edges[panel][..., None] + half[..., None] * (1 + _GAUSS_NODES)
         piece = np.searchsorted(self.course.breaks, edges[panel], side="right") - 1
         middles = 0.5 * (self.course.breaks[1:] + self.course.breaks[:-1])
         found = lengths[panel]
         for one in np.unique(piece):
             own = piece == one
-            found[own] += (self.course.speed(places[own], middles[one]) * _WEIGHTS).sum(axis=-1) * half[own]
+            found[own] += (self.course.speed(places[own], middles[one]) * _GAUSS_WEIGHTS).sum(axis=-1) * half[own]
         return (found / lengths[-1]).reshape(np.shape(t))[()]
 
     @cached_property
@@ -122,11 +124,11 @@ class Fit:
         """Edges of panels over the parameter, and the arc lengths there before scaling."""
         edges, steps = [np.zeros(1)], [np.zeros(1)]
         for left, right in itertools.pairwise(self.course.breaks.tolist()):
-            marks = np.linspace(left, right, _PANELS + 1)
+            marks = np.linspace(left, right, _N_PANELS + 1)
             half = 0.5 * (marks[1] - marks[0])
-            t = (marks[:-1] + half)[:, None] + half * _NODES
+            t = (marks[:-1] + half)[:, None] + half * _GAUSS_NODES
             edges.append(marks[1:])
-            steps.append((self.course.speed(t, 0.5 * (left + right)) * _WEIGHTS).sum(axis=1) * half)
+            steps.append((self.course.speed(t, 0.5 * (left + right)) * _GAUSS_WEIGHTS).sum(axis=1) * half)
         return np.concatenate(edges), np.cumsum(np.concatenate(steps))
 
     def parameter(self, fraction: float) -> float:
@@ -205,12 +207,12 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
         t = (known or fitted).parameter(station)
         ahead = _station_step(beam, station) - np.imag(fitted.arc(t))
         step = float(ahead * np.real(fitted.length) / np.real(fitted.speed(t, t)))
-        k = int(np.searchsorted(marks, t - SAME))
-        if marks[k] > t + SAME:
+        k = int(np.searchsorted(marks, t - PARAMETER_TOL))
+        if marks[k] > t + PARAMETER_TOL:
             marks, steps = np.insert(marks, k, t), np.insert(steps, k, step)
         elif not _has_corner(fitted.course, t):
             steps[k] = step
-        elif _has_step(beam.section, station) and abs(step) > _SLIGHT * _change(fitted.course):
+        elif _has_step(beam.section, station) and abs(step) > _ANGLE_TOL * _change(fitted.course):
             raise InputError(
                 f"a corner of the beam {beam.start}-{beam.end} and a step of its thickness move past each other: "
                 "no derivative there"
@@ -224,7 +226,7 @@ def _has_corner(course: FittedShape, t: float) -> bool:
     if k in (0, len(course.breaks) - 1):
         return True
     before, after = 0.5 * (course.breaks[k - 1 : k + 1] + course.breaks[k : k + 2])
-    return bool(abs(np.real(course.angle(t, after) - course.angle(t, before))) > _SLIGHT)
+    return bool(abs(np.real(course.angle(t, after) - course.angle(t, before))) > _ANGLE_TOL)
 
 
 def _has_step(section: Section, station: float) -> bool:
@@ -257,7 +259,7 @@ def _turn_of(course: FittedShape, left: Any, right: Any) -> float:
 
     The angle itself, unlike its sine, shows at a few places how far it runs.
     """
-    places = np.linspace(np.real(left), np.real(right), _PANELS * len(_NODES))
+    places = np.linspace(np.real(left), np.real(right), _N_PANELS * len(_GAUSS_NODES))
     angles = np.broadcast_to(np.real(course.angle(places, float(np.real(0.5 * (left + right))))), places.shape)
     return float(np.abs(np.diff(angles)).sum())
 
@@ -269,11 +271,11 @@ def _integral(course: FittedShape) -> tuple[tuple[Any, Any], Any]:
     length: Any = 0.0
     for left, right in itertools.pairwise(course.breaks):
         inside = float(np.real(0.5 * (left + right)))
-        count = max(_PANELS, ceil(_turn_of(course, left, right) / _COILED))
+        count = max(_N_PANELS, ceil(_turn_of(course, left, right) / _MAX_PANEL_TURN))
         panels = np.linspace(left, right, count + 1)
         half = 0.5 * (panels[1] - panels[0])
-        t = ((panels[:-1] + half)[:, None] + half * _NODES).ravel()
-        weights = np.tile(half * _WEIGHTS, count)
+        t = ((panels[:-1] + half)[:, None] + half * _GAUSS_NODES).ravel()
+        weights = np.tile(half * _GAUSS_WEIGHTS, count)
         speed, angle = course.speed(t, inside) * weights, course.angle(t, inside)
         x = x + (speed * np.cos(angle)).sum()
         y = y + (speed * np.sin(angle)).sum()

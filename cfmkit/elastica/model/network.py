@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.contact import Contact
 
 
-_NONE = (0.0, 0.0, 0.0)  # not displaced
+_NO_DISPLACEMENT = (0.0, 0.0, 0.0)  # not displaced
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Support:
 
     def __post_init__(self) -> None:
         """Refuse displacements of motions that are free."""
-        if tuple(self.displacement) == _NONE:
+        if tuple(self.displacement) == _NO_DISPLACEMENT:
             return
         for held, value, name in zip(
             (self.along, self.across, self.rotation), self.displacement, ("along", "across", "rotation"), strict=True
@@ -58,9 +58,9 @@ class Support:
                 raise InputError(f"a displacement {name} is given but that motion is not held")
 
 
-FREE = Support()
-CLAMPED = Support(True, True, True)
-PINNED = Support(True, True, False)
+FREE_SUPPORT = Support()
+CLAMPED_SUPPORT = Support(True, True, True)
+PINNED_SUPPORT = Support(True, True, False)
 
 
 def slider_support(direction: float, rotates: bool = False) -> Support:
@@ -74,7 +74,7 @@ class Node:
 
     x: float
     y: float
-    support: Support = FREE
+    support: Support = FREE_SUPPORT
 
 
 @dataclass(frozen=True)

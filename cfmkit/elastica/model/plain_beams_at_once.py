@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.beam import GAUSS, Fit
+from cfmkit.elastica.model.beam import BEAM_QUADRATURE, Fit
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.section import Section
 
 
-COILED = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine of the angle to about 1e-12
+MAX_BEAM_TURN = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine of the angle to about 1e-12
 
 
 class Bundle:
@@ -128,7 +128,7 @@ def is_plain(beam: Beam) -> bool:
 
 def coils(beam: Beam) -> bool:
     """Return True if the angle of a beam, a polynomial, may turn by more than COILED."""
-    return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > COILED
+    return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > MAX_BEAM_TURN
 
 
 def coefficients_of(beams: Sequence[Beam]) -> Any:
@@ -141,7 +141,7 @@ def coefficients_of(beams: Sequence[Beam]) -> Any:
 def chords(coefficients: Any) -> tuple[Any, Any]:
     """Return the chords of shapes of length 1 with coefficients (..., b, m), x and y (..., b) each."""
     cos, sin = cos_sin(coefficients @ powers(coefficients.shape[-1]))
-    return cos @ GAUSS[1], sin @ GAUSS[1]
+    return cos @ BEAM_QUADRATURE[1], sin @ BEAM_QUADRATURE[1]
 
 
 def fit_to_ends(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:
@@ -169,6 +169,6 @@ def _rigidities(s: Section) -> tuple[Any, Any, Any]:
 @lru_cache(maxsize=32)
 def powers(count: int) -> Any:
     """Return the powers (count, n) of the Gauss nodes of the whole beam."""
-    powers = np.vander(GAUSS[0], count, increasing=True).T.copy()
+    powers = np.vander(BEAM_QUADRATURE[0], count, increasing=True).T.copy()
     powers.setflags(write=False)
     return powers

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-_SINES = 64  # places of half a sine: the mean over it is smooth, and periodic
+_N_SINE_SAMPLES = 64  # places of half a sine: the mean over it is smooth, and periodic
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def hindered_share(width: Any, thickness: Any, poisson_ratio: Any, curvature: An
     >>> round(float(hindered_share(10e-3, 1e-3, 0.35, 60.0)), 4)
     0.0342
     """
-    bent = np.sin(np.pi * (np.arange(_SINES) + 0.5) / _SINES) ** 2
+    bent = np.sin(np.pi * (np.arange(_N_SINE_SAMPLES) + 0.5) / _N_SINE_SAMPLES) ** 2
     curl, plate = curling(width, thickness, poisson_ratio)
     return plate * (curl_hindered(np.multiply.outer(curl * curvature**2, bent)) @ bent) / bent.sum()
 

@@ -19,7 +19,7 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-_NEAR = 1e-12  # of the parameter: counts as on a piece
+_PARAMETER_TOL = 1e-12  # of the parameter: counts as on a piece
 
 AngleLaw = Callable[[Any, float], Any]  # (t, a place inside the piece) -> angle [rad] or speed
 
@@ -84,7 +84,7 @@ class Polynomial:
         return FittedShape(angle, lambda u, inside: length + 0.0 * u, read_only([0.0, 1.0]), True)
 
 
-STRAIGHT = Polynomial()
+STRAIGHT_SHAPE = Polynomial()
 """The shape of a straight beam."""
 
 
@@ -213,7 +213,7 @@ def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
         own = min(int(np.searchsorted(knots.real, inside, side="right")) - 1, n - 2)
         at = np.real(t)
         i = np.clip(np.searchsorted(knots.real, at, side="right") - 1, 0, n - 2)
-        i = np.where((at >= knots.real[own] - _NEAR) & (at <= knots.real[own + 1] + _NEAR), own, i)
+        i = np.where((at >= knots.real[own] - _PARAMETER_TOL) & (at <= knots.real[own + 1] + _PARAMETER_TOL), own, i)
         u = ((t - knots[i]) / gap[i])[..., None]
         return 6 * u * (1 - u) * slope[i] + (1 - u) * (1 - 3 * u) * ends[i] + u * (3 * u - 2) * ends[i + 1]
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.designs import CURLING, design_of
+from cfmkit.elastica.mechanics.designs import CURLING_TABLES, design_of
 from cfmkit.elastica.mechanics.polynomials import (
     basis,
     integrals,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
     from cfmkit.elastica.model.network import Network
 
-ON_POINTS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", *CURLING)
+ON_POINTS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", *CURLING_TABLES)
 """Tables of elements at their Gauss points."""
 
 

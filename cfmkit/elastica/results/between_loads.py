@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.results.between_points import FEWEST, KNOWN, BetweenPoints
+from cfmkit.elastica.results.between_points import MIN_PATH_POINTS, PLACE_RTOL, BetweenPoints
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -100,7 +100,7 @@ def interpolate_loads(
         Stress [Pa]; where it is passed is solved for.
     """
     mesh = path.mesh
-    if len(path) < FEWEST or not np.all(path.accurate) or (along is not None and node not in mesh.bodies):
+    if len(path) < MIN_PATH_POINTS or not np.all(path.accurate) or (along is not None and node not in mesh.bodies):
         return None
     place = mesh.nodes[node]
     unknowns, frame = mesh.attachments.unknowns[place], mesh.attachments.frame[place]
@@ -117,7 +117,7 @@ def interpolate_loads(
     moved = path.motion(node)
     motion = moved[:, 2] if along is None else moved[:, 0] * np.cos(along) + moved[:, 1] * np.sin(along)
     rest = motion - scale * (path.free @ row[:-1])
-    steps, least = np.diff(motion), KNOWN * float(np.ptp(motion))  # rounding may go one way, too
+    steps, least = np.diff(motion), PLACE_RTOL * float(np.ptp(motion))  # rounding may go one way, too
     if not row.any() or np.ptp(rest) > least or not ((steps > least).all() or (steps < -least).all()):
         return None
     return BetweenLoads(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))

@@ -31,23 +31,23 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.path import EquilibriumPath
     from cfmkit.elastica.results.stress_between_points import Knots
 
-FEWEST = 4  # points of a path below which nothing is said of what lies between them: a cubic needs four
+MIN_PATH_POINTS = 4  # points of a path below which nothing is said of what lies between them: a cubic needs four
 
-ROUNDS = 3
+N_EXTREME_ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
 
-STRAY, LEAST = 0.5, 1e-3
+MAX_RELATIVE_STRAY, MIN_STRAY_DISTANCE = 0.5, 1e-3
 """Largest distance of a pose from its first guess: as a share of the change between the two points around it, and at
 least [rad or mean beam lengths]. Beyond that another branch was found."""
 
-ASIDE = 1e-6
+CORNER_OFFSET = 1e-6
 """Share of the drive's range by which the knots next to a corner are beside it: no cubic goes across it but there."""
 
-NEARER = (0.1, 0.01, 0.001)
+CORNER_SHARES = (0.1, 0.01, 0.001)
 """Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
 
 AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at a point: it is not located better
-KNOWN = 1e-12  # share of the drive's range within which a place is that of a point
+PLACE_RTOL = 1e-12  # share of the drive's range within which a place is that of a point
 
 
 def interpolate_path(
@@ -66,7 +66,7 @@ def interpolate_path(
     allowed : float or None
         Stress [Pa]; where it is passed is solved for.
     """
-    if isinstance(path.load_case, Loading) or len(path) < FEWEST or not np.all(path.accurate):
+    if isinstance(path.load_case, Loading) or len(path) < MIN_PATH_POINTS or not np.all(path.accurate):
         return None
     steps = np.diff(path.at.drive)
     if not ((steps > 0).all() or (steps < 0).all()):
@@ -135,7 +135,7 @@ class BetweenPoints(ShortRepr):
         for number, corner in enumerate(self.corners):
             before, behind = points[points < corner][-1:], points[points > corner][:1]
             room = 0.5 * float(np.abs(np.concatenate([before, behind]) - corner).min())
-            aside = min(ASIDE * (points[-1] - points[0]), room)
+            aside = min(CORNER_OFFSET * (points[-1] - points[0]), room)
             found[number] = corner - aside * len(before), corner, corner + aside * len(behind)
         return found
 
@@ -146,7 +146,7 @@ class BetweenPoints(ShortRepr):
         if len(self.corners):
             beside = np.setdiff1d(self.beside_corners, x)
             x, effort = insert_knots(x, effort, beside, self.effort("", beside))
-        for _ in range(ROUNDS):
+        for _ in range(N_EXTREME_ROUNDS):
             more = inner_extremes(x, effort)
             for low, _, high in self.beside_corners.tolist():
                 more = more[(more < low) | (more > high)]
@@ -270,10 +270,10 @@ class BetweenPoints(ShortRepr):
         later = left + (self._numbers[left + 1] > self._numbers[left])
         y[:, self._friction_slots] = self.own_unknowns[later][:, self._friction_slots]
         loads = self._loads[near]
-        known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
+        known = np.abs(wanted - drive[near]) <= PLACE_RTOL * (drive[-1] - drive[0])
         y[known] = self.own_unknowns[near[known]]
         for corner in self._corners.values():
-            here = np.abs(wanted - corner.drive) <= KNOWN * (drive[-1] - drive[0])
+            here = np.abs(wanted - corner.drive) <= PLACE_RTOL * (drive[-1] - drive[0])
             y[here], loads[here], known = corner.y, corner.drive, known | here
         found, changes = known.copy(), self._poses(self.own_unknowns[left + 1] - self.own_unknowns[left])
         asked = np.flatnonzero(~known)
@@ -281,7 +281,9 @@ class BetweenPoints(ShortRepr):
             spots, ways = self._spots(y[asked], wanted[asked], loads[asked])
             alike = (spots.unstable[:, None] == self._counts(near[asked], left[asked])).any(axis=1)
             moved = self._poses(spots.free - y[asked])
-            good = spots.converged & alike & (moved <= np.maximum(LEAST, STRAY * changes[asked]))
+            good = (
+                spots.converged & alike & (moved <= np.maximum(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * changes[asked]))
+            )
             chosen = asked[good]
             y[chosen], loads[chosen], found[chosen] = spots.free[good], ways[good], True
         return self.path.with_states(self._numbers[near], y, loads, found)
@@ -397,12 +399,12 @@ class BetweenPoints(ShortRepr):
         """
         own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self.own_drive
         x, y = drive[own], self.own_unknowns[own]
-        for share in NEARER:
+        for share in CORNER_SHARES:
             near = place + share * (drive[point] - place)
             spots, _ = self._spots(values_at(x, y, np.array([near])), np.array([near]), np.array([near]))
             beside = np.array([point])
             if not spots.converged[0] or spots.unstable[0] not in self._counts(beside, beside):
-                if share == NEARER[0]:
+                if share == CORNER_SHARES[0]:
                     return None
                 break  # of a bifurcation just behind the rest, the place is known less closely
             at = int(np.searchsorted(x, near))

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.similar_arrays import without_floor
+from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.equations import NumpyEquations
     from cfmkit.elastica.results.path import EquilibriumPath
 
-LARGEST = 1e13  # motion or force, dimensionless, that follows a unit motion: beyond it the tangent may be singular
-RANK = 1e-14  # share of the largest singular value below which one is rounding
+MAX_FLEXIBILITY = (
+    1e13  # motion or force, dimensionless, that follows a unit motion: beyond it the tangent may be singular
+)
+RANK_RTOL = 1e-14  # share of the largest singular value below which one is rounding
 OPEN_FORCE = 1e-9  # dimensionless force that may be left where a force is open: rounding leaves 1e-14
 
 
@@ -78,7 +80,7 @@ def _compute_along_path(path: EquilibriumPath, node: str, direction: float) -> t
     frame[place] = new
     kept = mesh.free[(mesh.free != x) & (mesh.free != y)]
     loose = replace(mesh, attachments=mesh.attachments._replace(frame=frame), free=np.sort(np.append(kept, y)))
-    loose = without_floor(loose, np.flatnonzero(mesh.floored))
+    loose = make_inextensible(loose, np.flatnonzero(mesh.floored))
     own, cos, sin = equations(loose), new @ old, old[0] * new[1] - old[1] * new[0]
     found = np.empty((len(path), 2))
     for k, (state, drive) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
@@ -100,7 +102,7 @@ def _condense(own: NumpyEquations, z: FloatArray, drive: float, across: int) -> 
         with contextlib.suppress(np.linalg.LinAlgError):
             (moved,), unstable = own.resolve(z[free], drive, push[None])
             give = float(push @ moved)
-            if np.abs(moved).max() < LARGEST * abs(give):
+            if np.abs(moved).max() < MAX_FLEXIBILITY * abs(give):
                 return 1.0 / give, (-1.0) ** (unstable - (give < 0))
     rest = push == 0
     tangent = own.linearise(z[free], drive).tangent
@@ -108,9 +110,9 @@ def _condense(own: NumpyEquations, z: FloatArray, drive: float, across: int) -> 
     stiffness, sign = float(tangent[~rest, ~rest][0]), float(np.linalg.slogdet(kept)[0])
     with contextlib.suppress(np.linalg.LinAlgError):
         follow = np.linalg.solve(kept, column)
-        if np.abs(follow).max(initial=0.0) < LARGEST:
+        if np.abs(follow).max(initial=0.0) < MAX_FLEXIBILITY:
             return stiffness - float(row @ follow), sign
-    follow, _, _, _ = np.linalg.lstsq(kept, column, RANK)
+    follow, _, _, _ = np.linalg.lstsq(kept, column, RANK_RTOL)
     left = np.abs(kept @ follow - column).max(initial=0.0)
     is_open = left > OPEN_FORCE * max(1.0, float(np.abs(column).max(initial=0.0)))
     return float("nan") if is_open else stiffness - float(row @ follow), sign

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.results.path import EquilibriumPath
 
-_ROUNDING = 1e-24  # share of the largest energy below which there is none: squares of rounded moments
+_ENERGY_RTOL = 1e-24  # share of the largest energy below which there is none: squares of rounded moments
 
-_STEP = 1e-30
+_COMPLEX_STEP = 1e-30
 """Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
 
@@ -49,7 +49,9 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
             found = states_of_elements(path.network, path.at, [element], places)
             left, right = mesh.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
-            rest = np.imag(fitted.angle(t + 1j * _STEP, inside)) / _STEP / np.real(fitted.speed(t, inside))
+            rest = (
+                np.imag(fitted.angle(t + 1j * _COMPLEX_STEP, inside)) / _COMPLEX_STEP / np.real(fitted.speed(t, inside))
+            )
             rigidity = section.youngs_modulus * section.width * found.thickness**3 / 12
             weights = mesh.elements.weight[..., element, :] * mesh.scales.length
             density = 0.5 * found.moment**2 / rigidity * weights
@@ -59,6 +61,6 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
                 hindered = plate * curl_hindered(curl * (rest + found.moment / rigidity) ** 2)
                 lost[number] += (density * hindered).sum(axis=1)
     total = energies.sum(axis=0)
-    bent = total > _ROUNDING * total.max(initial=0.0)
+    bent = total > _ENERGY_RTOL * total.max(initial=0.0)
     share = np.where(bent, lost.sum(axis=0) / np.where(bent, total, 1.0), 0.0)
     return HinderedCurling(read_only(share), read_only(np.array(names)[lost.argmax(axis=0)], np.str_))

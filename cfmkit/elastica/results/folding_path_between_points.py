@@ -17,7 +17,12 @@ import numpy as np
 
 from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.results.between_points import FEWEST, LEAST, ROUNDS, STRAY
+from cfmkit.elastica.results.between_points import (
+    MAX_RELATIVE_STRAY,
+    MIN_PATH_POINTS,
+    MIN_STRAY_DISTANCE,
+    N_EXTREME_ROUNDS,
+)
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -76,7 +81,7 @@ class AlongTheWay:
         """Return where one of the states has extremes between points: of polynomials, with what is solved there."""
         points = np.arange(float(len(self.path)))
         ways, values = points, self._states_at_points[which]
-        for _ in range(ROUNDS):
+        for _ in range(N_EXTREME_ROUNDS):
             extremes = inner_extremes(np.interp(ways, points, self.arc), values)
             more = np.array(sorted({*np.interp(extremes, self.arc, points).tolist()} - {*ways.tolist()}))
             if not len(more):
@@ -136,7 +141,7 @@ class AlongTheWay:
             if spot is None or spot.unstable not in path.unstable[at : at + 2].tolist():
                 continue
             moved = _largest(path, spot.free - y[number])
-            if moved <= max(LEAST, STRAY * _largest(path, known_y[at + 1] - known_y[at])):
+            if moved <= max(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * _largest(path, known_y[at + 1] - known_y[at])):
                 y[number], drive[number], found[number] = spot.free, spot.way, True
         return path.with_states(near, y, drive, found)
 
@@ -187,4 +192,4 @@ def interpolate_folding_path(
     path: EquilibriumPath, observe: Callable[[EquilibriumPath], Observed]
 ) -> AlongTheWay | None:
     """Return a path at every place of its way; None of one that is too short, or misses its tolerance."""
-    return AlongTheWay(path, observe) if len(path) >= FEWEST and np.all(path.accurate) else None
+    return AlongTheWay(path, observe) if len(path) >= MIN_PATH_POINTS and np.all(path.accurate) else None

@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import with_places
-from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.results.path import largest_force
 from cfmkit.results import ROUND_OFF
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
 
-STEP = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Of the largest unknown along the path, to either side: the motion's difference is off by 1e-10."""
 
-ROUNDING = 30 * np.finfo(float).eps
+FORCE_ROUNDING = 30 * np.finfo(float).eps
 """Share of the stiffest element's force for a unit motion that rounding of places leaves, with room."""
 
 
@@ -44,7 +44,7 @@ def effort_error(path: EquilibriumPath, tolerance: float) -> float:
     """Return the numerical error of a path's effort [N or N m] under a drive by a motion.
 
     That is the estimated error of the forces, and what rounding makes of them: `ROUND_OFF` of the largest force in the
-    network, and `ROUNDING`.
+    network, and `FORCE_ROUNDING`.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def effort_error(path: EquilibriumPath, tolerance: float) -> float:
         That its accurate points reach, relative to the largest force [1].
     """
     scales = path.mesh.scales
-    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + ROUNDING * stiffest(path.mesh)
+    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + FORCE_ROUNDING * stiffest(path.mesh)
     return error * scales.moment / scales.drive
 
 
@@ -76,10 +76,10 @@ def largest_member_efforts(
     free, drive = _ways(here)
     ahead, behind = (
         here.with_states(np.arange(len(here)), here.free + step * free, here.at.drive + step * drive)
-        for step in (STEP, -STEP)
+        for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP)
     )
     with np.errstate(all="ignore"):
-        efforts = _works(here, free, drive) / ((motion(ahead) - motion(behind)) / (2 * STEP))
+        efforts = _works(here, free, drive) / ((motion(ahead) - motion(behind)) / (2 * DIFFERENCE_STEP))
     sizes = np.abs(efforts)
     return np.asarray(sizes.max(axis=0, initial=0.0, where=np.isfinite(sizes)))
 
@@ -110,6 +110,6 @@ def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatA
         own, _ = energy.element_gradients(with_places(mesh, state), state, at, 1.0)
         np.add.at(found[:, k], beam, (own * z[k][mesh.elements.unknowns]).sum(axis=1))
         for number, spring in enumerate(mesh.springs):
-            part = TERMS[type(spring.item)](mesh, spring, state, 1.0, at)
+            part = ENERGY_TERMS[type(spring.item)](mesh, spring, state, 1.0, at)
             found[len(names) + number, k] = part.gradient @ z[k][part.unknowns]
     return found * mesh.scales.moment

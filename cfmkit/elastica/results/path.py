@@ -16,7 +16,7 @@ from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.drive import Loading
@@ -35,7 +35,7 @@ N_PLACES = 17
 """Even places of every element at which states along a beam are handed out; neighbours share their ends."""
 
 
-TIED = 1e-9  # share by which stresses of two beams differ that are one but for rounding
+STRESS_RTOL = 1e-9  # share by which stresses of two beams differ that are one but for rounding
 
 
 class PathStatus(Enum):
@@ -388,7 +388,7 @@ def most_stressed(values: FloatArray, places: FloatArray) -> Any:
 
     Beams that meet have one stress there, but for rounding: it is that of the beam that begins.
     """
-    return np.where(values >= (1 - TIED) * values.max(axis=0), -places, -np.inf).argmax(axis=0)
+    return np.where(values >= (1 - STRESS_RTOL) * values.max(axis=0), -places, -np.inf).argmax(axis=0)
 
 
 def node_motion(at: Equilibria, node: str) -> Any:
@@ -438,7 +438,7 @@ def strain_energy(at: Equilibria) -> Any:
     density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
     total = (e.weight * density).sum(axis=(1, 2)) / 2
     for spring in at.mesh.springs:
-        term = TERMS[type(spring.item)]
+        term = ENERGY_TERMS[type(spring.item)]
         total = total + np.array(
             [term(at.mesh, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
         )

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.arrays import Several, read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.results.between_points import KNOWN, LEAST, ROUNDS, STRAY
+from cfmkit.elastica.results.between_points import MAX_RELATIVE_STRAY, MIN_STRAY_DISTANCE, N_EXTREME_ROUNDS, PLACE_RTOL
 from cfmkit.elastica.results.stress_between_points import (
     few_points,
     insert_knots,
@@ -49,7 +49,7 @@ class PathsOfDesigns:
     def solve_knots(self) -> None:
         """Let the extremes of all paths between their points be known: as each would solve for them by itself."""
         every = [(law.own_points, law.point_efforts) for law in self.laws]
-        for _ in range(ROUNDS):
+        for _ in range(N_EXTREME_ROUNDS):
             more = inner_extremes_of_rows(every)
             rows = np.flatnonzero([len(places) for places in more])
             if not len(rows):
@@ -107,7 +107,7 @@ class PathsOfDesigns:
         before, behind = (np.take_along_axis(drive, at, 1) for at in (left, left + 1))
         near = left + (wanted - before > behind - wanted)
         guess, efforts = self._guess(rows, wanted, last), self._efforts[every, near]
-        known = np.abs(wanted - np.take_along_axis(drive, near, 1)) <= KNOWN * (drive[:, -1:] - drive[:, :1])
+        known = np.abs(wanted - np.take_along_axis(drive, near, 1)) <= PLACE_RTOL * (drive[:, -1:] - drive[:, :1])
         guess[known] = self._unknowns[every, near][known]
         change = np.abs(self._unknowns[every, left + 1] - self._unknowns[every, left])[..., self._moves].max(axis=-1)
         found, solved = known.copy(), np.where(known, efforts, np.nan)
@@ -116,7 +116,11 @@ class PathsOfDesigns:
             own = equations(law.path.mesh)
             states = own.solve_each(guess[k, asked], wanted[k, asked])
             moved = np.abs(states.free - guess[k, asked])[:, self._moves].max(axis=-1)
-            good = states.converged & (states.unstable == 0) & (moved <= np.maximum(LEAST, STRAY * change[k, asked]))
+            good = (
+                states.converged
+                & (states.unstable == 0)
+                & (moved <= np.maximum(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * change[k, asked]))
+            )
             chosen = asked[good]
             guess[k, chosen], found[k, chosen] = states.free[good], True
             solved[k, chosen] = law.unit * own.effort_unit * states.effort[good]

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     Knots = tuple[FloatArray, FloatArray]  # places, increasing, and stresses of one beam
     Solve = Callable[[FloatArray], tuple[FloatArray, Any]]
 
-ROUNDS = 3
+N_EXTREME_ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
 
-NEARLY = 0.9
+CANDIDATE_SHARE = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
 N_FEW = 24  # points that are looked at first
-CLOSE = 0.95  # share of the largest stress at these from which on the largest of all may be near
-STENCIL = 4  # points on either side that a cubic, or the next one, may go through
+NEIGHBOUR_SHARE = 0.95  # share of the largest stress at these from which on the largest of all may be near
+STENCIL_REACH = 4  # points on either side that a cubic, or the next one, may go through
 
 
 def solve_extremes(t: FloatArray, rows: FloatArray, solve: Solve, bound: float = 0.0) -> tuple[Knots, ...]:
@@ -54,7 +54,7 @@ def solve_all_extremes(
     """Return the same of several curves; `solve` takes places of each of them, by chance none, in one call."""
     found = [[(t, row) for row in rows] for t, rows, _ in curves]
     largest = [rows.max(axis=0) for _, rows, _ in curves]
-    for _ in range(ROUNDS):
+    for _ in range(N_EXTREME_ROUNDS):
         stressed = [
             [own if own[1].max() >= bound else (own[0][:0], own[1][:0]) for own in knots]
             for knots, (_, _, bound) in zip(found, curves, strict=True)
@@ -103,8 +103,8 @@ def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: 
 
 def few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
     """Return the numbers of points of a path that are looked at first, in a window and next to it."""
-    first = max(int(np.searchsorted(x, low)) - STENCIL, 0)
-    last = min(int(np.searchsorted(x, high, side="right")) + STENCIL, len(x)) - 1
+    first = max(int(np.searchsorted(x, low)) - STENCIL_REACH, 0)
+    last = min(int(np.searchsorted(x, high, side="right")) + STENCIL_REACH, len(x)) - 1
     return np.append(np.arange(first, last, max(1, (last - first) // N_FEW)), last)
 
 
@@ -116,9 +116,9 @@ def near_largest(
     inside = (x[few] >= low) & (x[few] <= high)
     top = stresses[:, inside].max(initial=0.0)
     guess = values_at(x[few], stresses.T, x[first : last + 1]).max(axis=1)
-    near = first + np.flatnonzero(guess >= CLOSE * top)
+    near = first + np.flatnonzero(guess >= NEIGHBOUR_SHARE * top)
     wanted = np.zeros(len(x), dtype=bool)
-    for step in range(-STENCIL, STENCIL + 1):
+    for step in range(-STENCIL_REACH, STENCIL_REACH + 1):
         wanted[np.clip(near + step, first, last)] = True
     wanted[few] = False
     return np.flatnonzero(wanted)
@@ -139,7 +139,7 @@ def runs_of_points(
 ) -> list[tuple[FloatArray, FloatArray, float]]:
     """Return places and stresses (b, n) of neighbouring points between which the largest may be, and a bound to it."""
     inside = (x[points] >= window[0]) & (x[points] <= window[1])
-    bound = CLOSE * stresses[:, inside].max(initial=-np.inf)
+    bound = NEIGHBOUR_SHARE * stresses[:, inside].max(initial=-np.inf)
     parts = np.split(np.arange(len(points)), np.flatnonzero(np.diff(points) > 1) + 1)
     runs = [(x[points[own]], stresses[:, own], bound) for own in parts if len(own) > 3]
     return [run for run in runs if run[1].max() >= bound]
@@ -161,7 +161,7 @@ def solve_passes(knots: tuple[Knots, ...], t: FloatArray, solve: Solve, allowed:
     They are those of the last of some rounds only: knots that nearly coincide spoil a cubic.
     """
     found = list(knots)
-    for _ in range(ROUNDS):
+    for _ in range(N_EXTREME_ROUNDS):
         more = [_find_passes(own, allowed, t) for own in found]
         if not any(map(len, more)):
             break
@@ -173,7 +173,7 @@ def _keep_tops(knots: Knots, top: FloatArray, t: FloatArray, largest: FloatArray
     """Return those of the extremes of the stress of a beam that may be the largest of all."""
     own, values = knots
     beside = np.searchsorted(own, top)
-    return top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
+    return top[np.maximum(values[beside - 1], values[beside]) >= CANDIDATE_SHARE * np.interp(top, t, largest)]
 
 
 def _find_passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:

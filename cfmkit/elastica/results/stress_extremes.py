@@ -37,9 +37,9 @@ N_GRID = 49
 """Places of a grid on an element: the extreme lies between the neighbours of the highest one."""
 MAX_STEPS = 10  # of Newton's method, or halvings where it leaves the neighbours
 MAX_TOGETHER = 1_000_000  # numbers on the grids of some points: 8 MB
-ROUNDING = 4 * np.finfo(float).eps  # share by which a value is higher than another one
+STRESS_ROUNDING = 4 * np.finfo(float).eps  # share by which a value is higher than another one
 AT_END = 1e-14  # fraction of an element within which a place is its end
-TIED = 1e-9  # share by which one element's stress must be higher than that of the one before it
+STRESS_RTOL = 1e-9  # share by which one element's stress must be higher than that of the one before it
 
 
 class SideExtremes(NamedTuple):
@@ -113,7 +113,7 @@ def _highest(own: Sequence[Sequence[int]], parts: Sequence[tuple[Any, Any, Any]]
     arc, where = np.zeros(shape), np.zeros(shape)
     for k, numbers in enumerate(own):
         for number in range(len(numbers)):
-            better = value[end] > np.where(best[k] > 0, best[k] * (1 + TIED), best[k])
+            better = value[end] > np.where(best[k] > 0, best[k] * (1 + STRESS_RTOL), best[k])
             best[k], chosen[k] = np.where(better, value[end], best[k]), np.where(better, number, chosen[k])
             arc[k], where[k] = np.where(better, place[end], arc[k]), np.where(better, fraction[end], where[k])
             end += 1
@@ -166,11 +166,11 @@ def _top(series: FloatArray) -> tuple[FloatArray, FloatArray]:
             newton = x - slope / curvature
         follows = (curvature < 0) & (newton >= low) & (newton <= high)
         step = np.where(follows, newton, 0.5 * (low + high)) - x
-        if number == MAX_STEPS - 1 or (np.abs(slope * step) <= ROUNDING * np.abs(top)).all():
+        if number == MAX_STEPS - 1 or (np.abs(slope * step) <= STRESS_ROUNDING * np.abs(top)).all():
             break
         x = x + step
         polynomials = legendre.legvander(x, count - 1)
-    higher = value > top + ROUNDING * np.abs(top)
+    higher = value > top + STRESS_ROUNDING * np.abs(top)
     return np.where(higher, value, top), np.where(higher, x, place)
 
 

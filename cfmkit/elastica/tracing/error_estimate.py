@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 DEGREES_MORE = 4
 MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
-SAFETY = 1.5
-ROUNDING = 1e-13
+ERROR_SAFETY = 1.5
+ROUNDING_ERROR = 1e-13
 ROUNDED_PLACES = 4.0  # roundings of a place by which a nearly rigid network's effort is uncertain
-CRITICAL = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
+CRITICAL_STIFFNESS = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
 SAME_POINT = 1e-3  # motion by which a point may be improved
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
@@ -54,18 +54,18 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     known = solved.converged & (moved <= MAX_CHANGE)
     for row in np.flatnonzero(known & (solved.unstable != path.unstable[chosen])):
         at = PathEquilibrium(solved.free[row], float(drives[row]), solved.rate[row], int(solved.unstable[row]))
-        known[row] = abs(float(problem.modes(at, 1)[0][0])) < CRITICAL
+        known[row] = abs(float(problem.modes(at, 1)[0][0])) < CRITICAL_STIFFNESS
     fine = replace(path, at=Equilibria(finer, states, drives))
     efforts: Any = np.abs(fine.effort - path.effort[chosen])
     forces: Any = np.abs(fine.residual[:, :n_bodies] - some.residual[:, :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - own.z[chosen, :n_bodies]).max(axis=1)
     reach = float(np.abs(own.z[:, :n_bodies]).max())
-    load = max(largest_force(fine.at), NO_FORCE * reach, ROUNDING)
+    load = max(largest_force(fine.at), NO_FORCE * reach, ROUNDING_ERROR)
     size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * scales.moment / scales.drive)
     reach = max(reach, SMALL_MOTION)
     bearing = np.maximum(efforts / size, forces / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
     relative = np.maximum(bearing, moves / reach)
-    return np.where(known, SAFETY * relative + ROUNDING, np.inf)
+    return np.where(known, ERROR_SAFETY * relative + ROUNDING_ERROR, np.inf)
 
 
 def _rises(path: Path) -> FloatArray:

@@ -19,8 +19,14 @@ from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import apart
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.elastica.results.path import PathStatus
-from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, NEXT_CORRECTION, ROUNDING, SAFETY, pick_points
-from cfmkit.elastica.tracing.start import FREE, next_correction
+from cfmkit.elastica.tracing.error_estimate import (
+    DEGREES_MORE,
+    ERROR_SAFETY,
+    NEXT_CORRECTION,
+    ROUNDING_ERROR,
+    pick_points,
+)
+from cfmkit.elastica.tracing.start import FREE_LENGTH_KEYS, next_correction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +40,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.path import Path
 
 LOWEST_DEGREE = 4
-MARGIN = 4.0  # tolerances over the error of the network that was traced, at the degree of all
+ERROR_MARGIN = 4.0  # tolerances over the error of the network that was traced, at the degree of all
 
 
 def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> FloatArray | None:
@@ -90,7 +96,9 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
     arrays = path.mesh
     springs = [spring.item for spring in arrays.springs]
     rests = not (
-        path.network.loads or arrays.base.any() or any(getattr(s, name, None) for s in springs for name in FREE)
+        path.network.loads
+        or arrays.base.any()
+        or any(getattr(s, name, None) for s in springs for name in FREE_LENGTH_KEYS)
     )
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
     simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
@@ -117,7 +125,7 @@ def _follow(path: Path, networks: list[Network], control: Control) -> Any:
     size = np.abs(exact).max()
     degrees = range(LOWEST_DEGREE, highest)
     errors = ((k, np.abs(efforts_of(set_up_at(k, [origin]))[0][0] - exact).max()) for k in degrees)
-    degree = next((k for k, error in errors if MARGIN * error <= control.tolerance * size), highest)
+    degree = next((k for k, error in errors if ERROR_MARGIN * error <= control.tolerance * size), highest)
     few = np.sort(path.requested[pick_points(path, ())])
     efforts = np.full((len(pairs), len(points)), np.nan)
     left = np.arange(len(pairs))
@@ -129,7 +137,7 @@ def _follow(path: Path, networks: list[Network], control: Control) -> Any:
         z[..., mesh.free] = states
         guesses = embed(mesh, fine, z)[..., fine.free]
         finer = solve_designs(raise_designs(designs, fine), guesses, points[few], NEXT_CORRECTION)
-        error = SAFETY * np.abs(finer - coarse[:, few]).max(axis=1) + ROUNDING * size
+        error = ERROR_SAFETY * np.abs(finer - coarse[:, few]).max(axis=1) + ROUNDING_ERROR * size
         accurate = error <= control.tolerance * np.abs(coarse).max(axis=1)
         efforts[left[accurate]] = coarse[accurate]
         left, degree = left[~accurate], degree + DEGREES_MORE

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
     from cfmkit.numerics.continuation.path import PathEvent
 
-DEGREE = 14  # of the polynomials that the rotations are given as
-PLACES = 65  # of an element at which they and displacements are taken
+POLYNOMIAL_DEGREE = 14  # of the polynomials that the rotations are given as
+N_ELEMENT_PLACES = 65  # of an element at which they and displacements are taken
 NO_DRIVE = 1e-9  # share of the range below which the network buckles before the drive moves it
 
 
@@ -88,7 +88,7 @@ def _node_motion(problem: NetworkProblem, name: str, change: FloatArray) -> tupl
 def _rotations(problem: NetworkProblem, beam: str, mode: FloatArray) -> Chebyshev:
     """Return the rotations of a beam's sections in a mode, over the parameter of its shape [rad]."""
     mesh, places, values = problem.mesh, [], []
-    shares = (1 - np.cos(np.pi * np.arange(PLACES) / (PLACES - 1))) / 2
+    shares = (1 - np.cos(np.pi * np.arange(N_ELEMENT_PLACES) / (N_ELEMENT_PLACES - 1))) / 2
     shapes, _ = shape_functions(mesh.degree, shares)
     columns = energy.rotation_columns(mesh.degree)
     for number, name in enumerate(mesh.elements.beam):
@@ -96,7 +96,7 @@ def _rotations(problem: NetworkProblem, beam: str, mode: FloatArray) -> Chebyshe
             left, right = mesh.elements.cuts[number]
             places.append(left + (right - left) * shares)
             values.append(shapes @ mode[mesh.elements.unknowns[number, columns]])
-    return Chebyshev.fit(np.concatenate(places), np.concatenate(values), DEGREE, domain=[0.0, 1.0])
+    return Chebyshev.fit(np.concatenate(places), np.concatenate(values), POLYNOMIAL_DEGREE, domain=[0.0, 1.0])
 
 
 def _reach(network: Network, problem: NetworkProblem, mode: FloatArray) -> float:
@@ -111,8 +111,8 @@ def _reach(network: Network, problem: NetworkProblem, mode: FloatArray) -> float
         places, moved = [np.zeros(1, complex)], [np.zeros(1, complex)]
         breaks = np.real(fitted.course.breaks)
         for left, right in zip(breaks[:-1].tolist(), breaks[1:].tolist(), strict=True):
-            shares = (1 + np.polynomial.legendre.leggauss(PLACES)[0]) / 2
-            to_places = integrals(shares, np.linspace(0, 1, PLACES)) * (right - left)
+            shares = (1 + np.polynomial.legendre.leggauss(N_ELEMENT_PLACES)[0]) / 2
+            to_places = integrals(shares, np.linspace(0, 1, N_ELEMENT_PLACES)) * (right - left)
             t, inside = left + (right - left) * shares, 0.5 * (left + right)
             rate = np.real(fitted.speed(t, inside)) * np.exp(1j * np.real(fitted.angle(t, inside)))
             for rates, along in ((rate + 0.0 * t, places), (1j * turn(t) * rate, moved)):

@@ -11,7 +11,7 @@ from cfmkit.elastica.contact.changes import ContactChange
 from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.mechanics.similar_arrays import without_floor
+from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 FIRST_SHARE = 0.5  # of what is constant, in the first step
 LOOSEST_CORRECTION, CORRECTION_SHARE = 1e-10, 1e-6
 """Next correction at which a march accepts an equilibrium: at most, and as a share of the path's tolerance."""
-FREE = "free_length", "free_angle", "free_displacement"
+FREE_LENGTH_KEYS = "free_length", "free_angle", "free_displacement"
 FLOOR_SHARE = 0.01
 """Part of the flexibility along a straight beam that its floor may bear: where it bears less, it is taken away."""
 FLOOR_STRAIN = 1e-7  # of a beam that does not stretch, from which on the drive stretches it
@@ -117,7 +117,7 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
     The second of these says whether the share, not the drive, is the way.
     """
     springs = [spring.item for spring in mesh.springs]
-    tight = any(getattr(item, name, None) for item in springs for name in FREE)
+    tight = any(getattr(item, name, None) for item in springs for name in FREE_LENGTH_KEYS)
     if tight or mesh.elements.gap.any():
         yield "prestress", (_remove_loads, True)
     if any(not load.grows for load in mesh.loads) or mesh.elements.line[:, 0].any() or mesh.base.any():
@@ -171,13 +171,13 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     needless = elements[share < FLOOR_SHARE]
     if not needless.size:
         return problem, at
-    stiff = replace(problem, mesh=without_floor(mesh, needless))
+    stiff = replace(problem, mesh=make_inextensible(mesh, needless))
     if problem.remesh is not None:
         beams, remesh = {mesh.elements.beam[number] for number in needless.tolist()}, problem.remesh
 
         def remesh_stiff(flanks: tuple[FlankPlace, ...]) -> Discretisation:
             found = remesh(flanks)
-            return without_floor(found, [k for k, name in enumerate(found.elements.beam) if name in beams])
+            return make_inextensible(found, [k for k, name in enumerate(found.elements.beam) if name in beams])
 
         stiff = replace(stiff, remesh=remesh_stiff)
     return stiff, correct(stiff, at.x, at.drive) or at

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.element_cuts import TAUT
+from cfmkit.elastica.mechanics.element_cuts import TAUT_RATIO
 from cfmkit.elastica.results.path import Path, PathStatus
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
 MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: it locks
-WHOLE = 0.15  # share of a beam from which on a taut element is cut again
+RECUT_SHARE = 0.15  # share of a beam from which on a taut element is cut again
 
 
 def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
@@ -25,11 +25,11 @@ def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     if not len(path):
         return {}
     whole = _tautness(path)
-    if not whole.max() > TAUT:
+    if not whole.max() > TAUT_RATIO:
         return {}
     resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
-        if right - left > WHOLE and resolved[number] * (right - left) > TAUT:
+        if right - left > RECUT_SHARE and resolved[number] * (right - left) > TAUT_RATIO:
             found[beam] = max(found.get(beam, 0.0), float(resolved[number]))
     return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
 

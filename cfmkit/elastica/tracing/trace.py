@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 FIRST_STEP = 0.05  # share of the range, unless a requested value is nearer
-DEGREES = 5, 14  # with which a path is tried first, by its tolerance
+FIRST_DEGREES = 5, 14  # with which a path is tried first, by its tolerance
 DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
@@ -49,12 +49,12 @@ FEW_BEAMS = {1: 4, 2: 2, 3: 2, 4: 2, 5: 2}  # degrees more to begin with
 SLOWEST_FALL = 0.9  # of coefficients from one degree to the next that a forecast is made from
 MAX_RAISED_ERROR, MAX_RAISED_MOTION = 1e-2, 0.05
 """Error of a path, and motion of its points, up to which it is raised to a higher degree as it is."""
-NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
+NEAR_ERROR_FACTOR = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
 EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
 SAME_PLACE = 1e-9  # share of the range within which a point lies at a bifurcation
 SAME_END = 1e-3  # share of the range within which two paths end alike
-RIGID = "the drive cannot move the network from rest: it is rigid, or nothing holds the network"
+RIGID_MESSAGE = "the drive cannot move the network from rest: it is rigid, or nothing holds the network"
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     path, tolerance = attempt.path, control.tolerance
     if is_stretched(path.mesh, path.at.z):
         nothing = trace_on(network, drive, control, attempt.resolution, limit=0).path
-        return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID)
+        return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID_MESSAGE)
     if path.error <= tolerance or not len(path):
         return path
     accurate = (
@@ -149,7 +149,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
         finer = _finer(path)
         attempt = _with_error(attempt, finer)
         raised = resolution.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
-        if tolerance < attempt.path.error < NEARLY * tolerance and not raised:
+        if tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance and not raised:
             attempt = _with_error(attempt._replace(path=polish(path)), finer)
         path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
@@ -181,7 +181,7 @@ def _first_degree(network: Network, tolerance: float) -> int:
 
 
 def _plain_degree(tolerance: float) -> int:
-    lowest, highest = DEGREES
+    lowest, highest = FIRST_DEGREES
     return min(max(math.ceil(1 - math.log10(tolerance)), lowest), highest)
 
 
@@ -440,7 +440,7 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
     """Return the status of a path, and why it ended."""
     if start.at is None:
         if start.stopped is None:
-            return PathStatus.NO_START, RIGID
+            return PathStatus.NO_START, RIGID_MESSAGE
         what, stop = start.stopped
         jumps = stop.end is WhyStopped.JUMPS
         if stop.end is WhyStopped.BLOCKED:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.path import Path
 
-_CHUNK, _AHEAD = 256, 2  # networks set up at once; chunks for each process that are on their way
+_CHUNK_SIZE, _CHUNKS_PER_PROCESS = 256, 2  # networks set up at once; chunks for each process that are on their way
 
 
 @dataclass(frozen=True)
@@ -92,16 +92,16 @@ def trace_many(
         waiting: deque[Future[_Packed]] = deque()
         for chunk in _chunks(networks):
             waiting.append(pool.submit(_pack, chunk, one))
-            if len(waiting) > _AHEAD * workers:
+            if len(waiting) > _CHUNKS_PER_PROCESS * workers:
                 yield from waiting.popleft().result().outcomes()
         while waiting:
             yield from waiting.popleft().result().outcomes()
 
 
 def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[list[Network | Callable[[], Network]]]:
-    """Yield the networks in lists of at most `_CHUNK`."""
+    """Yield the networks in lists of at most `_CHUNK_SIZE`."""
     source = iter(networks)
-    while chunk := list(islice(source, _CHUNK)):
+    while chunk := list(islice(source, _CHUNK_SIZE)):
         yield chunk
 
 

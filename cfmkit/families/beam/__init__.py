@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search, when_called
-from cfmkit.families.beam.findings import FINDINGS
+from cfmkit.families.beam.findings import BEAM_FINDINGS
 from cfmkit.families.beam.network_from_spec import resolve
-from cfmkit.families.beam.scalar_results import DEFINITIONS
+from cfmkit.families.beam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.beam.spec import BeamSpec
-from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as SURFACE
+from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as SURFACE
 
 FAMILY = Family(
     name="beam",
@@ -19,7 +19,7 @@ FAMILY = Family(
     },
     design=when_called("cfmkit.families.beam.design:design"),
     search=Search(tables=("starts.csv",)),
-    values=DEFINITIONS | SURFACE,
+    values=SCALAR_DEFINITIONS | SURFACE,
     resolve=resolve,
     rows=when_called("cfmkit.families.beam.beams_in_rows:solve_rows"),
     errors="cfmkit.families.beam.redesign_variables_and_process_errors:errors",
@@ -46,7 +46,7 @@ FAMILY = Family(
         "frequency_free_min",
     ),
     template="cfmkit/families/beam/template.yaml",
-    findings=FINDINGS,
+    findings=BEAM_FINDINGS,
     bibliography="cfmkit/families/beam/references.bib",
     references=(
         "C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector "

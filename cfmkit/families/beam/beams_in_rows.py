@@ -17,9 +17,9 @@ from cfmkit.elastica.results.paths_of_designs import PathsOfDesigns
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.findings import rules_of
 from cfmkit.families.beam.model import kind_of, solve
-from cfmkit.families.beam.scalar_results import QUANTITIES, target_of
+from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, target_of
 from cfmkit.families.beam.solution import Solution
-from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as OF_SURFACES
+from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as OF_SURFACES
 from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
 from cfmkit.families.rows import ScalarQuantity, SeveralSolutions, SolvedRows, each_quantity, each_rule
 from cfmkit.metrics import split_name
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 ROWS_TOGETHER = 64
 """Mechanisms that are looked at together: their unknowns at 200 points take 20 MB."""
 
-COLUMNS = {name: each_quantity(quantity) for name, quantity in QUANTITIES.items()} | {
+ROW_COLUMNS = {name: each_quantity(quantity) for name, quantity in SCALAR_QUANTITIES.items()} | {
     split_name(name)[0]: ScalarQuantity[SeveralSolutions[Solution]](*about, lambda _: np.nan)
     for name, about in (OF_SURFACES | OF_CONTACTS).items()
 }
@@ -150,4 +150,7 @@ def solve_rows(specs: Sequence[BeamSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for members in alike.values():
             solved = BeamRows(tuple(members.values()))
             rules = [each_rule(rule) for rule in rules_of(solved.each[0])]
-            yield np.array(list(members)), SolvedRows(solved, COLUMNS, rules, np.ones(len(members), bool), traced=True)
+            yield (
+                np.array(list(members)),
+                SolvedRows(solved, ROW_COLUMNS, rules, np.ones(len(members), bool), traced=True),
+            )

@@ -31,7 +31,7 @@ Fault = tuple[tuple[str | int, ...], str]
 Mechanism = Any
 """The block `mechanism`, which imports this file."""
 FRICTION_COLUMNS = ("tangential", "state")
-OVERLAP = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
+MAX_OVERLAP_SHARE = 1e-9  # share of the mechanism's size by which a pad may lie in an obstacle at rest: rounding
 HELD_SUPPORTS = ("clamped", "pinned")  # supports of nodes that are held in place
 LONGEST_POLYLINE = 200  # corners
 
@@ -184,9 +184,9 @@ class PolylineObstacle(ObstacleBase):
         return polyline(self.points, self.fillet or 0.0, self.closed)
 
 
-_FROM: Any = {"from": (Angle, Field(description="direction from the middle to one end of the arc"))}
+_FROM_FIELD: Any = {"from": (Angle, Field(description="direction from the middle to one end of the arc"))}
 """No name in Python."""
-_BeginsAnywhere = create_model("_BeginsAnywhere", __base__=ObstacleBase, **_FROM)
+_BeginsAnywhere = create_model("_BeginsAnywhere", __base__=ObstacleBase, **_FROM_FIELD)
 
 
 class ArcObstacle(_BeginsAnywhere):
@@ -305,7 +305,7 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
             if radius == 0 and outline.smallest_bulge == 0:
                 yield place, f"a sharp corner needs a pad of {node!r} with a radius"
             inside = radius - float(outline.distance(mechanism.nodes[node].at).value)
-            if inside > OVERLAP * size and mechanism.closure != "chain":
+            if inside > MAX_OVERLAP_SHARE * size and mechanism.closure != "chain":
                 yield place, f"the pad of node {node!r} lies {format_short(inside, 'length')} inside it before any load"
     if not (mechanism.stops or mechanism.obstacles):
         return

@@ -16,7 +16,7 @@ from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.errors import InputError
-from cfmkit.families.beam.contact_spec import OVERLAP, column_names, friction_columns, pads_of, sides_of
+from cfmkit.families.beam.contact_spec import MAX_OVERLAP_SHARE, column_names, friction_columns, pads_of, sides_of
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 N_SIDE = 129  # places of every element at which the side of a beam is looked at
 N_MEAN = 17  # places of the rule for a mean between two corners
-PENETRATION = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
+MAX_PENETRATION_SHARE = 0.01  # share of a beam's thickness by which its side may lie in an obstacle beside a pad
 ROUNDING_OF_GAP = 1e-9  # mean beam lengths: a clamped end that lies on an obstacle stays there
 NEAR_GAP = 0.01  # share of the thinnest beam's thickness below which a gap that stays open is reported
 OUT_OF_REACH = 10.0  # largest motions of a pad from an obstacle, from which on it is reported
@@ -63,7 +63,7 @@ def refuse_sides_in_obstacles(assembly: Assembly) -> None:
     for contact in sides:
         least = SideGaps(mesh, contact, ()).find_least(rest[0], LoadStage(np.zeros(1)))
         depth = -least.gap * mesh.scales.length
-        if depth > OVERLAP * mesh.scales.length:
+        if depth > MAX_OVERLAP_SHARE * mesh.scales.length:
             place = float(np.ravel(mesh.fits[contact.beam].arc(least.parameter))[0])
             raise InputError(
                 f"mechanism.obstacles.{contact.name}: beam {contact.beam!r} lies {format_short(depth, 'length')} in"
@@ -233,7 +233,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 
 
 # -- findings ----------------------------------------------------------------------------------------------------------
-FINDINGS = OF_STOPS | {
+CONTACT_FINDINGS = OF_STOPS | {
     "friction_not_unique": "friction leaves several states at a change of contact: the first of them was taken",
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
@@ -351,7 +351,7 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
             found = states(path.network, path.take(keep).at, beam, np.linspace(0.0, 1.0, N_SIDE))
             places = np.stack([found.x, found.y], axis=-1)
             depth = 0.5 * thickest_of(own.section) - outline.distance(places).value
-            slack = PENETRATION * thickest_of(own.section)
+            slack = MAX_PENETRATION_SHARE * thickest_of(own.section)
             # an elastic obstacle yields at its pads, and the beam with them
             yields = max((float(-path.contact_gap(k).min()) for k, one in enumerate(path.network.contacts)
                           if isinstance(one, NodeOnObstacle) and one.name == name and one.node in pads),

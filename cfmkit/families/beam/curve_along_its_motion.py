@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
-BAND = 0.05
+RANGE_BAND = 0.05
 """Share of F_d by which the force may differ from it: the range begins at 0.95 F_d [Lan, sec. 2]."""
 
-ROUNDS = 4
+MAX_REFINEMENTS = 4
 """Of putting a place right; Lan's mechanism (`configs/beam_lan2010.yaml`) needs three."""
 
-SETTLED = 1e-11  # of the travel: a place that moves by less is known
+PLACE_RTOL = 1e-11  # of the travel: a place that moves by less is known
 
-BESIDE = 0.1 * np.arange(-2.0, 3.0)
+EXTREME_STENCIL = 0.1 * np.arange(-2.0, 3.0)
 """Where equilibria are solved for around an extreme, as shares of the way to the next point: wide enough that what the
 solver leaves does not move the place, close enough that a polynomial of degree four does not either."""
 
@@ -158,7 +158,7 @@ class AlongMotion:
         """Displacement at which the force first reaches 0.95 of that at the end [m]."""
         if not abs(self.nominal) > (self.solution.effort_error or 0.0):  # else 95 % of it are rounding
             return np.nan
-        place = self._refine(lambda x, force: crossing(x, force / self.nominal, 1 - BAND))
+        place = self._refine(lambda x, force: crossing(x, force / self.nominal, 1 - RANGE_BAND))
         return place if place is not None and place <= self.end and self.end > 0 else np.nan
 
     @cached_property
@@ -197,8 +197,8 @@ class AlongMotion:
         """Return a place that cubics tell, put right by the equilibrium solved there, if the model can do so."""
         x, force = self.knots
         place = find(x, force)
-        for _ in range(ROUNDS):
-            if self.corners is None or place is None or np.abs(x - place).min() <= SETTLED * (x[-1] - x[0]):
+        for _ in range(MAX_REFINEMENTS):
+            if self.corners is None or place is None or np.abs(x - place).min() <= PLACE_RTOL * (x[-1] - x[0]):
                 break
             at = int(np.searchsorted(x, place))
             x, force = np.insert(x, at, place), np.insert(force, at, self.effort_at(np.array([place])))
@@ -232,13 +232,15 @@ class AlongMotion:
             return found
         place, value = found
         clear = np.concatenate([self.motion[[0, -1]], self.corners])
-        step = min(float(np.abs(np.diff(self.motion)).max()), float(np.abs(clear - place).min()) / BESIDE[-1])
+        step = min(float(np.abs(np.diff(self.motion)).max()), float(np.abs(clear - place).min()) / EXTREME_STENCIL[-1])
         for _ in range(2):
-            powers = np.polynomial.polynomial.polyfit(BESIDE, self.effort_at(place + step * BESIDE), 4)
+            powers = np.polynomial.polynomial.polyfit(
+                EXTREME_STENCIL, self.effort_at(place + step * EXTREME_STENCIL), 4
+            )
             rates = np.polynomial.polynomial.polyder(powers)
             turns = np.roots(rates[::-1])
             real = turns.real[np.isreal(turns)]
-            if not len(real) or np.abs(real).min() > BESIDE[-1]:
+            if not len(real) or np.abs(real).min() > EXTREME_STENCIL[-1]:
                 return found
             at = float(real[np.abs(real).argmin()])
             place, value = place + step * at, float(np.polynomial.polynomial.polyval(at, powers))
@@ -249,7 +251,7 @@ class AlongMotion:
         return value if self.sense > 0 else 0.0 - value  # not -0
 
 
-def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float = BAND) -> float:
+def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float = RANGE_BAND) -> float:
     """Return the smallest c with (max - min) <= band max of the force on c ... end."""
     before = x < end
     values = np.append(force[before], value_at(x, force, end))
@@ -262,8 +264,8 @@ def find_strict_start(x: FloatArray, force: FloatArray, end: float, band: float 
     last = int(bad[-1])
     top, bottom = float(tops[last + 1]), float(bottoms[last + 1])
 
-    def inside(place: float) -> bool:
+    def is_inside_band(place: float) -> bool:
         here = value_at(x, force, place)
         return max(top, here) - min(bottom, here) <= band * max(top, here)
 
-    return bisect(inside, float(places[last]), float(places[last + 1]))
+    return bisect(is_inside_band, float(places[last]), float(places[last + 1]))

@@ -55,15 +55,15 @@ def design(spec: BeamSpec, run: Run) -> Design:
     return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale' or 'optimise'")
 
 
-EXPONENTS = {"width": 1.0, "thickness": 3.0, "size": -2.0}
+FORCE_EXPONENTS = {"width": 1.0, "thickness": 3.0, "size": -2.0}
 """How the force goes with what may be free, by Eq. 6."""
 
-CLOSE = 1e-9
-ROUNDS = 12
+FORCE_RTOL = 1e-9
+MAX_ROUNDS = 12
 """Of corrections, of which `configs/beam_rescaled.yaml` needs two; of travels, each a quarter longer: the last is 14.6
 times the first."""
 
-STEP = 1e-5
+TRAVEL_STEP = 1e-5
 """Travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]."""
 
 
@@ -80,7 +80,7 @@ def rescale(spec: BeamSpec, wanted: Rescale) -> Design:
     wanted = wanted.model_copy(update={"free": wanted.choose_dimension(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
     found = _validity(spec, wanted)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         before = changed
         if wanted.to_allowable_stress:
             ended, why = _to_allowable_stress(changed)
@@ -119,9 +119,9 @@ def _force(spec: BeamSpec) -> float | None:
 def _correct_value(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec, float | None]:
     """Return the specification whose free value gives the force wanted, and that force."""
     target = math.copysign(wanted.force or 0.0, force)
-    exponent = EXPONENTS[wanted.free]
-    for _ in range(ROUNDS):
-        if abs(force / target - 1) <= CLOSE:
+    exponent = FORCE_EXPONENTS[wanted.free]
+    for _ in range(MAX_ROUNDS):
+        if abs(force / target - 1) <= FORCE_RTOL:
             return spec, force
         if not force / target > 0:
             break
@@ -152,7 +152,7 @@ def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:
     spec = spec.model_copy(update={"mechanism": mechanism})
     for name, value in _sizes(mechanism).items():
         asked = getattr(wanted, name)
-        if asked is not None and abs(asked / value - 1) > CLOSE:
+        if asked is not None and abs(asked / value - 1) > FORCE_RTOL:
             spec = _scale(spec, name, asked / value)
     return spec
 
@@ -267,7 +267,7 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
     no force to scale either.
     """
     travel, more = spec.extent, ": state a longer 'analysis.travel'"
-    for number in range(ROUNDS + 1):
+    for number in range(MAX_ROUNDS + 1):
         try:
             solution = solve(_with_analysis(spec, travel=Place(travel), window=None))
         except InputError:
@@ -290,12 +290,12 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
 
 def _round_down(value: float) -> float:
     """Return a place rounded to a hundredth of a millimetre towards rest, as a short decimal."""
-    return math.copysign(round(math.floor(abs(value) / STEP + 1e-6) * STEP, 9), value)
+    return math.copysign(round(math.floor(abs(value) / TRAVEL_STEP + 1e-6) * TRAVEL_STEP, 9), value)
 
 
 def _round_up(value: float) -> float:
     """Return the same rounded away from rest."""
-    return math.copysign(round(math.ceil(abs(value) / STEP - 1e-6) * STEP, 9), value)
+    return math.copysign(round(math.ceil(abs(value) / TRAVEL_STEP - 1e-6) * TRAVEL_STEP, 9), value)
 
 
 def _set_window(spec: BeamSpec, start: float, end: float) -> BeamSpec:
@@ -315,10 +315,10 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
     predicted = force * _force_ratio(spec.mechanism, changed.mechanism)
     if wanted.force is not None:
         target = math.copysign(wanted.force, predicted)
-        changed = _scale(changed, wanted.free, (target / predicted) ** (1 / EXPONENTS[wanted.free]))
+        changed = _scale(changed, wanted.free, (target / predicted) ** (1 / FORCE_EXPONENTS[wanted.free]))
         predicted = target
     reached = _force(changed)
-    if reached is not None and abs(reached / predicted - 1) <= CLOSE:
+    if reached is not None and abs(reached / predicted - 1) <= FORCE_RTOL:
         return []
     reported = (
         "" if reached is None else f": by it alone the force would be off by {100 * (reached / predicted - 1):+.2g} %"
@@ -330,7 +330,7 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
 def _force_ratio(old: Mechanism, new: Mechanism) -> float:
     """Return the force of one mechanism over that of another by Eq. 6: E b h^3 / L_x^2."""
     before, after = _sizes(old), _sizes(new)
-    sizes = [(after[name] / before[name]) ** EXPONENTS[name] for name in ("width", "thickness", "size")]
+    sizes = [(after[name] / before[name]) ** FORCE_EXPONENTS[name] for name in ("width", "thickness", "size")]
     return float(_modulus(new) / _modulus(old) * math.prod(sizes))
 
 
@@ -359,7 +359,7 @@ def _report_changes(old: BeamSpec, new: BeamSpec) -> str:
     now = _sizes(new.mechanism)
     for name, before in _sizes(old.mechanism).items():
         after = now[name]
-        if abs(after / before - 1) > CLOSE:
+        if abs(after / before - 1) > FORCE_RTOL:
             changes.append(f"{name} {format_short(before, 'length')} -> {format_short(after, 'length')}")
     before, after = (_modulus(one.mechanism) for one in (old, new))
     if before != after:

@@ -25,29 +25,29 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.network_from_spec import Assembly
 
-PAD = 4.0
+PAD_DEPTH = 4.0
 """Depth of a pad behind the end of a beam, in thicknesses."""
 
-EYE, HOLE = 2.5, 1.2
+EYE_RADIUS, HOLE_RADIUS = 2.5, 1.2
 """Radii of the eye and of the hole at a pinned support, in thicknesses."""
 
-STANDS = 1e-4
+STANDING_DISTANCE = 1e-4
 """A beam that ends nearer to its node than this stands on it, in thicknesses, as places do that differ by rounding."""
 
-ON = 1e-6
+CONTINUATION_ANGLE = 1e-6
 """A beam that turns by less than this continues another one [rad]."""
 
-LEAST = 0.1
+MIN_PAD_SHARE = 0.1
 """Pads of which less than this share is behind all beams are none."""
 
-SQUARE = 0.1
+SQUARE_SINE = 0.1
 """Sine of the angle between a beam and a section at a bend below which the section is that across the beam."""
 
-OVER = 1.02
+SECTION_LENGTH_FACTOR = 1.02
 """Length of sections at bends, in what straight beams have there: edges of curved ones are a little off. Beyond the
 edge a section has no nodes."""
 
-_CORNERS = 64
+_N_CIRCLE_CORNERS = 64
 """A polygon with so many lies within its circle by at most 0.12 % of the radius."""
 
 
@@ -119,7 +119,7 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: fl
     solid = [block.shape for block in blocks]
     eyes = [end for node, ends in meeting_ends(assembly, halves).items() if _is_pinned(assembly, node) for end in ends]
     blocks += [
-        DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE * end.thickness, bulge))
+        DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE_RADIUS * end.thickness, bulge))
         for node, ends in meeting_ends(assembly, beams).items()
         if _is_pinned(assembly, node)
         for end in ends
@@ -128,8 +128,8 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: fl
         bars = bars_between_halves(assembly, beams, *axis)
         solid += [mirror_points(shape, *axis) for shape in solid] + list(bars.values())
         blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
-    pieces += [OutlinePiece.polygon(shape) for shape in solid] + [_round(end, EYE) for end in eyes]
-    return DrawnParts(pieces, [_round(end, HOLE) for end in eyes], blocks)
+    pieces += [OutlinePiece.polygon(shape) for shape in solid] + [_round(end, EYE_RADIUS) for end in eyes]
+    return DrawnParts(pieces, [_round(end, HOLE_RADIUS) for end in eyes], blocks)
 
 
 def _round(end: BeamEnd, size: float) -> OutlinePiece:
@@ -161,14 +161,14 @@ def _close_ends(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
     apart, as where two halves do not quite meet, are joined by the smallest convex piece.
     """
     away = [float(np.hypot(*(end.at - ends[0].at))) for end in ends]
-    if max(away) > STANDS * ends[0].thickness:
+    if max(away) > STANDING_DISTANCE * ends[0].thickness:
         near = [end.cap for end, apart in zip(ends, away, strict=True) if apart < end.thickness]
         yield from OutlinePiece.from_convex_hull(np.concatenate(near)) if len(near) > 1 else ()
         return
     ordered = sorted(ends, key=lambda end: end.angle % math.tau)
     for one, other in zip(ordered, [*ordered[1:], ordered[0]], strict=True):
         gap = (other.angle - one.angle) % math.tau
-        if math.pi + ON < gap < math.tau - ON:
+        if math.pi + CONTINUATION_ANGLE < gap < math.tau - CONTINUATION_ANGLE:
             yield OutlinePiece.polygon(np.array([one.at, one.cap[0], other.cap[1]]))
 
 
@@ -180,15 +180,15 @@ def _blocks(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Iterator[D
             yield DrawnBlock(f"the pad of {end.beam} at {node}", (node,), pad)
         place = np.array([network.nodes[node].x, network.nodes[node].y])
         for end in own:
-            breadth = PAD * end.thickness
-            if np.hypot(*(end.at - place)) > STANDS * breadth:
+            breadth = PAD_DEPTH * end.thickness
+            if np.hypot(*(end.at - place)) > STANDING_DISTANCE * breadth:
                 arm = _bar(place, end.at, breadth, own)
                 yield DrawnBlock(f"the arm of {end.beam} at {node}", (node,), arm)
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
     for link in network.links:
         a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
         if np.hypot(*(b - a)) > 0:
-            bar = _bar(a, b, PAD * thick, [*ends.get(link.master, []), *ends.get(link.node, [])])
+            bar = _bar(a, b, PAD_DEPTH * thick, [*ends.get(link.master, []), *ends.get(link.node, [])])
             yield DrawnBlock(f"the bar from {link.master} to {link.node}", (link.master, link.node), bar)
 
 
@@ -231,7 +231,7 @@ def mitre_direction(ends: Sequence[BeamEnd]) -> float | None:
     if len(ends) != 2:
         return None
     along = ends[0].along - ends[1].along
-    return math.atan2(along[0], -along[1]) if np.hypot(*along) > ON else None
+    return math.atan2(along[0], -along[1]) if np.hypot(*along) > CONTINUATION_ANGLE else None
 
 
 def section_at_bend(ends: Sequence[BeamEnd], direction: float, fillet: float) -> FloatArray:
@@ -251,10 +251,10 @@ def section_at_bend(ends: Sequence[BeamEnd], direction: float, fillet: float) ->
     for end in ends:
         lean = float(line @ end.along)
         square = math.sqrt(max(1.0 - lean**2, 0.0))
-        if square < SQUARE:
+        if square < SQUARE_SINE:
             return ends[0].cap
         inside, outside = (0.5 * end.thickness + fillet) / square - fillet, 0.5 * end.thickness * square
-        over = 1.0 if square > 1.0 - ON else OVER
+        over = 1.0 if square > 1.0 - CONTINUATION_ANGLE else SECTION_LENGTH_FACTOR
         for side, sign in enumerate((1.0, -1.0)):
             reach[side] = max(reach[side], over * (inside if sign * lean > 0.0 else outside))
     return np.array([ends[0].at + reach[0] * line, ends[0].at - reach[1] * line])
@@ -263,7 +263,7 @@ def section_at_bend(ends: Sequence[BeamEnd], direction: float, fillet: float) ->
 def disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
     """Return a polygon whose sides are no farther than `bulge` [m] within the circle."""
     step = 2.0 * math.acos(max(1.0 - bulge / radius, 0.0))
-    turn = np.linspace(0.0, 2 * math.pi, max(_CORNERS, math.ceil(2 * math.pi / step)), endpoint=False)
+    turn = np.linspace(0.0, 2 * math.pi, max(_N_CIRCLE_CORNERS, math.ceil(2 * math.pi / step)), endpoint=False)
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
@@ -274,7 +274,7 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
     """
     part, moving = assembly.spec.mechanism.part, moves(assembly, node)
     for end in ends:
-        depth, half = PAD * end.thickness, 0.5 * PAD * end.thickness
+        depth, half = PAD_DEPTH * end.thickness, 0.5 * PAD_DEPTH * end.thickness
         if part is not None and part.pad is not None:
             depth, half = part.pad[0], 0.5 * part.pad[1]
         if part is not None and part.frame is not None:
@@ -283,14 +283,14 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
         pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
         for other in ends:
             pad = _part_behind_end(pad, other) if other is not end else pad
-        if len(pad) > 2 and abs(signed_area(pad)) > LEAST * depth * half:
+        if len(pad) > 2 and abs(signed_area(pad)) > MIN_PAD_SHARE * depth * half:
             yield pad, end
 
 
 def _part_behind_end(shape: FloatArray, end: BeamEnd) -> FloatArray:
     """Return what of a convex polygon (n, 2) lies behind the end of a beam [m]; nothing may be left."""
     ahead = (shape - end.at) @ end.along
-    ahead = np.where(np.abs(ahead) <= STANDS * end.thickness, 0.0, ahead)
+    ahead = np.where(np.abs(ahead) <= STANDING_DISTANCE * end.thickness, 0.0, ahead)
     found = []
     for a, b, one, other in zip(shape, np.roll(shape, -1, axis=0), ahead, np.roll(ahead, -1), strict=True):
         if one <= 0:
@@ -309,7 +309,7 @@ def _bar(a: FloatArray, b: FloatArray, width: float, ends: Sequence[BeamEnd] = (
     side, over = 0.5 * width * np.array([-along[1], along[0]]), 0.25 * width * along
     bar = np.array([a - over - side, b + over - side, b + over + side, a - over + side])
     for end in ends:
-        if max(float((place - end.at) @ end.along) for place in (a, b)) <= STANDS * width:
+        if max(float((place - end.at) @ end.along) for place in (a, b)) <= STANDING_DISTANCE * width:
             bar = _part_behind_end(bar, end)
     return bar
 
@@ -330,14 +330,14 @@ def bars_between_halves(
         other = mirror_points(middle[None], at, direction)[0]
         if np.hypot(*(other - middle)) > 0:
             images = ends_at(assembly, halves, f"{node}'")
-            found[node] = _bar(middle, other, _shuttle(assembly) or PAD * thick, [*ends, *images])
+            found[node] = _bar(middle, other, _shuttle(assembly) or PAD_DEPTH * thick, [*ends, *images])
     return found
 
 
 def _far_side(pad: FloatArray, end: BeamEnd) -> FloatArray:
     """Return the middle of the side of a pad that is farthest behind its beam [m]."""
     ahead = (pad - end.at) @ end.along
-    middle: FloatArray = pad[ahead <= ahead.min() + STANDS * end.thickness].mean(axis=0)
+    middle: FloatArray = pad[ahead <= ahead.min() + STANDING_DISTANCE * end.thickness].mean(axis=0)
     return middle
 
 

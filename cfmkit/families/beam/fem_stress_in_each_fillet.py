@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.families.beam.drawn_pieces import both_halves
 from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
-from cfmkit.families.beam.part import SPARSE, strips_of
+from cfmkit.families.beam.part import POINT_TOLERANCE_FACTOR, strips_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.solid.meshed_part import MeshSolution
 
-EXACT = 1e-3
+EDGE_TOLERANCE = 1e-3
 """Lines between points of a beam are no farther from its edges than this, in thicknesses of the thinnest one."""
 
 
@@ -54,8 +54,8 @@ def _described_half(assembly: Assembly, points: FloatArray) -> FloatArray:
 def _name_polygons(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
     """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
     network, axis = assembly.network, mirror_axis(assembly)
-    exact = EXACT * min(thinnest_of(beam.section) for beam in network.beams.values())
-    halves = both_halves(assembly, strips_of(assembly, exact / SPARSE))
+    exact = EDGE_TOLERANCE * min(thinnest_of(beam.section) for beam in network.beams.values())
+    halves = both_halves(assembly, strips_of(assembly, exact / POINT_TOLERANCE_FACTOR))
     beams = {name: [polygon for strip in found for polygon in strip.polygons] for name, found in halves.items()}
     nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
     if axis is not None:

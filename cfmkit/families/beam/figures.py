@@ -13,7 +13,7 @@ from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.beam.network_from_spec import mirror_axis
-from cfmkit.families.beam.part import COARSE, bodies, made_strips, regions
+from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
 from cfmkit.families.beam.strips_and_gaps import mirror_points, strips
 from cfmkit.families.beam.tip_on_uneven_surface import ride
@@ -28,7 +28,17 @@ from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.rounding_noise import vanishing
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import stress_map_figure, stress_views
-from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import (
+    LINE_BLUE,
+    LINE_COLOURS,
+    LINE_VERMILLION,
+    TEXT_GREY,
+    TEXT_INK,
+    TROUBLE_RED,
+    apply_style,
+    axes_mm,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -44,7 +54,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-POSES = 5
+N_DRAWN_POSES = 5
 KEY_MM = 5.0
 """Room for the key of the poses above the axes [mm]."""
 
@@ -54,10 +64,10 @@ MOST_BEAMS = 6
 MOST_MODES = 4
 """So many modes have lines: held and free they are twice as many."""
 
-WIDE = 30.0
+MAX_LINEAR_FREQUENCY_RATIO = 30.0
 """Frequencies that differ by more than this factor stand on a logarithmic axis."""
 
-SAME = 1e-4
+LINE_RTOL = 1e-4
 """Lines closer than this share of their size are one."""
 
 
@@ -110,7 +120,7 @@ def stress_map(result: Result) -> Figure:
 def shapes(result: Result) -> Figure:
     """Return the mechanism to scale: as cut, and bent at several places of the travel."""
     solution: Solution = result.state
-    poses = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))[1:]
+    poses = np.unique(np.linspace(0, len(solution.keep) - 1, N_DRAWN_POSES).astype(int))[1:]
     shown, made = bodies(solution, poses, centre_line=centre_line), made_strips(solution.assembly)
     drawn = {int(pose): [body.core_at(k) for body in shown] for k, pose in enumerate(poses)}
     springs = _both(solution, spring_lines(solution.path))
@@ -124,13 +134,13 @@ def shapes(result: Result) -> Figure:
     ax = axes_mm(figure, room)
     parts.bodies(ax, made, 0, {})
     for number, line in enumerate(_both(solution, rigid_parts(solution.path, None))):
-        parts.edge(ax, line, f"rigid-{number}", color=GREY, linewidth=2.4, zorder=1.3, solid_capstyle="round")
+        parts.edge(ax, line, f"rigid-{number}", color=TEXT_GREY, linewidth=2.4, zorder=1.3, solid_capstyle="round")
     for number, line in enumerate(springs):
         ends = [(float(x), float(y)) for x, y in line]
         parts.spring(ax, ends[0], ends[1], 0.02 * max(width, height), f"spring-{number}")
     peak = _poses(solution, ax, drawn)
     motion = f"{result.curve.motion_name}:"
-    color_key(ax, [(motion, INK), *_key(solution, list(drawn))])
+    color_key(ax, [(motion, TEXT_INK), *_key(solution, list(drawn))])
     _supports(solution, ax)
     _contacts(solution, ax, box, list(drawn))
     parts.to_scale(ax, box)
@@ -173,8 +183,10 @@ def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     found = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(found, axis=0).T))])
     x, y = (float(np.interp(share * way[-1], way, found[:, k])) for k in (0, 1))
-    ax.plot(*parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE, zorder=5, gid="peak")
-    return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE)
+    ax.plot(
+        *parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE_RED, zorder=5, gid="peak"
+    )
+    return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE_RED)
 
 
 def _names(solution: Solution) -> list[Label]:
@@ -182,7 +194,7 @@ def _names(solution: Solution) -> list[Label]:
     path, found = solution.path, []
     for name in list(path.network.beams)[: 2 * MOST_BEAMS]:
         points = np.concatenate([strip.points for strip in strips(path.network, path.fits, name)])
-        found.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), INK))
+        found.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), TEXT_INK))
     return found
 
 
@@ -203,12 +215,13 @@ def _supports(solution: Solution, ax: Axes) -> None:
         support = node.support
         if not (support.along or support.across or support.rotation) and name != solution.assembly.driven:
             continue
-        color = VERMILLION if name == solution.assembly.driven else INK
+        color = LINE_VERMILLION if name == solution.assembly.driven else TEXT_INK
         here = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
         for at in [here] if axis is None else [here, mirror_points(here, *axis)]:
             ax.plot(
                 *parts.mm(at[0]), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
-                markerfacecolor=color if support.along or color != INK else "white", linestyle="", gid=f"at-{name}",
+                markerfacecolor=color if support.along or color != TEXT_INK else "white", linestyle="",
+                gid=f"at-{name}",
             )  # fmt: skip
 
 
@@ -218,7 +231,7 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
     outlines = {contact.name: contact.outline for contact in path.network.contacts if not isinstance(contact, Stop)}
     for name, outline in outlines.items():
         for number, line in enumerate(_both(solution, outline.lines(2 * size))):
-            parts.edge(ax, line, f"obstacle-{name}-{number}", color=INK, linewidth=1.8, zorder=1.6)
+            parts.edge(ax, line, f"obstacle-{name}-{number}", color=TEXT_INK, linewidth=1.8, zorder=1.6)
     for number, contact in enumerate(path.network.contacts):
         if isinstance(contact, BeamOnObstacle):
             _touching_side(solution, ax, number, poses)
@@ -229,7 +242,7 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
             at = np.array([float(np.real(node.x)), float(np.real(node.y))]) + contact.gap * along
             bar = 0.03 * size * np.array([[-along[1], along[0]], [along[1], -along[0]]])
             for image, line in enumerate(_both(solution, [at + bar])):
-                parts.edge(ax, line, f"stop-{contact.name}-{number}-{image}", color=INK, linewidth=2.6, zorder=1.6)
+                parts.edge(ax, line, f"stop-{contact.name}-{number}-{image}", color=TEXT_INK, linewidth=2.6, zorder=1.6)
         for color, pose in zip(_colors(len(poses)), poses, strict=True):
             point = int(solution.keep[pose])
             if contact.turns or not path.contact_force(number)[point] > 0:
@@ -307,14 +320,19 @@ def _series(values: dict[str, FloatArray]) -> list[Series]:
         lines[same or name] = (names, values[name])
     chosen = sorted(lines, key=list(values).index)
     return [
-        Series(lines[name][1], lines[name][0], LINES[number % len(LINES)], prefer=0.25 + 0.5 * number / len(chosen))
+        Series(
+            lines[name][1],
+            lines[name][0],
+            LINE_COLOURS[number % len(LINE_COLOURS)],
+            prefer=0.25 + 0.5 * number / len(chosen),
+        )
         for number, name in enumerate(chosen)
     ]
 
 
 def _alike(one: FloatArray, other: FloatArray) -> bool:
     largest = float(np.nanmax(np.abs(one)))
-    return bool(np.nanmax(np.abs(one - other)) <= SAME * largest)
+    return bool(np.nanmax(np.abs(one - other)) <= LINE_RTOL * largest)
 
 
 def stress(result: Result) -> Figure:
@@ -342,11 +360,13 @@ def frequencies(result: Result) -> Figure:
             values = both[name][:, number]
             if np.isfinite(values).any():
                 prefer = (0.3 if dashed else 0.7) - 0.1 * (number % 2)
-                series.append(Series(values, f"{number + 1} {name}", LINES[number % len(LINES)], dashed, prefer))
+                series.append(
+                    Series(values, f"{number + 1} {name}", LINE_COLOURS[number % len(LINE_COLOURS)], dashed, prefer)
+                )
     most = f"; the lowest {MOST_MODES}" if solution.spec.analysis.modes > MOST_MODES else ""
     heading = Heading.from_result(result, f"natural frequencies about each pose, drive held and free{most}")
     values = np.concatenate([one.values[np.isfinite(one.values)] for one in series] or [np.ones(1)])
-    wide = bool(values.min() > 0 and values.max() > WIDE * values.min())
+    wide = bool(values.min() > 0 and values.max() > MAX_LINEAR_FREQUENCY_RATIO * values.min())
     scale = Scale("frequency", "frequency", zero=not wide, log=wide)
     return diagram_figure(heading, [Diagram(solution.motion, _motion(result), scale, series)])
 
@@ -362,8 +382,14 @@ def surface(result: Result) -> Figure:
     if low is not None and high is not None:
         limits += [Limit(value, value_text(value, "force")) for value in (low, high)]
     diagrams = [
-        Diagram(found.place, way, Scale("height", "length"), [Series(found.height, "surface", GREY)]),
-        Diagram(found.place, way, Scale("tip force", "force", zero=False), [Series(found.force, "", LINES[0])], limits),
+        Diagram(found.place, way, Scale("height", "length"), [Series(found.height, "surface", TEXT_GREY)]),
+        Diagram(
+            found.place,
+            way,
+            Scale("tip force", "force", zero=False),
+            [Series(found.force, "", LINE_COLOURS[0])],
+            limits,
+        ),
     ]
     return diagram_figure(Heading.from_result(result, "contact force along the surface"), diagrams)
 
@@ -375,27 +401,27 @@ def moving(result: Result) -> Moving | None:
     solution: Solution = result.state
     points = choose_poses(len(solution.keep))
     made = made_strips(solution.assembly)
-    shown = bodies(solution, points, regions(solution.spec, COARSE), centre_line)
+    shown = bodies(solution, points, regions(solution.spec, BOX_TOLERANCE), centre_line)
     box = _box([*made, *shown])
 
     def draw(ax: Axes, number: int) -> None:
         parts.bodies(ax, made, 0, {})
-        parts.bodies(ax, shown, number, {"beam": BLUE})
+        parts.bodies(ax, shown, number, {"beam": LINE_BLUE})
         for line in _both(solution, rigid_parts(solution.path, int(solution.keep[points[number]]))):
-            parts.edge(ax, line, "rigid", color=GREY, linewidth=2.4, zorder=2.4, solid_capstyle="round")
+            parts.edge(ax, line, "rigid", color=TEXT_GREY, linewidth=2.4, zorder=2.4, solid_capstyle="round")
         _supports(solution, ax)
         parts.to_scale(ax, box)
 
     return Moving(solution.motion[points], box, draw)
 
 
-_PLACES = 65  # of an element: more than a picture shows
-_NEAR = 1e-9  # of the size: parts shorter than this are not there
+_N_ELEMENT_PLACES = 65  # of an element: more than a picture shows
+_LENGTH_RTOL = 1e-9  # of the size: parts shorter than this are not there
 
 
 def centre_line(path: Path, beam: str, point: int) -> FloatArray:
     """Return the centre line of a beam at a point of the path, (n, 2) [m]."""
-    found = states(path.network, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _PLACES))
+    found = states(path.network, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _N_ELEMENT_PLACES))
     line = np.stack([found.x[0], found.y[0]], axis=-1)
     return np.asarray(line[np.append(True, np.diff(found.place) > 0)])
 
@@ -410,7 +436,7 @@ def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:
             angle = 0.0 if point is None else float(path.motion(node)[point, 2])
             turned = complex(*map(float, np.real(arm))) * np.exp(1j * angle)
             found.append(np.array([at, at + np.array([turned.real, turned.imag])]))
-    return [line for line in found if np.hypot(*(line[1] - line[0])) > _NEAR * path.mesh.scales.length]
+    return [line for line in found if np.hypot(*(line[1] - line[0])) > _LENGTH_RTOL * path.mesh.scales.length]
 
 
 def spring_lines(path: Path) -> list[FloatArray]:

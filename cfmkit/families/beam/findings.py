@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
-from cfmkit.families.beam.contacts import FINDINGS as ON_CONTACTS
+from cfmkit.families.beam.contacts import CONTACT_FINDINGS as ON_CONTACTS
 from cfmkit.families.beam.contacts import change_sentences, contact_sentences
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-FINDINGS = {
+BEAM_FINDINGS = {
     "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
     "closure_prestress": "beams are forced into place between rounded nodes: the mechanism is prestressed at rest",
     "self_contact": "the part as a solid touches itself: the curve ends there",
@@ -69,8 +69,8 @@ FINDINGS = {
     **ON_CONTACTS,
 }
 
-finding = finder(FINDINGS)
-"""Return a finding of this family; the name must be one that `FINDINGS` explains."""
+finding = finder(BEAM_FINDINGS)
+"""Return a finding of this family; the name must be one that `BEAM_FINDINGS` explains."""
 
 
 def percent(share: float) -> str:
@@ -84,10 +84,10 @@ def percent(share: float) -> str:
     return format_short(share, "ratio", 3)
 
 
-NEGLIGIBLE = 1e-9
+LENGTH_RTOL = 1e-9
 """Share of a length: gaps, movements and errors of a thickness below it are rounding."""
 
-THICK = 10.0
+SLENDERNESS_LIMIT = 10.0
 """Length over thickness at which shear makes a beam between two guided ends 3 % softer, 2.6/(5/6) (t/l)^2."""
 
 
@@ -110,7 +110,7 @@ def _early_ending(solution: Solution) -> Sentence:
 # --- closure --------------------------------------------------------------------------------------------------------
 
 
-def _moved(solution: Solution) -> dict[str, float]:
+def _find_moved_nodes(solution: Solution) -> dict[str, float]:
     """Return the nodes that the closure "chain" moved, each with how far [m]."""
     if solution.spec.mechanism.closure != "chain":
         return {}
@@ -119,16 +119,16 @@ def _moved(solution: Solution) -> dict[str, float]:
         name: float(np.hypot(*(np.real([network.nodes[name].x, network.nodes[name].y]) - node.at)))
         for name, node in nodes.items()
     }
-    return {name: way for name, way in ways.items() if way > NEGLIGIBLE * solution.path.mesh.scales.length}
+    return {name: way for name, way in ways.items() if way > LENGTH_RTOL * solution.path.mesh.scales.length}
 
 
 def _moved_guides(solution: Solution) -> list[str]:
     nodes = solution.spec.mechanism.nodes
-    return [name for name in _moved(solution) if nodes[name].support in ("guided", "roller")]
+    return [name for name in _find_moved_nodes(solution) if nodes[name].support in ("guided", "roller")]
 
 
 def _moved_nodes(solution: Solution) -> Sentence:
-    reported = (f"{name} by {format_short(way, 'length')}" for name, way in _moved(solution).items())
+    reported = (f"{name} by {format_short(way, 'length')}" for name, way in _find_moved_nodes(solution).items())
     return (f"nodes were moved to where the beams end: {', '.join(reported)}",)
 
 
@@ -140,7 +140,7 @@ def _misfits(solution: Solution) -> dict[str, Fit]:
         for name, one in solution.path.fits.items()
         if name in solution.spec.mechanism.beams
         and getattr(beams[name].shape, "length", None)
-        and one.gap > NEGLIGIBLE * float(np.real(one.length))
+        and one.gap > LENGTH_RTOL * float(np.real(one.length))
     }
 
 
@@ -307,12 +307,13 @@ def _thick_beam(name: str) -> FindingRule[Solution]:
 
     def is_short(solution: Solution) -> bool:
         length, thickness = sizes(solution)
-        return length < THICK * thickness
+        return length < SLENDERNESS_LIMIT * thickness
 
     def sentence(solution: Solution) -> Sentence:
         length, thickness = (format_short(size, "length") for size in sizes(solution))
         return (
-            f"beam {name} is {length} long and {thickness} thick: below {THICK:g} times the thickness beam theory is "
+            f"beam {name} is {length} long and {thickness} thick: below {SLENDERNESS_LIMIT:g} times the "
+            f"thickness beam theory is "
             "inaccurate",
         )
 
@@ -389,14 +390,14 @@ def _thin_beam(name: str) -> FindingRule[Solution]:
         thin, made = (format_short(size, "length") for size in (thickness(solution), least(solution)))
         return (f"beam {name} is {thin} thick: less than can be made ({made})",)
 
-    return FindingRule("feature_small", lambda one: thickness(one) < least(one) * (1 - NEGLIGIBLE), sentence)
+    return FindingRule("feature_small", lambda one: thickness(one) < least(one) * (1 - LENGTH_RTOL), sentence)
 
 
 # --- table ----------------------------------------------------------------------------------------------------------
 
-RULES: tuple[FindingRule[Solution], ...] = (
+FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("ends_early", _ends_early, _early_ending),
-    FindingRule("closure_adjusted", lambda solution: bool(_moved(solution)), _moved_nodes),
+    FindingRule("closure_adjusted", lambda solution: bool(_find_moved_nodes(solution)), _moved_nodes),
     FindingRule(
         "closure_adjusted",
         lambda solution: bool(_moved_guides(solution)),
@@ -451,7 +452,7 @@ LAST_RULES: tuple[FindingRule[Solution], ...] = (
 def rules_of(solution: Solution) -> tuple[FindingRule[Solution], ...]:
     """Return everything that may be wrong with a solved mechanism: of its beams, too."""
     beams = solution.path.network.beams
-    return (*RULES, *map(_thick_beam, beams), *LAST_RULES, *map(_thin_beam, beams))
+    return (*FINDING_RULES, *map(_thick_beam, beams), *LAST_RULES, *map(_thin_beam, beams))
 
 
 def findings_of(solution: Solution) -> Iterator[Finding]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
-_SMOOTH = re.compile(
+_SMOOTH_KEYS = re.compile(
     r"mechanism\.(nodes\.[^.]+\.at\.[01]"
     r"|(beams\.[^.]+\.)?(thickness|width|material\.(youngs_modulus|poisson_ratio))"
     r"|beams\.[^.]+\.((start|end)_offset\.[01]|shape\.(coefficients\.\d+|sweep|rise))"
@@ -75,7 +75,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     copies = spec.mechanism.copies
     if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
         return None
-    known = [path for path in paths if _SMOOTH.fullmatch(path) and isinstance(spec.get_value(path), float)]
+    known = [path for path in paths if _SMOOTH_KEYS.fullmatch(path) and isinstance(spec.get_value(path), float)]
     found = _follow_path(spec, places)
     if found is None or not known:
         return None

@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
     from cfmkit.families.beam.solution import Solution
 
-ROUNDS = 4
+N_EXTREME_ROUNDS = 4
 """Extremes are solved for, and looked for again with what was found: the last moves them by less than 1e-9."""
 
-NEARLY, RISE = 0.05, 1e-10
+CANDIDATE_SHARE, MIN_RISE_SHARE = 0.05, 1e-10
 """Shares of a row's range: how much too low the first cubic may be, and what a later one is to add to count."""
 
-FAR = 1e6
+MAX_MEDIAN_RATIO = 1e6
 """Values so many times as large as the middle one are in no cubic: a straight beam is nearly rigid lengthwise."""
 
-SAME = 1e-12
+PLACE_RTOL = 1e-12
 """Share of the largest place within which two places are one."""
 
-SLACK = 1e-9
+WINDOW_SLACK = 1e-9
 """Share of the range of motion by which the ends of a window, where they were looked for, may be beside it."""
 
 
@@ -65,8 +65,8 @@ def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: t
     else:
         return _top(rows, points.accurate & _find_in_window(reached, window))
     top = None
-    for number in range(ROUNDS):
-        wanted = wanted[np.abs(wanted[:, None] - x).min(axis=1) > SAME * np.abs(x).max()]
+    for number in range(N_EXTREME_ROUNDS):
+        wanted = wanted[np.abs(wanted[:, None] - x).min(axis=1) > PLACE_RTOL * np.abs(x).max()]
         if len(wanted):
             there = ask(wanted)
             known = np.flatnonzero(there.accurate)
@@ -78,7 +78,10 @@ def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: t
         if top is None:
             break
         # what was missed by little is looked at once; then only what is higher is
-        bounds = [top - (NEARLY if number == 0 else -RISE) * float(np.ptp(row[np.isfinite(row)])) for row in rows]
+        bounds = [
+            top - (CANDIDATE_SHARE if number == 0 else -MIN_RISE_SHARE) * float(np.ptp(row[np.isfinite(row)]))
+            for row in rows
+        ]
         wanted = distinct(np.concatenate([_higher(x, row, bound) for row, bound in zip(rows, bounds, strict=True)]))
         if not len(wanted):
             break
@@ -102,7 +105,7 @@ def _solve_lengths(winding: AlongTheWay, arcs: FloatArray) -> Path:
 
 def _find_in_window(motion: FloatArray, window: tuple[float, float]) -> FloatArray:
     """Return which places are in a window, (n,) of bool."""
-    slack = SLACK * float(np.ptp(motion)) if len(motion) else 0.0
+    slack = WINDOW_SLACK * float(np.ptp(motion)) if len(motion) else 0.0
     return np.asarray((motion >= window[0] - slack) & (motion <= window[1] + slack))
 
 
@@ -117,7 +120,7 @@ def _higher(x: FloatArray, row: FloatArray, bound: float) -> FloatArray:
     """Return where the cubics between values have extremes above a bound."""
     size = np.abs(row)
     finite = np.sort(size[np.isfinite(size)])
-    known = size <= FAR * finite[len(finite) // 2]  # np.median would load numpy.ma
+    known = size <= MAX_MEDIAN_RATIO * finite[len(finite) // 2]  # np.median would load numpy.ma
     known[1:] &= np.diff(x) > 0.0  # a straight column does not move under a load
     x, row = x[known], row[known]
     found = inner_extremes(x, row)

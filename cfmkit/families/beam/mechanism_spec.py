@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.beam.contact_spec import ObstacleSpec, StopSpec, contact_faults
 from cfmkit.families.beam.network_elements_spec import (
-    HELD,
+    HELD_MOTIONS,
     Copies,
     DriveSpec,
     LinkSpec,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 Fault = tuple[tuple[str | int, ...], str]
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+_NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
 
 
@@ -42,7 +42,7 @@ def faults(mechanism: Mechanism) -> Iterator[Fault]:
     """Yield what is wrong with a mechanism whose keys are each right by themselves."""
     for group in ("nodes", "beams", "springs", "stops", "obstacles"):
         for name in getattr(mechanism, group):
-            if not _NAME.fullmatch(name):
+            if not _NAME_PATTERN.fullmatch(name):
                 yield (group, name), "a name is a letter and then at most 39 letters, digits, '_' or '-'"
     if len(mechanism.nodes) == 1:
         held = "{at: [0 mm, 0 mm], support: clamped}"
@@ -157,7 +157,7 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
         yield at, f"{drive.node!r} follows {leader!r}: drive that one"
         return
     node = mechanism.nodes[drive.node]
-    along, across, rotation = HELD[node.support]
+    along, across, rotation = HELD_MOTIONS[node.support]
     if drive.turns:
         if rotation:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}; 'pinned' lets it turn"

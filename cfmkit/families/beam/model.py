@@ -32,7 +32,7 @@ from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.path_ending import ending_of, in_units
 from cfmkit.families.beam.requested_node_columns import END_FORCES, columns_of, output_columns
-from cfmkit.families.beam.scalar_results import QUANTITIES, natural, target_of
+from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, target_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.there_and_back import both_ways, join_ways, part_ways
@@ -53,8 +53,10 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
 
-_TORN = 3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
-_ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
+_MAX_TRAVEL_RATIO = (
+    3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
+)
+_COIL_PLACES = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
 @one_blas_thread
@@ -71,7 +73,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
         message = f"no curve: {ending_of(solution).message}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=tuple(findings_of(solution)))
     status, message = _ending(solution)
-    values, along = values_of_one(QUANTITIES, solution) | contact_values(solution), ride(solution)
+    values, along = values_of_one(SCALAR_QUANTITIES, solution) | contact_values(solution), ride(solution)
     curves: tuple[Curve, ...] = (_curve(solution),)
     if along is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()
@@ -129,7 +131,7 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
     wound = [name for name, beam in network.beams.items() if coils(beam)]
     fits = BeamFits(network) if wound else {}
     for name in wound:
-        turns = np.abs(np.diff(fits[name].angle(_ALONG, 0.5))) / np.diff(_ALONG)
+        turns = np.abs(np.diff(fits[name].angle(_COIL_PLACES, 0.5))) / np.diff(_COIL_PLACES)
         radius, thick = float(fits[name].length / turns.max()), thickest_of(network.beams[name].section)
         if radius < 0.5 * thick:
             raise InputError(
@@ -148,7 +150,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     if not drive.is_displacement or travel is None:
         return
     # each of several stages makes its share of the travel
-    most = _TORN * (spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1)
+    most = _MAX_TRAVEL_RATIO * (spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1)
     straight = {name: distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
     if abs(spec.extent) <= most * _way_to_support(network, drive.node, straight):
         return

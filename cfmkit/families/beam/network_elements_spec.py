@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
 
-HELD = {
+HELD_MOTIONS = {
     "free": (False, False, False),
     "clamped": (True, True, True),
     "pinned": (True, True, False),
@@ -99,7 +99,7 @@ class NodeSpec(Model):
     @model_validator(mode="after")
     def _moves_only_what_is_held(self) -> Self:
         if self.moved is not None:
-            for name, held in zip(("along", "across", "rotation"), HELD[self.support], strict=True):
+            for name, held in zip(("along", "across", "rotation"), HELD_MOTIONS[self.support], strict=True):
                 if getattr(self.moved, name) != 0 and not held:
                     raise ValueError(
                         f"'moved.{name}' is given, but a support that is {self.support!r} leaves that free"

@@ -26,10 +26,10 @@ import numpy as np
 from cfmkit import elastica as engine
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
-from cfmkit.elastica.model.network import FREE, Link, Network, Node
+from cfmkit.elastica.model.network import FREE_SUPPORT, Link, Network, Node
 from cfmkit.families.beam.contact_spec import contacts_of
 from cfmkit.families.beam.network_elements_spec import (
-    HELD,
+    HELD_MOTIONS,
     DisplacementDrive,
     ForceDrive,
     LoadsDrive,
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
 _ON_AXIS = 0.5  # thicknesses from the mirror axis within which a node is on it
-_SMOOTH = 0.07  # the same where every step is a point of the curve
+_SMOOTH_PITCH_SHARE = 0.07  # the same where every step is a point of the curve
 
 
 @dataclass(frozen=True, repr=False)
@@ -155,7 +155,7 @@ class Assembly(ShortRepr):
         return engine.Control(
             tolerance=analysis.tolerance,
             through_folds=analysis.through_folds,
-            largest_turn=_SMOOTH if analysis.through_folds else _LARGEST_TURN,
+            largest_turn=_SMOOTH_PITCH_SHARE if analysis.through_folds else _LARGEST_TURN,
             branch=analysis.branch,
             sign=-1 if analysis.other_side else 1,
             imperfection=analysis.imperfection,
@@ -253,7 +253,7 @@ def _node(node: NodeSpec) -> engine.Node:
     moved = (0.0, 0.0, 0.0)
     if node.moved is not None:
         moved = (node.moved.along, node.moved.across, node.moved.rotation)
-    return engine.Node(*node.at, engine.Support(*HELD[node.support], node.direction or 0.0, moved))
+    return engine.Node(*node.at, engine.Support(*HELD_MOTIONS[node.support], node.direction or 0.0, moved))
 
 
 def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
@@ -287,7 +287,7 @@ def is_between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
     Without stretching it could not even bend, and its axial force would be any: the whole network would be rigid.
     """
     ends = [mechanism.nodes[name] for name in (beam.start, beam.end)]
-    held = all(all(HELD[node.support][:2]) and node.moved is None for node in ends)
+    held = all(all(HELD_MOTIONS[node.support][:2]) and node.moved is None for node in ends)
     return held and beam.shape.is_straight and not (beam.start_offset or beam.end_offset)
 
 
@@ -337,7 +337,7 @@ def _own_chord(network: Network, beam: Beam) -> complex:
     return reach * cmath.exp(-1j * float(np.real(found.rotation))) / float(np.real(found.scale))
 
 
-_ROOM = 1.15  # of the pitch that is chosen, for what joins the stages
+_PITCH_MARGIN = 1.15  # of the pitch that is chosen, for what joins the stages
 
 
 def stack_stages(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
@@ -360,7 +360,9 @@ def stack_stages(network: Network, driven: str, count: int, pitch: float | None 
         below = _name_node(driven, stage - 1)
         for name, node in network.nodes.items():
             clamped = node.support.along and name != driven
-            moved = Node(node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, FREE if clamped else node.support)
+            moved = Node(
+                node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, FREE_SUPPORT if clamped else node.support
+            )
             nodes[_name_node(name, stage)] = moved
             if clamped:
                 links.append(Link(below, _name_node(name, stage)))
@@ -383,5 +385,5 @@ def _step(network: Network, driven: str, pitch: float | None) -> tuple[float, fl
     grounds = [node for name, node in network.nodes.items() if node.support.along and name != driven]
     ahead = [(top.x - node.x) * c + (top.y - node.y) * s for node in grounds]
     mean = sum(ahead) / len(ahead) if ahead else 0.0
-    size = math.copysign(_ROOM * max(map(abs, ahead), default=0.0) if pitch is None else pitch, mean)
+    size = math.copysign(_PITCH_MARGIN * max(map(abs, ahead), default=0.0) if pitch is None else pitch, mean)
     return size * c, size * s

@@ -10,9 +10,17 @@ import numpy as np
 from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, Smooth, circle, mark
 from cfmkit.export.drawn_as_specified import SpecifiedPiece, check_outline
 from cfmkit.export.union import OutlinePiece
-from cfmkit.families.beam.drawn_pieces import STANDS, both_halves, drawn_parts
+from cfmkit.families.beam.drawn_pieces import STANDING_DISTANCE, both_halves, drawn_parts
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes
-from cfmkit.families.beam.part import FINE, SHARE, drawn_fillet, drawn_frame, fine_tolerance, held_places, strips_of
+from cfmkit.families.beam.part import (
+    OUTLINE_TOLERANCE,
+    POLYGON_TOLERANCE_SHARE,
+    drawn_fillet,
+    drawn_frame,
+    fine_tolerance,
+    held_places,
+    strips_of,
+)
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points
 from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_drawn_solid
 from cfmkit.specs.units import format_short
@@ -46,13 +54,16 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     tolerance = tolerance or fine
     beams = strips_of(assembly, tolerance)
     halves = both_halves(assembly, beams)
-    solid = drawn_parts(assembly, beams, SHARE * tolerance)
+    solid = drawn_parts(assembly, beams, POLYGON_TOLERANCE_SHARE * tolerance)
     frame = drawn_frame(assembly, beams, tolerance)
     lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
     part, fillet = spec.mechanism.cut_part, drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
-    contours = merge_pieces(pieces, fine / FINE, fillet, solid.holes)
-    thinnest, holes = fine / FINE, [area for hole in solid.holes for area in hole.to_polygons(fine / FINE)]
+    contours = merge_pieces(pieces, fine / OUTLINE_TOLERANCE, fillet, solid.holes)
+    thinnest, holes = (
+        fine / OUTLINE_TOLERANCE,
+        [area for hole in solid.holes for area in hole.to_polygons(fine / OUTLINE_TOLERANCE)],
+    )
     sections = check_outline(contours, tuple(_specified_pieces(beams, pieces, thinnest)), thinnest, fillet, holes)
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
@@ -109,7 +120,7 @@ def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
 
 def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"], ...]) -> Iterator[DrawnDimension]:
     for axis in along:
-        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > STANDS * math.dist(start, end):
+        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > STANDING_DISTANCE * math.dist(start, end):
             yield DrawnDimension(words, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), axis)
 
 

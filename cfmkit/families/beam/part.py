@@ -18,8 +18,8 @@ from cfmkit.export.contours import Contour
 from cfmkit.export.ground_frame import ground_frame, move_polygon
 from cfmkit.export.posed_part import PosedBody, PosedPart, rectangle, swept
 from cfmkit.families.beam.drawn_pieces import (
-    EYE,
-    HOLE,
+    EYE_RADIUS,
+    HOLE_RADIUS,
     BeamEnd,
     bars_between_halves,
     disc,
@@ -53,11 +53,11 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Result
 
-FINE = 2e-4
+OUTLINE_TOLERANCE = 2e-4
 """How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
 beam: both edges together change its bending stiffness by 1.2e-3 at most."""
 
-SHARP = 1e-4
+MIN_FILLET_RATIO = 1e-4
 """Fillets smaller than this are not drawn, in thicknesses of the thinnest beam."""
 
 N_SWEPT = 25
@@ -66,13 +66,13 @@ N_SWEPT = 25
 N_POSES = 13
 """Poses that a box counts: between two of them, a twelfth of the travel apart, beams bulge by next to nothing."""
 
-COARSE = 5e-5
+BOX_TOLERANCE = 5e-5
 """Tolerance of the outline of a box: it is wanted to a tenth of a millimetre [m]."""
 
-SHARE = 0.2
+POLYGON_TOLERANCE_SHARE = 0.2
 """Part of the tolerance that polygons of eyes may be off."""
 
-SPARSE = 5.0
+POINT_TOLERANCE_FACTOR = 5.0
 """How far lines between the points of a beam may be from its edges, in tolerances: edges are cubics between the points,
 which are nearer by the square of that again."""
 
@@ -111,7 +111,7 @@ def strips_of(assembly: Assembly, tolerance: float = np.inf) -> dict[str, list[B
     """Return every beam in smooth pieces, as exact as a drawing of some tolerance [m] needs them."""
     network = assembly.network
     fits = BeamFits(network)
-    return {name: strips(network, fits, name, SPARSE * tolerance) for name in network.beams}
+    return {name: strips(network, fits, name, POINT_TOLERANCE_FACTOR * tolerance) for name in network.beams}
 
 
 def held_places(
@@ -126,7 +126,7 @@ def held_places(
         held = about.support.along or about.support.across or about.support.rotation
         if not ends or not (held or node in moving or node in loaded):
             continue
-        region = _region(assembly, node, ends, SHARE * tolerance)
+        region = _region(assembly, node, ends, POLYGON_TOLERANCE_SHARE * tolerance)
         joined = (bars[node],) if node in bars else ()
         yield replace(region, shapes=(*region.shapes, *joined))
         if axis is not None and not is_on_axis(assembly, node):
@@ -149,7 +149,7 @@ def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) ->
         return HeldPlace(node, node, at, tuple(pad for pad, _ in pads), tuple(end.cap for _, end in pads), True)
     end = ends[0]
     if about.support.across and not about.support.rotation and not is_on_axis(assembly, node):
-        return HeldPlace(node, node, at, (disc(end.at, HOLE * end.thickness, bulge),))
+        return HeldPlace(node, node, at, (disc(end.at, HOLE_RADIUS * end.thickness, bulge),))
     axis = mirror_axis(assembly)
     mitre = axis[1] if axis is not None and is_on_axis(assembly, node) else mitre_direction(ends)
     section = end.cap if mitre is None else section_at_bend(ends, mitre, drawn_fillet(assembly.spec))
@@ -159,12 +159,12 @@ def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) ->
 def drawn_fillet(spec: BeamSpec) -> float:
     """Return the radius of inside corners as drawn [m]: those much smaller than the beams are sharp corners."""
     fillet = spec.mechanism.fillet
-    return fillet if fillet >= SHARP * spec.mechanism.thinnest else 0.0
+    return fillet if fillet >= MIN_FILLET_RATIO * spec.mechanism.thinnest else 0.0
 
 
 def fine_tolerance(assembly: Assembly) -> float:
     """Return how far an outline may be from the exact one where nobody states it [m]."""
-    return FINE * min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+    return OUTLINE_TOLERANCE * min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
 
 
 def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
@@ -191,7 +191,9 @@ def drawn_frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance
             pads |= {f"{place.name} ({k})" if k else place.name: shape for k, shape in enumerate(place.shapes)}
         else:
             covered += list(place.shapes)
-            covered += [place.at + EYE / HOLE * (shape - place.at) for shape in place.shapes if len(shape) > 4]
+            covered += [
+                place.at + EYE_RADIUS / HOLE_RADIUS * (shape - place.at) for shape in place.shapes if len(shape) > 4
+            ]
     return ground_frame(
         pads, _swept(assembly, places), covered, part.frame.ground, part.frame.clearance, part.frame.inside
     ).pieces
@@ -231,7 +233,10 @@ def part_over_motion(result: Result) -> PosedPart | None:
     assembly, mechanism = solution.assembly, solution.spec.mechanism
     legs = mechanism.copies.legs if mechanism.copies else 1
     return PosedPart(
-        (*as_made(assembly), *bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, COARSE))),
+        (
+            *as_made(assembly),
+            *bodies(solution, choose_points(solution, N_POSES), regions(solution.spec, BOX_TOLERANCE)),
+        ),
         direction=assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi,
         depth=legs * max([mechanism.width or 0.0, *mechanism.of_beams("width").values()]),
         pieces=legs,
@@ -240,10 +245,10 @@ def part_over_motion(result: Result) -> PosedPart | None:
 
 def as_made(assembly: Assembly) -> Iterator[PosedBody]:
     """Yield the boxes of all that a part is united from, and of the frame around it."""
-    beams = strips_of(assembly, COARSE)
-    for piece in drawn_parts(assembly, beams, SHARE * COARSE).pieces:
+    beams = strips_of(assembly, BOX_TOLERANCE)
+    for piece in drawn_parts(assembly, beams, POLYGON_TOLERANCE_SHARE * BOX_TOLERANCE).pieces:
         yield PosedBody.polygon("as cut", "free", rectangle(*Contour(piece.edges, "cut").box))
-    yield from (PosedBody.polygon("frame", "held", shape) for shape in drawn_frame(assembly, beams, COARSE))
+    yield from (PosedBody.polygon("frame", "held", shape) for shape in drawn_frame(assembly, beams, BOX_TOLERANCE))
 
 
 def bodies(

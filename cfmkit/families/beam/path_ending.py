@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.elastica import PathStatus
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.similar_arrays import without_floor
+from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
 from cfmkit.families.beam.taut_beams import taut_beams
 from cfmkit.specs.units import format_short
 
@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.spec import BeamSpec
 
-_NUMBER = r"(-?\d[\d.]*(?:e[+-]?\d+)?)"
-_PLACE = re.compile(rf"\b(at|near) {_NUMBER}(?![\d.e]| of )")  # not a share: "lost at 0.4 of the constant loads"
-_LENGTH = re.compile(rf"{_NUMBER} m\b")
+_NUMBER_PATTERN = r"(-?\d[\d.]*(?:e[+-]?\d+)?)"
+_PLACE_PATTERN = re.compile(
+    rf"\b(at|near) {_NUMBER_PATTERN}(?![\d.e]| of )"
+)  # not a share: "lost at 0.4 of the constant loads"
+_LENGTH_PATTERN = re.compile(rf"{_NUMBER_PATTERN} m\b")
 
 
 def drive_text(assembly: Assembly, value: float) -> str:
@@ -34,13 +36,13 @@ def drive_text(assembly: Assembly, value: float) -> str:
 
 def in_units(assembly: Assembly, text: str) -> str:
     """Return a sentence of the engine with units."""
-    text = _LENGTH.sub(lambda found: format_short(float(found[1]), "length"), text)
-    return _PLACE.sub(lambda found: f"{found[1]} {drive_text(assembly, float(found[2]))}", text)
+    text = _LENGTH_PATTERN.sub(lambda found: format_short(float(found[1]), "length"), text)
+    return _PLACE_PATTERN.sub(lambda found: f"{found[1]} {drive_text(assembly, float(found[2]))}", text)
 
 
-STRETCH = "analysis.fidelity=extensible"
+EXTENSIBLE_OPTION = "analysis.fidelity=extensible"
 
-_PARALLEL = 1e-9  # of its length a beam may leave the line of the drive: angles are read in degrees and rounded
+_PARALLEL_RTOL = 1e-9  # of its length a beam may leave the line of the drive: angles are read in degrees and rounded
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def ending_of(solution: Solution) -> PathEnding:
         if not taut:
             taut, kept = taut_beams(path, len(path) - 1), False
     if not taut and len(solution.keep) < 2:
-        return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
+        return PathEnding(f"{said}: {_in_the_way(solution)}", (EXTENSIBLE_OPTION,) if rigid else ())
     if not taut:
         return PathEnding(said)
     if kept:
@@ -74,7 +76,7 @@ def ending_of(solution: Solution) -> PathEnding:
     return PathEnding(
         f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams cannot follow: allow stretching "
         "('mechanism.axial: true')",
-        (STRETCH,),
+        (EXTENSIBLE_OPTION,),
     )
 
 
@@ -104,20 +106,20 @@ def _find_over_determined(solution: Solution) -> list[str]:
     They are what the null vectors of the tangent have, where these move nothing.
     """
     arrays = discretise(solution.path.network, solution.path.load_case)
-    arrays = without_floor(arrays, np.flatnonzero(arrays.floored))
+    arrays = make_inextensible(arrays, np.flatnonzero(arrays.floored))
     tangent = equations(arrays).linearise(np.zeros(len(arrays.free)), 0.0).tangent
     _, sizes, rows = np.linalg.svd(tangent)
     null = np.zeros((len(rows), arrays.size))
     null[:, arrays.free] = rows
-    null = null[sizes <= _SINGULAR * sizes[0]]
-    if not len(null) or np.abs(null[:, : arrays.n_motions]).max(initial=0.0) > _STILL:
+    null = null[sizes <= _SINGULAR_RTOL * sizes[0]]
+    if not len(null) or np.abs(null[:, : arrays.n_motions]).max(initial=0.0) > _MOTION_TOL:
         return []
     forces = np.abs(null[:, arrays.elements.unknowns[:, -2:]]).max(axis=(0, 2))
-    names = [name for name, force in zip(arrays.elements.beam, forces.tolist(), strict=True) if force > _STILL]
+    names = [name for name, force in zip(arrays.elements.beam, forces.tolist(), strict=True) if force > _MOTION_TOL]
     return list(dict.fromkeys(names))
 
 
-_SINGULAR, _STILL = 1e-10, 1e-6  # of the largest singular value; motion or force of a null vector of length 1
+_SINGULAR_RTOL, _MOTION_TOL = 1e-10, 1e-6  # of the largest singular value; motion or force of a null vector of length 1
 
 
 def _find_along_drive(spec: BeamSpec) -> Iterator[str]:
@@ -129,5 +131,5 @@ def _find_along_drive(spec: BeamSpec) -> Iterator[str]:
     for name, beam in mechanism.beams.items():
         way = np.subtract(mechanism.nodes[beam.end].at, mechanism.nodes[beam.start].at)
         across = abs(way @ (-np.sin(direction), np.cos(direction)))
-        if beam.shape.is_straight and across <= _PARALLEL * np.hypot(*way):
+        if beam.shape.is_straight and across <= _PARALLEL_RTOL * np.hypot(*way):
             yield name

@@ -31,7 +31,7 @@ from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing
 from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
-from cfmkit.families.beam.scalar_results import DEFINITIONS, EXTREMES, RANGES, number_of, target_of
+from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, SCALAR_DEFINITIONS, number_of, target_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
@@ -261,13 +261,13 @@ def _solve_loaded_part(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolut
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
     from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
-    from cfmkit.solid.plane_stress_law import LAWS
+    from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     frame = standing_frame(spec)
     drawn = drawing(_remove_frame(spec, frame))
     cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
-    law = LAWS[material.law](material.modulus, material.poisson)
+    law = MATERIAL_LAWS[material.law](material.modulus, material.poisson)
     places = [
         HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
         for one in regions(spec)
@@ -422,7 +422,7 @@ def _fillet_table(solution: SolidSolution) -> Table:
 
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None if the model does not know a value."""
-    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
+    numbers: dict[str, float | None] = dict.fromkeys(SCALAR_DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         **solution.error.values(),
     }
@@ -430,7 +430,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not _turns(solution.spec):
         numbers |= {"travel_end": float(solution.motion[-1])} | _limit(solution)
-        names = (*EXTREMES, *(RANGES if solution.reached is None else ()))
+        names = (*EXTREME_METRICS, *(RANGE_METRICS if solution.reached is None else ()))
         numbers |= {name: number_of(name, solution) for name in names}
         if solution.solved.critical_points:
             first = solution.solved.critical_points[0]
@@ -439,7 +439,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
                 "critical_force": solution.copies * first.effort,
                 "critical_error": None if math.isnan(first.error) else first.error,
             }
-    return quantities(DEFINITIONS, numbers) | largest_concentration(solution.fillets)
+    return quantities(SCALAR_DEFINITIONS, numbers) | largest_concentration(solution.fillets)
 
 
 def _limit(solution: SolidSolution) -> dict[str, float | None]:

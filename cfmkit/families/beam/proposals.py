@@ -41,28 +41,28 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
 
-SHAPES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector", "end-effector-leg")
+SHAPE_FILES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
 
-SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
+RELATIVE_SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
 """Sizes that are tried, over the largest that fits the envelope with the pads scaled, too, which they are not."""
 
-STRESS = 0.95
+BENDING_STRESS_SHARE = 0.95
 """Share of the allowable stress by bending alone: what stretching adds is judged afterwards."""
 
-RIPPLES = (0.95, 1.02)
+RIPPLE_SHARES = (0.95, 1.02)
 """Shares of the ripple required that the scaled curve may have: the second where no window has the first."""
 
-DEEPER = 0.99
+DEPTH_SHARE = 0.99
 """Width over the depth that may seem to be needed: stretch and shear make beams softer or stiffer by a per cent."""
 
-STOUT = 1.15
+MAX_THICKNESS_RATIO = 1.15
 """Largest thickness over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do."""
 
-FLAT = 1.0
+MIN_WIDTH_RATIO = 1.0
 """Least width of a beam over its thickness: narrower ones leave the plane."""
 
-OFFERED = 18
+MAX_PROPOSALS = 18
 
 WIDE_LAST = 100.0
 """Promise of shapes whose beams are too wide to curl: they come after all others."""
@@ -91,7 +91,7 @@ def kept_shapes() -> tuple[Kept, ...]:
     That is bending alone, whose curve is the same for every thickness, or, where beams are stout, with stretch and
     shear: then the curve is exact where the thickness goes with the size, and a guess elsewhere.
     """
-    plain = tuple(_follow_shape(name) for name in SHAPES)
+    plain = tuple(_follow_shape(name) for name in SHAPE_FILES)
     return (*plain, *(_in_two_layers(kept) for kept in plain if kept.spec.mechanism.copies is not None))
 
 
@@ -126,7 +126,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     missed: list[tuple[float, str]] = []
     for kept in kept_shapes():
         largest = min(request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along)
-        for share in SIZES:
+        for share in RELATIVE_SIZES:
             for block in request.materials or ({"name": "pom"},):
                 one = _rescale_shape(request, kept, share * largest, dict(block))
                 if isinstance(one, Candidate):
@@ -134,7 +134,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 else:
                     missed.append(one)
     if found:
-        return FamilyOffer(tuple(_vary_by_turns(found)[:OFFERED]))
+        return FamilyOffer(tuple(_vary_by_turns(found)[:MAX_PROPOSALS]))
     return FamilyOffer(reason=min(missed, key=lambda one: one[0])[1])
 
 
@@ -161,7 +161,9 @@ def _rescale_shape(request: Request, kept: Kept, size: float, block: dict[str, A
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
     stress = np.maximum.accumulate(kept.stress)[ends]
-    flat = next((flat for share in RIPPLES if len(flat := np.flatnonzero(ripple <= share * request.ripple))), None)
+    flat = next(
+        (flat for share in RIPPLE_SHARES if len(flat := np.flatnonzero(ripple <= share * request.ripple))), None
+    )
     if flat is None:
         least = float(ripple.min())
         reason = f"the force of beams in this envelope changes by {percent(least)} over the travel"
@@ -192,15 +194,17 @@ def _size_section(
     strength = material.allowable(1.0)
     if strength is None or not force > 0.0:
         return 1e9, "no strength of the material is known"
-    thicker = min(STRESS * request.strength_used * strength * size / (stress * stiffer), STOUT * size)
+    thicker = min(
+        BENDING_STRESS_SHARE * request.strength_used * strength * size / (stress * stiffer), MAX_THICKNESS_RATIO * size
+    )
     wide = _width(request, kept, size, stiffer, thicker, force)
-    if wide < FLAT * thicker * thin:
+    if wide < MIN_WIDTH_RATIO * thicker * thin:
         # thinner, so that the same force wants as much width as the beam is thick
-        thicker *= (wide / (FLAT * thicker * thin)) ** 0.25
+        thicker *= (wide / (MIN_WIDTH_RATIO * thicker * thin)) ** 0.25
         wide = _width(request, kept, size, stiffer, thicker, force)
     if thicker * thin < request.thinnest:
         return request.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick"
-    if request.depth is not None and wide > DEEPER * request.depth:
+    if request.depth is not None and wide > DEPTH_SHARE * request.depth:
         return wide / request.depth, f"the beams would be {mm(wide)} wide"
     spec = _write_shape(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.envelope.across * kept.envelope.along / (request.envelope[0] * request.envelope[1])

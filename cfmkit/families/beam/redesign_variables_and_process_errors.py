@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
 
-_TURN = 0.4
+_MAX_COEFFICIENT_TURN = 0.4
 """How far a coefficient of a shape may turn from the design [rad]: farther off it is another shape."""
 
 
@@ -63,7 +63,13 @@ def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tupl
         for k, value in enumerate(getattr(shape, "coefficients", ())):
             if k:  # the first turns with the chord
                 path = f"mechanism.beams.{name}.shape.coefficients.{k}"
-                yield path, (max(-limit, float(value) - _TURN), min(limit, float(value) + _TURN))
+                yield (
+                    path,
+                    (
+                        max(-limit, float(value) - _MAX_COEFFICIENT_TURN),
+                        min(limit, float(value) + _MAX_COEFFICIENT_TURN),
+                    ),
+                )
 
 
 def errors(spec: BeamSpec) -> dict[str, str]:

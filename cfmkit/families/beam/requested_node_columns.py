@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     Read = Callable[[str], FloatArray]  # from a name to three values at each of n points, (n, 3)
     LazyColumns = dict[str, Callable[[], Column]]
 
-MOTIONS = {"x": "length", "y": "length", "rotation": "angle"}
-REACTIONS = {"fx": "force", "fy": "force", "m": "torque"}
+MOTION_DIMENSIONS = {"x": "length", "y": "length", "rotation": "angle"}
+REACTION_DIMENSIONS = {"fx": "force", "fy": "force", "m": "torque"}
 END_FORCES = {"force_x": "force", "force_y": "force", "moment": "torque"}
 """What three columns of a node or a beam are called after its name, and their dimensions."""
 
@@ -45,7 +45,7 @@ def output_columns(outputs: Outputs, motion: Read, reaction: Read) -> LazyColumn
     """
     columns: LazyColumns = {}
     for name in outputs.nodes:
-        columns |= columns_of(name, motion, MOTIONS)
+        columns |= columns_of(name, motion, MOTION_DIMENSIONS)
     for name in outputs.reactions:
-        columns |= columns_of(name, reaction, REACTIONS)
+        columns |= columns_of(name, reaction, REACTION_DIMENSIONS)
     return columns

@@ -12,7 +12,7 @@ from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
-from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.rows import ScalarQuantity
 from cfmkit.numerics.cubic_interpolation import value_at
 
@@ -168,7 +168,7 @@ def _passes_pole(solution: Solution, direction: float, window: tuple[float, floa
     return bool((found & inside[1:] & inside[:-1]).any())
 
 
-BESIDE = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
+BIFURCATION_OFFSETS = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
 """Shares of the travel by which places are beside a bifurcation where a value is looked at."""
 
 
@@ -183,7 +183,7 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
     for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
         if window[0] <= place <= window[1]:
             far, near, later, farther = np.abs(
-                observe(law.solve_at(place + BESIDE * float(np.ptp(solution.motion))))[0]
+                observe(law.solve_at(place + BIFURCATION_OFFSETS * float(np.ptp(solution.motion))))[0]
             )
             if near > 5.0 * far or later > 5.0 * farther:
                 return True
@@ -232,7 +232,7 @@ def _of_solids(names: Iterable[str]) -> dict[str, ScalarQuantity[Solution]]:
     return {name: _quantity(*OF_SOLIDS[name], lambda _: None, reason) for name in names}
 
 
-QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "nominal_force": _quantity(
         "force",
         "F_d: force at d, the end of the window or of the travel [Lan, sec. 2]",
@@ -383,15 +383,15 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result of the family, in the order in which they are shown."""
 
-DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()} | OF_CONTACTS
+SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_CONTACTS
 """Name -> dimension and definition."""
 
-EXTREMES = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
-RANGES = tuple(QUANTITIES)[: tuple(QUANTITIES).index("allowable_stress")]
+EXTREME_METRICS = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
+RANGE_METRICS = tuple(SCALAR_QUANTITIES)[: tuple(SCALAR_QUANTITIES).index("allowable_stress")]
 """Those that the curve of any model has."""
 
 
 def number_of(name: str, solution: OnCurve) -> float | None:
     """Return a scalar result that the curve has [SI]; None if there is none."""
-    value = QUANTITIES[name].function(solution)  # type: ignore[arg-type]
+    value = SCALAR_QUANTITIES[name].function(solution)  # type: ignore[arg-type]
     return float(value) if np.isfinite(value) else None

@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 
 Point = tuple[Length, Length]
 
-_CLOSED = 1e-9  # of the length; the engine cannot fit what is shorter
+_CLOSING_RTOL = 1e-9  # of the length; the engine cannot fit what is shorter
 # 20 places of the quadrature on each panel, of a turn below a radian on the average
-_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(20)
 
-RETURNS = "the shape returns to its start: it cannot be fitted"
+CLOSED_SHAPE_MESSAGE = "the shape returns to its start: it cannot be fitted"
 
 
 def _returns(coefficients: Sequence[float]) -> bool:
     """Return True if a shape whose angle is a polynomial [rad] ends where it starts."""
     panels = 8 + math.ceil(sum(map(abs, coefficients[1:])))
-    u = (np.arange(panels)[:, None] + 0.5 * (_PLACES + 1)) / panels
-    chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * _WEIGHTS).sum() / (2 * panels)
-    return bool(abs(chord) < _CLOSED)
+    u = (np.arange(panels)[:, None] + 0.5 * (_GAUSS_NODES + 1)) / panels
+    chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * _GAUSS_WEIGHTS).sum() / (2 * panels)
+    return bool(abs(chord) < _CLOSING_RTOL)
 
 
 MOST_WINDINGS = 1000
@@ -66,9 +66,9 @@ class Straight(Shape):
 
     def build(self) -> engine.Shape:
         """Return the shape as the engine has it."""
-        from cfmkit.elastica.model.shapes import STRAIGHT
+        from cfmkit.elastica.model.shapes import STRAIGHT_SHAPE
 
-        return STRAIGHT
+        return STRAIGHT_SHAPE
 
 
 class PolynomialShape(Shape):
@@ -99,7 +99,7 @@ class PolynomialShape(Shape):
     def find_faults(self, reach: float) -> Iterator[tuple[str, str]]:
         """Yield that it returns to its start, if it does."""
         if _returns(self.coefficients):
-            yield "coefficients", RETURNS
+            yield "coefficients", CLOSED_SHAPE_MESSAGE
 
 
 class ArcShape(Shape):
@@ -150,7 +150,7 @@ class _ThroughPoints(Shape):
         if any(one == other for one, other in itertools.pairwise(points)):
             yield "points", "two neighbouring points are the same"
         elif points[0] == points[-1]:
-            yield "points", RETURNS
+            yield "points", CLOSED_SHAPE_MESSAGE
 
 
 class PolylineShape(_ThroughPoints):

@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
 
 
-_NOTHING = 1e-15
+_DISPLACEMENT_RTOL = 1e-15
 """Share of the largest displacement: a few units in the last place, as of the cosine of 90 deg."""
 
-_POSES = 7
+_N_POSES = 7
 AT_CORNER = 1e-9  # share of the travel within which a place is that of a corner
-_FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
+_N_FLUTTER_MODES = 4  # modes among which two may meet: it is the lowest ones that do
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,7 +67,7 @@ class Solution(ShortRepr):
             return read_only(moved[:, 2])
         angle = self.assembly.direction
         along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
-        return read_only(np.where(np.abs(along) > _NOTHING * np.abs(along).max(initial=0.0), along, 0.0))
+        return read_only(np.where(np.abs(along) > _DISPLACEMENT_RTOL * np.abs(along).max(initial=0.0), along, 0.0))
 
     @property
     def motion_dimension(self) -> str:
@@ -204,7 +204,7 @@ class Solution(ShortRepr):
     def frequencies(self) -> Frequencies | None:
         """Natural frequencies about every point of the curve; None if none are requested and nothing can flutter."""
         masses = self.assembly.masses()
-        count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
+        count = self.spec.analysis.modes or (_N_FLUTTER_MODES if self.follows else 0)
         if masses is None or not count or not len(self.keep):
             return None
         from cfmkit.elastica.vibration import frequencies
@@ -228,7 +228,7 @@ class Solution(ShortRepr):
     @cached_property
     def gaps(self) -> tuple[BeamGap | None, BeamGap | None]:
         """The smallest gap between two beams before any load, and of some places of the curve [m]."""
-        poses = sorted(set(np.linspace(0, len(self.keep) - 1, _POSES).astype(int).tolist()))
+        poses = sorted(set(np.linspace(0, len(self.keep) - 1, _N_POSES).astype(int).tolist()))
         found = [self._gap(int(self.keep[pose])) for pose in poses]
         moving = min((gap for gap in found if gap is not None), default=None)
         return found[0], moving

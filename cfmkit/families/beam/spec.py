@@ -17,14 +17,14 @@ from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula_of_x import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
-from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque, format_short
-from cfmkit.specs.units.fields import LARGEST
+from cfmkit.specs.units import DIMENSIONS_BY_NAME, Factor, Force, Length, Ratio, Torque, format_short
+from cfmkit.specs.units.fields import MAX_QUANTITY
 from cfmkit.stock.material_and_part_spec import sheet_faults, sheet_of, stated_sheet
 from cfmkit.stock.springs.spec import is_made
 from cfmkit.stock.stock_series import stock_faults
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
-EXTENTS = tuple(dict.fromkeys(kind.extent for kind in Drive.__subclasses__()))
+EXTENT_KEYS = tuple(dict.fromkeys(kind.extent for kind in Drive.__subclasses__()))
 
 
 class FileProfile(Model):
@@ -61,7 +61,7 @@ class FormulaProfile(Model):
     def _has_a_height_everywhere(self) -> Self:
         x = np.linspace(0.0, self.length, self.points) * 1e3
         heights = formula(self.height)(x)
-        bad = ~(np.abs(heights) <= LARGEST * 1e3)
+        bad = ~(np.abs(heights) <= MAX_QUANTITY * 1e3)
         if bad.any():
             place = x[int(bad.argmax())]
             reported = f"has no height at x = {place:.6g} mm: a finite number of mm is needed everywhere on the surface"
@@ -335,7 +335,7 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield what is wrong with how far the drive is to go."""
     drive, analysis = spec.mechanism.drive, spec.analysis
     kind, wanted = drive.kind, drive.extent
-    others = [name for name in EXTENTS if name != wanted and getattr(analysis, name) is not None]
+    others = [name for name in EXTENT_KEYS if name != wanted and getattr(analysis, name) is not None]
     for name in others:
         yield (name,), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
     value = getattr(analysis, wanted)
@@ -346,7 +346,7 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
     if analysis.surface is not None and not drive.is_displacement:
         yield ("surface",), "a surface needs a drive of kind 'displacement'"
     if value is not None and drive.by_motion and value.dimension != drive.dimension:
-        yield (wanted,), f"must be {DIMENSIONS[drive.dimension].phrase} for a drive of kind {kind!r}"
+        yield (wanted,), f"must be {DIMENSIONS_BY_NAME[drive.dimension].phrase} for a drive of kind {kind!r}"
 
 
 def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
     from cfmkit.export.contours import Edge
 
-STEPS, MOST_STEPS = 160, 20_000
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-STRAIGHT = 1e-9  # of the thickness: edges that bulge less are lines
-TINY = 1e-30  # of a complex step
-NEAR = 3.0  # thicknesses beside a common end that are no gap
-TOGETHER = 0.25  # of the thickness: ends closer than this are one
+STEP_LIMITS, MOST_STEPS = 160, 20_000
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
+LINE_RTOL = 1e-9  # of the thickness: edges that bulge less are lines
+COMPLEX_STEP = 1e-30  # of a complex step
+COMMON_END_THICKNESSES = 3.0  # thicknesses beside a common end that are no gap
+END_DISTANCE_RATIO = 0.25  # of the thickness: ends closer than this are one
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class BeamStrip:
         chords = [line[-1] - line[0] for line in self.sides]
         off = [np.abs(chord[0] * (line - line[0])[:, 1] - chord[1] * (line - line[0])[:, 0]).max() / np.hypot(*chord)
                for line, chord in zip(self.sides, chords, strict=True)]  # fmt: skip
-        return bool(max(off) <= STRAIGHT * float(self.thickness.min()))
+        return bool(max(off) <= LINE_RTOL * float(self.thickness.min()))
 
     @property
     def length(self) -> float:
@@ -139,7 +139,7 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
     cuts = {*fit.course.breaks.tolist(), *(fit.parameter(float(place)) for place in beam.section.stations)}
     found = []
     for low, high in itertools.pairwise(sorted(cuts)):
-        count = max(4, int(np.ceil(STEPS * (high - low))))
+        count = max(4, int(np.ceil(STEP_LIMITS * (high - low))))
         piece = _piece(beam, fit, at, np.linspace(low, high, count + 1))
         while piece.sagitta > tolerance and count < MOST_STEPS:
             count = min(MOST_STEPS, int(1.1 * count * np.sqrt(piece.sagitta / tolerance)) + 1)
@@ -158,14 +158,14 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
 def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
     """Return a smooth piece of a beam that starts at a place [m], at parameters of its shape."""
     inside, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[1] - t[0])
-    nodes = (t[:-1] + half)[:, None] + half * _GAUSS
+    nodes = (t[:-1] + half)[:, None] + half * _GAUSS_NODES
     speed, angle = np.real(fit.speed(nodes, inside)), np.real(fit.angle(nodes, inside))
-    step = half * np.stack([speed * np.cos(angle), speed * np.sin(angle)]) @ _WEIGHTS
+    step = half * np.stack([speed * np.cos(angle), speed * np.sin(angle)]) @ _GAUSS_WEIGHTS
     points = at + np.concatenate([np.zeros((1, 2)), np.cumsum(step.T, axis=0)])
     place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
     middle = float(place[len(place) // 2])
     thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
-    turn = np.imag(fit.angle(t + 1j * TINY, inside)) / TINY / np.real(fit.speed(t, inside))
+    turn = np.imag(fit.angle(t + 1j * COMPLEX_STEP, inside)) / COMPLEX_STEP / np.real(fit.speed(t, inside))
     slope = np.full(len(t), (thickness[-1] - thickness[0]) / ((place[-1] - place[0]) * float(np.real(fit.length))))
     angle = np.real(fit.angle(t, inside))
     return BeamStrip(*(read_only(one) for one in (points, angle, thickness, turn + np.zeros(len(t)), slope)))
@@ -231,8 +231,8 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str,
     """Return the gap of two beams; None if nothing is left of one beside their common ends."""
     a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
     for i, j in itertools.product((0, -1), repeat=2):
-        if np.hypot(*(lines[one][i] - lines[other][j])) < TOGETHER * (halves[one] + half):
-            a, b = _away(a, i, 2 * NEAR * halves[one]), _away(b, j, 2 * NEAR * half)
+        if np.hypot(*(lines[one][i] - lines[other][j])) < END_DISTANCE_RATIO * (halves[one] + half):
+            a, b = _away(a, i, 2 * COMMON_END_THICKNESSES * halves[one]), _away(b, j, 2 * COMMON_END_THICKNESSES * half)
     if len(a) < 2 or len(b) < 2:
         return None
     import shapely

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
     from cfmkit.elastica.results.path import Path
 
-_STRAIGHT = 0.995  # of the length of a taut beam or chain lies between its ends
-_TIGHT = 50.0  # N L^2 / EI: it is pulled so hard that only its ends are bent
+_STRAIGHT_LENGTH_SHARE = 0.995  # of the length of a taut beam or chain lies between its ends
+_TAUT_RATIO = 50.0  # N L^2 / EI: it is pulled so hard that only its ends are bent
 
 
 def taut_beams(path: Path, last: int) -> list[str]:
@@ -38,11 +38,11 @@ def _find_pulled(path: Path, last: int) -> Iterator[str]:
         line = path.shape(name, last)
         chord = line[-1] - line[0]
         way, length = float(np.hypot(*chord)), float(np.real(path.fits[name].length))
-        if way < _STRAIGHT * length:
+        if way < _STRAIGHT_LENGTH_SHARE * length:
             continue
         pull = float(path.end_force(name, 1)[last, :2] @ chord) / way
         stiffness = float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
-        if pull * length**2 > _TIGHT * stiffness:
+        if pull * length**2 > _TAUT_RATIO * stiffness:
             yield f"{name}: {_describe_beam(way, length)}"
 
 
@@ -57,7 +57,7 @@ def _in_line(path: Path, last: int) -> Iterator[str]:
     }
     for name, length in ways_to_supports(network, drive.node, lengths).items():
         first, now = (_apart(path, drive.node, name, point) for point in (0, last))
-        if now > max(_STRAIGHT * length, first):  # a column is as straight when it begins to shorten
+        if now > max(_STRAIGHT_LENGTH_SHARE * length, first):  # a column is as straight when it begins to shorten
             yield f"{name} to {drive.node}: {_describe_beam(now, length)}"
 
 

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 LOOKED_AT = 4001
 """Places along a surface at which extremes are looked for, before the best is refined."""
 
-_ROWS = 201  # of the curve along a surface that is given by few points
-_BESIDE = 1e-9  # of the length: both sides of a corner are looked at
+_N_SURFACE_ROWS = 201  # of the curve along a surface that is given by few points
+_CORNER_OFFSET = 1e-9  # of the length: both sides of a corner are looked at
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,7 +60,7 @@ class SurfaceCourse(ShortRepr):
     def places(self, end: float) -> FloatArray:
         """Return many places up to one [m], the rows and both sides of every corner among them."""
         start = float(self.rows[0])
-        beside = _BESIDE * (float(self.rows[-1]) - start)
+        beside = _CORNER_OFFSET * (float(self.rows[-1]) - start)
         both = np.concatenate([self.corners - beside, self.corners + beside])
         every = np.unique(np.concatenate([np.linspace(start, end, LOOKED_AT), self.rows, both]))
         return every[(every >= start) & (every <= end)]
@@ -94,7 +94,7 @@ def _of_file(given: FileProfile) -> SurfaceCourse:
     from cfmkit.tables.measured_outline import read_profile
 
     x, y = read_profile(getattr(given.file, "path", Path(given.file)))
-    rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _ROWS)]))
+    rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _N_SURFACE_ROWS)]))
     if given.between == "smooth":
         spline = CubicSpline(x, y)
         least = LARGEST_HOLE * (x[-1] - x[0])
@@ -117,19 +117,19 @@ def largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) ->
     1.0
     """
     found = -np.inf
-    for _ in range(_ZOOMS):
+    for _ in range(_N_ZOOMS):
         values = function(places)
         best = int(np.argmax(values))
         found = max(found, float(values[best]))
         low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]
-        places = np.linspace(low, high, _FINE)
+        places = np.linspace(low, high, _PLACES_PER_ZOOM)
     return found
 
 
-_ZOOMS, _FINE = 5, 65  # each makes the places 32 times as dense
+_N_ZOOMS, _PLACES_PER_ZOOM = 5, 65  # each makes the places 32 times as dense
 
 
-DEFINITIONS = {
+TIP_DEFINITIONS = {
     "tip_force_min": ("force", "smallest axial force of the tip along the surface"),
     "tip_force_max": ("force", "largest axial force of the tip along the surface"),
     "tip_force_band": ("ratio", "(max - min)/max of the axial force along the surface"),
@@ -144,7 +144,7 @@ DEFINITIONS = {
     ),
 }  # fmt: skip
 
-_SLACK = 1e-12  # of the travel: a surface may reach exactly to its ends
+_TRAVEL_SLACK = 1e-12  # of the travel: a surface may reach exactly to its ends
 _NO_FORCE = 1e-9  # of the largest force: less is none
 
 
@@ -221,7 +221,7 @@ class Tip:
     def follows(self, place: FloatArray) -> Any:
         """Return at which places the mechanism follows the surface and presses on it."""
         u = self.displacement(place)
-        slack = _SLACK * (self.x[-1] - self.x[0])
+        slack = _TRAVEL_SLACK * (self.x[-1] - self.x[0])
         inside = (u >= self.x[0] - slack) & (u <= self.x[-1] + slack)
         return inside & (self.force(place) >= 0)
 
@@ -294,7 +294,7 @@ def _drop_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
         "'analysis.surface.profile.between: straight' takes straight lines there for the surface",
         "analysis.surface.profile.between=straight",
     )
-    return replace(found, **rows, values=dict.fromkeys(DEFINITIONS), hole=hole)
+    return replace(found, **rows, values=dict.fromkeys(TIP_DEFINITIONS), hole=hole)
 
 
 def _tip(solution: OnCurve, surface: Surface) -> Tip:
@@ -316,7 +316,7 @@ def _tip(solution: OnCurve, surface: Surface) -> Tip:
 
 def _values(tip: Tip, rows: FloatArray, allowable: float | None) -> dict[str, float | None]:
     """Return the scalar results by name; extremes are those of the surface and of the force between all points."""
-    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS)
+    numbers: dict[str, float | None] = dict.fromkeys(TIP_DEFINITIONS)
     if not len(rows):
         return numbers
     places = tip.course.places(float(rows[-1]))
@@ -379,8 +379,8 @@ def values_along(found: Ride) -> Mapping[str, Quantity]:
     """Return the scalar results of a ride by name."""
     if found.hole is not None:
         reason = found.hole.message.partition(":")[0]
-        return {name: Quantity(None, *meant, reason) for name, meant in DEFINITIONS.items()}
-    return quantities(DEFINITIONS, found.values)
+        return {name: Quantity(None, *meant, reason) for name, meant in TIP_DEFINITIONS.items()}
+    return quantities(TIP_DEFINITIONS, found.values)
 
 
 def findings_along(found: Ride) -> Iterator[Finding]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.solid.meshed_part import Part
 
-UNBENT = 1e-3
+INITIAL_TRAVEL = 1e-3
 """Travel that is looked at first where beams have no pose under the load, in m or rad."""
 
 
@@ -92,4 +92,4 @@ def _travel_of_beams(assembly: Assembly) -> float:
     path = trace(assembly.network, assembly.drive(), assembly.control())
     kept = np.asarray(path.at_requested, np.int64)
     moved = float(Solution(assembly, path, kept).motion[-1]) if len(kept) > 1 else 0.0
-    return moved if moved * assembly.spec.extent > 0 else float(np.sign(assembly.spec.extent)) * UNBENT
+    return moved if moved * assembly.spec.extent > 0 else float(np.sign(assembly.spec.extent)) * INITIAL_TRAVEL

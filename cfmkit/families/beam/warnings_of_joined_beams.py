@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.strips_and_gaps import BeamStrip
     from cfmkit.results import Finding
 
-NAMED = 4
+MAX_NAMED_PAIRS = 4
 """Pairs that one line names."""
 
 
@@ -68,8 +68,8 @@ def joined_unasked(
         ]
     joins = joined_away_from_nodes(strips, blocks, _nodes_and_bodies(assembly), contours, fillet)
     if joins:
-        more = f" and {len(joins) - NAMED} more" if len(joins) > NAMED else ""
-        pairs = ", ".join(_phrase(one) for one in joins[:NAMED])
+        more = f" and {len(joins) - MAX_NAMED_PAIRS} more" if len(joins) > MAX_NAMED_PAIRS else ""
+        pairs = ", ".join(_phrase(one) for one in joins[:MAX_NAMED_PAIRS])
         yield finding(
             "joined_away_from_nodes",
             f"drawn as one piece although the mechanism has them apart: {pairs}{more}; the part is stiffer than its "

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search, when_called
-from cfmkit.families.cam.findings import FINDINGS
+from cfmkit.families.cam.findings import CAM_FINDINGS
 from cfmkit.families.cam.mechanism_from_spec import resolve
-from cfmkit.families.cam.scalar_results import DEFINITIONS
+from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
 
 FAMILY = Family(
@@ -15,7 +15,7 @@ FAMILY = Family(
     models={"quasi-static": "cfmkit.families.cam.model:analyze", "dynamic": "cfmkit.families.cam.dynamics:analyze"},
     design=when_called("cfmkit.families.cam.design:design"),
     search=Search(findings=("overwritten", "plate_incomplete")),
-    values=DEFINITIONS,
+    values=SCALAR_DEFINITIONS,
     resolve=resolve,
     attribution="cfmkit.families.cam.measured_deviation_causes",
     draw="cfmkit.families.cam.figures",
@@ -36,7 +36,7 @@ FAMILY = Family(
     ),
     branches=("load", "unload"),
     template="cfmkit/families/cam/template.yaml",
-    findings=FINDINGS,
+    findings=CAM_FINDINGS,
     bibliography="cfmkit/families/cam/references.bib",
     references=(
         "S. Sanchez-Salinas, A. Garcia-Agundez, J. Lopez-Martinez, D. Garcia-Vallejo, "

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Finding
 
-CLOSE = 1e-6
+TRAVEL_RTOL = 1e-6
 """A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
 
 

@@ -27,7 +27,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     loads_of,
 )
 from cfmkit.families.cam.model import reachable_travel, shortfalls, solve
-from cfmkit.families.cam.scalar_results import COLUMNS
+from cfmkit.families.cam.scalar_results import ROW_COLUMNS
 from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.rows import SolvedRows, drop_numbers, stack, with_values
 
@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
     Group = tuple[Rows, SolvedRows[Solution]]
 
-SAMPLES = 120_000
+MAX_SAMPLES_AT_ONCE = 120_000
 """Points that are worked on together: few enough to stay in a processor's cache, 400 curves of 301 points."""
 
-SEVERAL = 8
+MIN_SHARED_CAMS = 8
 """Mechanisms around one cam from which on they are worth a solution of their own."""
 
 BESIDE_THE_CAM = re.compile(
@@ -71,7 +71,7 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
         assembly = _assemble_first(variants, members, moving, plain)
         if assembly is None:
             continue
-        kind = None if len(members) >= SEVERAL else _kind(assembly, plain.keys() >= set(moving))
+        kind = None if len(members) >= MIN_SHARED_CAMS else _kind(assembly, plain.keys() >= set(moving))
         if kind is None:
             yield from _group_around_one_cam(assembly, members, {path: variants.values[path] for path in beside})
             continue
@@ -196,7 +196,7 @@ def _kind(assembly: Assembly, are_plain: bool) -> Hashable | None:
 
 def _group_around_one_cam(assembly: Assembly, members: Rows, beside: Mapping[str, NDArray[Any]]) -> Iterator[Group]:
     """Yield mechanisms around one cam, few at a time."""
-    size = max(1, SAMPLES // assembly.spec.analysis.points)
+    size = max(1, MAX_SAMPLES_AT_ONCE // assembly.spec.analysis.points)
     which_act = [values > 0 for path, values in beside.items() if "friction" in path or "masses" in path]
     for some in _alike(which_act, members):
         for start in range(0, len(some), size):
@@ -211,7 +211,7 @@ def _group_around_one_cam(assembly: Assembly, members: Rows, beside: Mapping[str
 
 def _side_by_side(group: list[tuple[int, Assembly]], variants: Variants) -> Iterator[Group]:
     """Yield mechanisms of one kind, each with a track of its own, few at a time."""
-    size = max(1, SAMPLES // group[0][1].spec.analysis.points)
+    size = max(1, MAX_SAMPLES_AT_ONCE // group[0][1].spec.analysis.points)
     for start in range(0, len(group), size):
         rows, cams = zip(*group[start : start + size], strict=True)
         chosen = np.array(rows)
@@ -245,4 +245,4 @@ def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:
     held = solution.elongation.max(axis=-1) >= 0
     held = held if held.all() else held | (solution.up.contact > 0).any(axis=-1)
     complete = np.broadcast_to(known & held, len(chosen))
-    return SolvedRows(solution, COLUMNS, LazySequence(partial(rules_of, solution)), complete)
+    return SolvedRows(solution, ROW_COLUMNS, LazySequence(partial(rules_of, solution)), complete)

@@ -15,7 +15,7 @@ from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.part_sizes import pin_path
-from cfmkit.families.cam.scalar_results import DEFINITIONS
+from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.findings import mm
 from cfmkit.results import Quantity
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Solution
     from cfmkit.results import Finding
 
-BESIDE, ROUNDING = "roller and plate beside the flanks", 1e-9
+BESIDE_FLANKS_PAIR, OVERLAP_TOL = "roller and plate beside the flanks", 1e-9
 """A pair whose distance ends at zero where the roller comes to the flank's end, which is no fault: only overlap is."""
 
 Place = tuple[FloatArray | float, FloatArray | float]
@@ -45,7 +45,7 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     contours = plate_contours((profile, profile), mechanism.plate)
     yield "roller and roller", 2.0 * (x - radius)
     # The ends of the edges beside the flanks lie on the flanks, which the rollers touch: rounding is no overlap.
-    yield BESIDE, _to_edges((x, y), contours[0].edges) - radius
+    yield BESIDE_FLANKS_PAIR, _to_edges((x, y), contours[0].edges) - radius
     half = 0.5 * sizes.brace_width
     screws = [edge.center for contour in contours[1:] for edge in contour.edges if isinstance(edge, Arc)]
     for place in screws if sizes.screw_head else ():
@@ -74,8 +74,8 @@ def nearest_pairs(solution: Solution) -> dict[str, FloatArray]:
 def smallest(solution: Solution) -> dict[str, Quantity]:
     """Return the smallest distance by name; nothing where no sizes are given."""
     least = {pair: float(gap.min()) for pair, gap in nearest_pairs(solution).items()}
-    found = [gap for pair, gap in least.items() if pair != BESIDE or gap < -ROUNDING]
-    return {"clearance_min": Quantity(min(found), *DEFINITIONS["clearance_min"])} if found else {}
+    found = [gap for pair, gap in least.items() if pair != BESIDE_FLANKS_PAIR or gap < -OVERLAP_TOL]
+    return {"clearance_min": Quantity(min(found), *SCALAR_DEFINITIONS["clearance_min"])} if found else {}
 
 
 def touching(solution: Solution) -> Iterator[Finding]:
@@ -83,7 +83,11 @@ def touching(solution: Solution) -> Iterator[Finding]:
     envelope, reported = solution.assembly.spec.mechanism.envelope, set()
     for pair, gap in sorted(clearances(solution), key=lambda item: float(item[1].min())):
         least = int(np.argmin(gap))
-        if envelope is None or pair in reported or gap[least] >= (0.0 if pair == BESIDE else envelope.gap) - ROUNDING:
+        if (
+            envelope is None
+            or pair in reported
+            or gap[least] >= (0.0 if pair == BESIDE_FLANKS_PAIR else envelope.gap) - OVERLAP_TOL
+        ):
             continue
         reported.add(pair)
         by = f"overlap by {mm(-float(gap[least]))}" if gap[least] < 0 else f"come within {mm(float(gap[least]))}"

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import CLOSE
+from cfmkit.families.cam.assembly import TRAVEL_RTOL
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
@@ -40,7 +40,7 @@ from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import format_at_least, format_at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
-from cfmkit.results import OVERWRITTEN, Design, Finding, Status
+from cfmkit.results import OVERWRITTEN_FINDING, Design, Finding, Status
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
@@ -353,7 +353,7 @@ def _stroke_of(law: SlopeLaw, target: CamDesign, springs: Springs) -> float:
     return max(float(path.travel(end)), 0.0) if end > law.rest_half_width else 0.0
 
 
-_LIMITS = {
+_BLOCKING_KEYS = {
     "undercut": "'design.avoid_undercut'",
     "brace too short": "'mechanism.brace_length'",
     "spring overstretched": "their 'max_elongation'",
@@ -365,7 +365,7 @@ _LIMITS = {
 
 def _in_the_way(reported: str) -> str:
     """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
-    keys = [key for word, key in _LIMITS.items() if f": {word}" in reported]
+    keys = [key for word, key in _BLOCKING_KEYS.items() if f": {word}" in reported]
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
 
 
@@ -401,7 +401,7 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
     """Raise if the geometry, the friction designed for or the springs end before the stroke."""
     path, end = reach(law, target.stroke)
     reached = float(path.travel(end))
-    if reached < target.stroke * (1 - CLOSE):
+    if reached < target.stroke * (1 - TRAVEL_RTOL):
         name = "path_vertical" if turns_vertical(law, end) else "brace_too_short"
         if reached <= 0:  # friction on the way down, or weights that help, are so large that the slider never rises
             name = "design_singular"
@@ -427,7 +427,7 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
         )
 
 
-_SOURCES = {
+_SOURCE_KEYS = {
     "friction": "design.friction",
     "preload": "mechanism.springs.preload",
     "slope_factor": "design.gravity",
@@ -447,9 +447,9 @@ def _overwritten(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
         old, now = getattr(given, name), getattr(new, name)
         if old is not None and old != now and not (isinstance(old, float) and isclose(old, now or 0.0, rel_tol=1e-12)):
             values = [f"{item:g}" if name in ("friction", "slope_factor") else _length(item) for item in (old, now)]
-            source = _SOURCES.get(name, f"mechanism.{name}")
+            source = _SOURCE_KEYS.get(name, f"mechanism.{name}")
             yield Finding(
-                OVERWRITTEN,
+                OVERWRITTEN_FINDING,
                 f"'mechanism.profile.{name}' ({values[0]}) is replaced by {values[1]}: the designed profile "
                 + (f"follows '{source}'; change that one" if source else "is as drawn, without errors of cutting"),
             )

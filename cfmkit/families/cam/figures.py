@@ -30,7 +30,18 @@ from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, apply_style, new_figure
+from cfmkit.plots.style import (
+    LINE_BLACK,
+    LINE_BLUE,
+    LINE_BROWN,
+    LINE_PURPLE,
+    LINE_VERMILLION,
+    SPRING_OCHRE,
+    TEXT_GREY,
+    TROUBLE_RED,
+    apply_style,
+    new_figure,
+)
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -47,7 +58,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-TRAVEL = Scale("displacement", "length")
+TRAVEL_SCALE = Scale("displacement", "length")
 
 MOST_RADIUS = 100.0
 """Times the brace's length: a path with a larger radius of curvature is straight, and is left out of its picture."""
@@ -97,7 +108,7 @@ def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None 
     for side, name, at in ((1.0, "right", here), (-1.0, "left", here.mirror())):
         mirror = np.array([side, 1.0])
         parts.edge(ax, view.flank * mirror, f"flank-{name}")
-        parts.edge(ax, view.path * mirror, f"path-{name}", color=BLUE, linewidth=0.7, dashes=(1, 2), zorder=2.4)
+        parts.edge(ax, view.path * mirror, f"path-{name}", color=LINE_BLUE, linewidth=0.7, dashes=(1, 2), zorder=2.4)
         parts.roller(ax, at.roller, radius, f"roller-{name}")
         parts.link(ax, at.slider, at.roller, f"brace-{name}")
         parts.contact(ax, at.contact, f"contact-{name}")
@@ -151,7 +162,7 @@ def mechanism(result: Result) -> Figure:
     slender = (view.box[3] - view.box[1]) / (view.box[2] - view.box[0])
     stacked = slender < STACK_BELOW
     across, up = (min(138.0, 45.0 / slender), min(138.0 * slender, 45.0)) if stacked else (43.5, 43.5 * slender)
-    figure = new_figure(160.0, 10.0 + (3 if stacked else 1) * (up + parts.TITLE) + heading.height_mm)
+    figure = new_figure(160.0, 10.0 + (3 if stacked else 1) * (up + parts.TITLE_HEIGHT) + heading.height_mm)
     write_heading(figure, heading)
     last = len(solution.travel) - 1
     places = {"start": 0, "middle": last // 2, "end": last}
@@ -169,7 +180,7 @@ def mechanism(result: Result) -> Figure:
 
 def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]:
     here = pose(solution, index)
-    return [parts.part_name("corner", [here.contact], (1.0, 0.6), TROUBLE)] if here.on_corner else []
+    return [parts.part_name("corner", [here.contact], (1.0, 0.6), TROUBLE_RED)] if here.on_corner else []
 
 
 def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
@@ -182,18 +193,18 @@ def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
     roller, pin = np.array(here.roller), np.array(here.slider)
     spring = np.column_stack([np.linspace(-0.5, 0.5, 20) * x, np.full(20, y - 0.45 * radius)])
     return [
-        parts.part_name("F", [pin + np.array([0.0, 0.06 * height])], (1.0, 0.0), VERMILLION),
+        parts.part_name("F", [pin + np.array([0.0, 0.06 * height])], (1.0, 0.0), LINE_VERMILLION),
         parts.part_name("slider", [pin], (-1.0, 0.2)),
         parts.part_name("brace", pin + np.linspace(0.2, 0.8, 20)[:, None] * (roller - pin), (1.0, 0.5)),
         parts.part_name("roller", parts.ring(here.roller, radius, 25), (0.0, -1.0)),
-        parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), OCHRE),
+        parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), SPRING_OCHRE),
     ]
 
 
 def _names_of_lines(_solution: Solution, _index: int, view: Scene) -> list[Label]:
     return [
         parts.part_name("cam", view.flank[len(view.flank) // 2 :] * np.array([0.4, 0.9]), (0.0, -1.0)),
-        parts.part_name("roller\npath", view.path[: len(view.path) // 4], (0.5, -1.0), BLUE, prefer=0.1),
+        parts.part_name("roller\npath", view.path[: len(view.path) // 4], (0.5, -1.0), LINE_BLUE, prefer=0.1),
     ]
 
 
@@ -218,11 +229,14 @@ def curvature(result: Result) -> Figure:
         text = f"undercut{first if solution.corner_travel > 0 else ''}"
         found.append(MarkedRange(float(x[0]), profile.corner.first_contact, text))
     scales = Scale("x of the roller's axis", "length"), Scale("radius of curvature", "length", log=True)
-    series = [Series(radius, "roller path", BLUE, prefer=0.5), Series(flank, "cam", GREY, dashed=True, prefer=0.15)]
+    series = [
+        Series(radius, "roller path", LINE_BLUE, prefer=0.5),
+        Series(flank, "cam", TEXT_GREY, dashed=True, prefer=0.15),
+    ]
     heading = Heading.from_result(result, "Radius of curvature")
     figure = diagram_figure(heading, [Diagram(x, *scales, series, limits, found)], top_mm=9.0)
     travel = profile.path.travel(x) + solution.origin
-    top_axis(figure.axes[0], parts.mm(x), parts.mm(travel), TRAVEL.label)
+    top_axis(figure.axes[0], parts.mm(x), parts.mm(travel), TRAVEL_SCALE.label)
     return figure
 
 
@@ -233,18 +247,18 @@ def contact(result: Result) -> Figure:
     _, highest = finite_range(up.contact) or (0.0, 0.0)
     alike = not np.any(np.abs(up.contact - down.contact) > 0.02 * highest)
     series = [
-        Series(up.contact, "contact, up and down" if alike else "contact, up", BLUE, prefer=0.7),
-        Series(up.brace, "brace, up", PURPLE, prefer=0.5),
+        Series(up.contact, "contact, up and down" if alike else "contact, up", LINE_BLUE, prefer=0.7),
+        Series(up.brace, "brace, up", LINE_PURPLE, prefer=0.5),
     ]
     if not alike:
-        series.append(Series(down.contact, "contact, down", VERMILLION, prefer=0.3))
-    angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", BLUE)]
+        series.append(Series(down.contact, "contact, down", LINE_VERMILLION, prefer=0.3))
+    angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", LINE_BLUE)]
     found = regions(solution)
     limits = [Limit(np.pi / 2, "90 deg: no leverage on the roller"), *limits_on(result, "pressure_angle_max")]
     unnamed = [replace(region, text="") for region in found]
     diagrams = [
-        Diagram(over, TRAVEL, Scale("force", "force"), series, limits_on(result, "contact_force_max"), found),
-        Diagram(over, TRAVEL, Scale("pressure angle", "angle"), angle, limits, unnamed),
+        Diagram(over, TRAVEL_SCALE, Scale("force", "force"), series, limits_on(result, "contact_force_max"), found),
+        Diagram(over, TRAVEL_SCALE, Scale("pressure angle", "angle"), angle, limits, unnamed),
     ]
     return diagram_figure(Heading.from_result(result, "forces on the parts, and the pressure angle"), diagrams)
 
@@ -259,8 +273,8 @@ def springs(result: Result) -> Figure:
     if limit:
         beyond = float(solution.elongation.max()) > limit * (1 + 1e-9)
         limits.append(Limit(limit, f"limit {value_text(limit, 'length')}", trouble=beyond))
-    line, over = [Series(solution.elongation, "", BLUE)], solution.travel + solution.origin
-    diagram = Diagram(over, TRAVEL, Scale("elongation", "length"), line, limits, regions(solution))
+    line, over = [Series(solution.elongation, "", LINE_BLUE)], solution.travel + solution.origin
+    diagram = Diagram(over, TRAVEL_SCALE, Scale("elongation", "length"), line, limits, regions(solution))
     figure = diagram_figure(Heading.from_result(result, "elongation of the springs"), [diagram], right_mm=17.0)
     stiffness, count = (
         float(to_border(solution.assembly.loads.stiffness, "stiffness")),
@@ -276,7 +290,7 @@ def clearance(result: Result) -> Figure:
     """Return how far the moving parts stay from plate, screws and each other over the travel, with the gap wanted."""
     solution: Solution = result.state
     envelope, found = solution.assembly.spec.mechanism.envelope, nearest_pairs(solution)
-    colors = (BLUE, VERMILLION, PURPLE, OCHRE, BLACK, BROWN, GREY)
+    colors = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, SPRING_OCHRE, LINE_BLACK, LINE_BROWN, TEXT_GREY)
     order = sorted(found, key=lambda pair: float(found[pair].min()))
     series = [
         Series(found[pair], pair, color, prefer=0.15 + 0.12 * number)
@@ -286,7 +300,7 @@ def clearance(result: Result) -> Figure:
     passed = any(float(gap.min()) < wanted - 1e-9 for gap in found.values())
     text = f"wanted {value_text(wanted, 'length')}" if wanted else "touching"
     limits = [*limits_on(result, "clearance_min"), Limit(wanted, text, trouble=passed)]
-    diagram = Diagram(solution.travel + solution.origin, TRAVEL, Scale("distance", "length"), series, limits)
+    diagram = Diagram(solution.travel + solution.origin, TRAVEL_SCALE, Scale("distance", "length"), series, limits)
     return diagram_figure(Heading.from_result(result, "clearances of the moving parts"), [diagram])
 
 
@@ -317,9 +331,9 @@ def _roller_on_corner(solution: Solution, ax: Axes, view: Scene) -> None:
     parts.close_up(ax, (start[0], start[1] + 0.35 * radius), 1.5 * radius)
     ax.set_ylabel("y [mm]")
     names = [
-        parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE),
+        parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE_RED),
         parts.part_name("start", [start], (-1.0, -1.0)),
-        parts.part_name("leaves the\ncorner here", parts.ring(leaves, radius), (0.3, 1.0), GREY, prefer=0.6),
+        parts.part_name("leaves the\ncorner here", parts.ring(leaves, radius), (0.3, 1.0), TEXT_GREY, prefer=0.6),
     ]
     place_labels(ax, names)
 
@@ -329,15 +343,15 @@ def _cut_away(solution: Solution, ax: Axes, view: Scene) -> None:
     tail, profile = swallowtail(solution), solution.assembly.track.profile
     corner = _cam_with_corner(solution, ax, view)
     rim = parts.ring((profile.path.law.rest_half_width, 0.0), profile.roller_radius, 8000)
-    parts.edge(ax, tail, "cut-away", color=TROUBLE, linestyle="--", linewidth=1.0, zorder=3)
+    parts.edge(ax, tail, "cut-away", color=TROUBLE_RED, linestyle="--", linewidth=1.0, zorder=3)
     parts.edge(ax, rim, "roller-start", zorder=2.2)
     x, y = 0.5 * (tail.max(axis=0) + tail.min(axis=0))
     size = 0.75 * float(np.ptp(tail, axis=0).max())
     parts.close_up(ax, (float(x), float(y)), size)
     near = rim[(np.abs(rim - np.array([x, y])) < size).all(axis=1)]
     names = [
-        parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE),
-        parts.part_name("shifted path,\ncut away", tail, (0.5, -1.0), TROUBLE, prefer=0.2),
+        parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE_RED),
+        parts.part_name("shifted path,\ncut away", tail, (0.5, -1.0), TROUBLE_RED, prefer=0.2),
         parts.part_name("roller at the start", near, (0.0, -1.0), prefer=0.8),
     ]
     place_labels(ax, names)
@@ -355,7 +369,7 @@ def _cam_with_corner(solution: Solution, ax: Axes, view: Scene) -> FloatArray:
     return flank[:1]
 
 
-PLACES = 400
+N_HEIGHTS = 400
 """Heights at which the errors of measured flanks are drawn."""
 
 
@@ -373,12 +387,12 @@ def profile(result: Result) -> Figure:
     built: Built = result.state
     low = max(float(points[0, 1]) for points in built.registration.points)
     high = min(float(points[-1, 1]) for points in built.registration.points)
-    heights = np.linspace(low, high, PLACES)
+    heights = np.linspace(low, high, N_HEIGHTS)
     kinds = (("error along the normal", built.registration.errors), ("error in x", built.across))
     diagrams = []
     for name, errors in kinds:
         right, left = (_values_over_height(built, side, values, heights) for side, values in enumerate(errors))
-        series = [Series(right, "right", BLUE, prefer=0.3), Series(left, "left", VERMILLION, prefer=0.7)]
+        series = [Series(right, "right", LINE_BLUE, prefer=0.3), Series(left, "left", LINE_VERMILLION, prefer=0.7)]
         diagrams.append(Diagram(heights, Scale("height on the cam", "length"), Scale(name, "length"), series))
     return diagram_figure(Heading.from_result(result, "measured profile less design, positive outside"), diagrams)
 
@@ -398,12 +412,12 @@ def shares(result: Result) -> Figure:
     built: Built = result.state
     parts = built.shares
     series = [
-        Series(parts["profile"], "profile", BLUE, prefer=0.3),
-        Series(parts["friction_up"], "friction, up", VERMILLION, prefer=0.6),
-        Series(parts["friction_down"], "friction, down", PURPLE, prefer=0.6),
+        Series(parts["profile"], "profile", LINE_BLUE, prefer=0.3),
+        Series(parts["friction_up"], "friction, up", LINE_VERMILLION, prefer=0.6),
+        Series(parts["friction_down"], "friction, down", LINE_PURPLE, prefer=0.6),
     ]
     if np.nanmax(np.abs(parts["rest"])) > 0:
-        series.append(Series(parts["rest"], "rest length", OCHRE, prefer=0.8))
+        series.append(Series(parts["rest"], "rest length", SPRING_OCHRE, prefer=0.8))
     over = built.travel + built.origin
     diagram = Diagram(over, Scale("displacement", "length"), Scale("force added to the design's", "force"), series)
     return diagram_figure(Heading.from_result(result, "where the force comes from"), [diagram])
@@ -420,9 +434,13 @@ def manufacturing(result: Result) -> Figure:
     band, over = solution.band, solution.travel + solution.origin
     assert band is not None
     shown = solution.travel >= solution.corner_travel + 0.005 * solution.travel[-1]
-    lines = ((0.975, "97.5 % of the cams are below", VERMILLION), (0.5, "half", BLUE), (0.025, "2.5 %", VERMILLION))
+    lines = (
+        (0.975, "97.5 % of the cams are below", LINE_VERMILLION),
+        (0.5, "half", LINE_BLUE),
+        (0.025, "2.5 %", LINE_VERMILLION),
+    )
     series = [Series(band.quantile(share)[shown], name, color, prefer=0.7) for share, name, color in lines]
-    one = Series(band.forces[0][shown], "one of them", PURPLE, prefer=0.3)
+    one = Series(band.forces[0][shown], "one of them", LINE_PURPLE, prefer=0.3)
     scales = Scale("displacement", "length"), Scale("force without friction", "force", zero=False)
     diagram = Diagram(over[shown], *scales, [*series, one])
     median = 100 * float(np.median(band.deviations()))

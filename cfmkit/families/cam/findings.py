@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-FINDINGS = {
+CAM_FINDINGS = {
     "brace_too_short": "the roller's distance from the axis reaches the length of the brace",
     "path_vertical": "the profile is cut for so much friction that the path turns vertical within the stroke",
     "design_singular": "the profile is cut for so much friction on the way down that the path does not rise at its "
@@ -68,35 +68,35 @@ FINDINGS = {
     "no_spring_fits": "no spring of the catalogue meets the limits",
 }
 
-finding = finder(FINDINGS)
-"""Return a finding of this family; the name must be one that `FINDINGS` explains."""
+finding = finder(CAM_FINDINGS)
+"""Return a finding of this family; the name must be one that `CAM_FINDINGS` explains."""
 
 
-ROUNDING = 1e-9
+LIMIT_RTOL = 1e-9
 """A value that exceeds its limit by this share is on it: conversions of units and sums leave less."""
 
-SHORTER = 1e-12
+LENGTH_TOL = 1e-12
 """Springs shorter than at rest by less [m] are at rest: rounding of half widths of decimetres is smaller."""
 
 
 def yields(pressure: FloatArray | float, allowable: FloatArray | float) -> Any:
     """Return whether a contact pressure exceeds the one at which a material with an allowable stress first yields."""
-    return np.asarray(pressure > YIELD_PRESSURE * allowable * (1 + ROUNDING))
+    return np.asarray(pressure > YIELD_PRESSURE * allowable * (1 + LIMIT_RTOL))
 
 
 def sinks_first(dead_point: FloatArray | float, start: FloatArray | float, brace: FloatArray | float) -> Any:
     """Return whether the slider's dead point lies below its start [m], by more than rounding of the brace's length."""
-    return np.asarray(dead_point < start - ROUNDING * brace)
+    return np.asarray(dead_point < start - LIMIT_RTOL * brace)
 
 
 def is_slack(elongation: FloatArray) -> NDArray[np.bool_]:
     """Return where springs are shorter than at rest, from their elongation [m]."""
-    return np.asarray(elongation < -SHORTER)
+    return np.asarray(elongation < -LENGTH_TOL)
 
 
 def is_overstretched(longest: FloatArray | float, limit: float) -> Any:
     """Return whether springs are stretched beyond their limit [m]."""
-    return np.asarray(longest > limit * (1 + ROUNDING))
+    return np.asarray(longest > limit * (1 + LIMIT_RTOL))
 
 
 def find_overstress(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.contours import TOLERANCE, Arc
+from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.cam.bought_parts import springs_in_words
 from cfmkit.families.cam.outline import plate_contours
@@ -185,7 +185,7 @@ def _drawn_bodies(
     rollers, pins, radius = roller_path(solution), pin_path(solution), solution.assembly.spec.mechanism.roller_radius
     mirror = np.array([-1.0, 1.0])
     yield from (body for body in standing if body.name == "guide")
-    yield PosedBody.polygon("plate", "held", _plate(solution)[0].points(TOLERANCE))
+    yield PosedBody.polygon("plate", "held", _plate(solution)[0].points(OUTLINE_TOLERANCE))
     yield from (body for body in standing if body.name == "screw")
     yield PosedBody.line("spring", "free", np.stack([rollers, rollers * mirror], axis=1), 0.35 * width)
     for side in (np.ones(2), mirror):

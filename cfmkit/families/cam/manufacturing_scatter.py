@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cfmkit.numerics.rigid_point_registration import CurveFrame
 
 
-WAVES = 24
-PLACES = 1600
+N_WAVES = 24
+N_PLACES = 1600
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray,
     generator = np.random.default_rng(seed)
     flank = DesignFlank(assembly.profile, 1.0)
     arc = arc_lengths(flank)
-    places = np.linspace(0.0, float(arc[1][-1]), PLACES)
+    places = np.linspace(0.0, float(arc[1][-1]), N_PLACES)
     nominal = flank.frame(np.interp(places, arc[1], arc[0]))
     slider = assembly.track.start + travel
     loads = assembly.loads
@@ -110,11 +110,11 @@ def _draw_error(
 ) -> DrawnError:
     longest = float(places[-1])
     shortest = min(tolerance.wavelength, longest)
-    lengths = np.exp(generator.uniform(np.log(shortest), np.log(longest), WAVES))
+    lengths = np.exp(generator.uniform(np.log(shortest), np.log(longest), N_WAVES))
     return DrawnError(
-        tolerance.waviness * (2.0 / WAVES) ** 0.5,
+        tolerance.waviness * (2.0 / N_WAVES) ** 0.5,
         2.0 * np.pi / lengths,
-        generator.uniform(0.0, 2.0 * np.pi, WAVES),
+        generator.uniform(0.0, 2.0 * np.pi, N_WAVES),
         tolerance.offset * float(generator.normal()),
         tolerance.angle * float(generator.normal()),
         nominal,

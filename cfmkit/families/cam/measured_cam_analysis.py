@@ -39,7 +39,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     displacement_origin,
 )
 from cfmkit.families.cam.scalar_results import (
-    DEFINITIONS,
+    SCALAR_DEFINITIONS,
     curve_cut_for,
     design_values,
     largest,
@@ -59,7 +59,7 @@ from cfmkit.numerics.rigid_point_registration import (
     register,
     registered_where_it_is,
 )
-from cfmkit.numerics.smoothing_spline import smoothed
+from cfmkit.numerics.smoothing_spline import fit_smoothing_spline
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.units import window_places
@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-STRANGE = 0.01
+MAX_HEIGHT_DEVIATION = 0.01
 """Points are those of another part if they are off the design by this part of their height."""
 
 WIDTH_CERTAIN = 5.0
@@ -185,7 +185,7 @@ def _check_fit(found: Registration, name: str) -> None:
             )
     errors = np.concatenate([error[use] for error, use in zip(found.errors, found.used, strict=True)])
     height = max(float(np.ptp(points[:, 1])) for points in found.points)
-    if (rms := float(np.sqrt(np.mean(errors**2)))) > STRANGE * height:
+    if (rms := float(np.sqrt(np.mean(errors**2)))) > MAX_HEIGHT_DEVIATION * height:
         raise DataError(
             f"{name}: registered to the design, the points are still {mm(rms)} (rms) off it; is it the same cam?"
         )
@@ -351,7 +351,7 @@ def _values(built: Built) -> Mapping[str, Quantity]:
     }
     if built.assembly.spec.mechanism.contact:
         numbers["contact_pressure_max"] = largest(pressure_of(built, 1.0))
-    shared = quantities(DEFINITIONS, numbers)
+    shared = quantities(SCALAR_DEFINITIONS, numbers)
     return shared | dict(values_of_built(built))
 
 
@@ -383,10 +383,10 @@ def _curve(built: Built) -> Curve:
     return Curve(loop(built.travel) + built.origin, loop(up[0], down[0]), branch, stable, extra)
 
 
-STEP = 5e-5
+PLACE_STEP = 5e-5
 """Distance of the places that are computed [m]."""
 
-REACH = 2e-3
+CONTACT_REACH = 2e-3
 """How far along the flank, beside the place where the design touches, contact is sought [m]."""
 
 
@@ -429,7 +429,7 @@ def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noi
     along = np.interp(points, *arc)
     places, inverse, counts = np.unique(np.round(along, 9), return_inverse=True, return_counts=True)
     mean = np.bincount(inverse, errors) / counts
-    return BuiltFlank(design, smoothed(places, mean, noise), arc)
+    return BuiltFlank(design, fit_smoothing_spline(places, mean, noise), arc)
 
 
 def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) -> BuiltTrack:
@@ -443,7 +443,7 @@ def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) ->
         Of the parts built in [m].
     """
     low, high = flank.ends
-    places = np.linspace(low, high, max(int((high - low) / STEP), 50) + 1)
+    places = np.linspace(low, high, max(int((high - low) / PLACE_STEP), 50) + 1)
     base = flank.design.frame(np.interp(places, flank.arc[1], flank.arc[0]))
     centers = base.points + roller_radius * base.normals
     lift, contact = _lift(flank, places, (centers, base.normals), roller_radius)
@@ -462,7 +462,7 @@ def _lift(
     """Return how far the circle must move along the normal to cut the flank nowhere, and where it then touches."""
     centers, normals = nominal
     points = flank.frame(places).points
-    count, reach = len(places), max(int(REACH / (places[1] - places[0])), 2)
+    count, reach = len(places), max(int(CONTACT_REACH / (places[1] - places[0])), 2)
     best, where = np.full(count, -np.inf), np.zeros(count, dtype=int)
     for shift in range(-reach, reach + 1):
         other = np.clip(np.arange(count) + shift, 0, count - 1)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Result
 
-DEFINITIONS = {
+DEVIATION_DEFINITIONS = {
     "data_friction": (
         "ratio",
         "rolling friction whose loop has the measured area, over the displacements that are compared",
@@ -47,8 +47,8 @@ DEFINITIONS = {
     "data_unexplained": ("force", "root mean square of the remainder"),
 }
 
-_ROUNDS = 12
-_STEP = 1e-6
+_MAX_ROUNDS = 12
+_DIFFERENCE_STEP = 1e-6
 """Of friction, and of the rest half width [m], for derivatives."""
 
 
@@ -84,8 +84,8 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     }
     if not np.isfinite(list(numbers.values())).all():
         why = "no friction and rest length of this model give the measured loop"
-        return {name: Quantity(None, *DEFINITIONS[name], why) for name in DEFINITIONS}
-    return quantities(DEFINITIONS, numbers)
+        return {name: Quantity(None, *DEVIATION_DEFINITIONS[name], why) for name in DEVIATION_DEFINITIONS}
+    return quantities(DEVIATION_DEFINITIONS, numbers)
 
 
 def _sides(state: Built | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
@@ -105,11 +105,13 @@ def _explain_loop(sides: Sides, loads: Loads, loop: MeasuredLoop) -> tuple[float
     """Return the friction that has the measured area, and the rest half width [m] that has the measured midline."""
     friction, rest = 0.0, loads.rest_half_width
     area, middle = np.trapezoid(loop.up - loop.down, loop.places), 0.5 * (loop.up + loop.down)
-    for _ in range(_ROUNDS):
-        size = friction or _STEP
+    for _ in range(_MAX_ROUNDS):
+        size = friction or _DIFFERENCE_STEP
         up, down = (sides.forces(loads, way * size, rest)[0] for way in (1.0, -1.0))
         new = float(size * area / np.trapezoid(up - down, loop.places))
-        slope = (_middle(sides, loads, new, rest + _STEP) - _middle(sides, loads, new, rest)) / _STEP
+        slope = (
+            _middle(sides, loads, new, rest + _DIFFERENCE_STEP) - _middle(sides, loads, new, rest)
+        ) / _DIFFERENCE_STEP
         step = float(slope @ (middle - _middle(sides, loads, new, rest)) / (slope @ slope))
         done = abs(new - friction) <= 1e-12 and abs(step) <= 1e-12
         friction, rest = new, rest + step

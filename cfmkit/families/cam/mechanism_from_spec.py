@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.assembly import CLOSE, Assembly
+from cfmkit.families.cam.assembly import TRAVEL_RTOL, Assembly
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import CAMS_KEPT, RollerPath, reached_path
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
+from cfmkit.families.cam.statics import STANDARD_GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm
 from cfmkit.families.guide_friction import GuideFriction
@@ -107,7 +107,7 @@ def hanging_weights(masses: Masses | None) -> tuple[float, float]:
 
 def weights(slider: Real, brace: Real, roller: Real) -> tuple[Real, Real]:
     """Return the weights that hang on one roller and on the slider [N] from the masses of the parts [kg]."""
-    return GRAVITY * (roller + 0.5 * brace), GRAVITY * (slider + brace)
+    return STANDARD_GRAVITY * (roller + 0.5 * brace), STANDARD_GRAVITY * (slider + brace)
 
 
 class Weights(NamedTuple):
@@ -253,7 +253,7 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
 
 def _shortfall(law: SlopeLaw, stroke: float, end: float, reached: float) -> Finding | None:
     """Return why the profile ends at x = `end` after `reached`, and not at `stroke` [m]; None if it does not."""
-    if reached >= stroke * (1 - CLOSE):
+    if reached >= stroke * (1 - TRAVEL_RTOL):
         return None
     ends = f"the stroke ends at {mm(reached)} of {mm(stroke)}"
     if turns_vertical(law, end):
@@ -284,7 +284,7 @@ def _shortfall(law: SlopeLaw, stroke: float, end: float, reached: float) -> Find
 
 def turns_vertical(law: SlopeLaw, end: float) -> bool:
     """Return whether a path that ends at an x [m] does so because it turns vertical there."""
-    return law.vertical_at < law.brace_length and end >= law.vertical_at * (1 - CLOSE)
+    return law.vertical_at < law.brace_length and end >= law.vertical_at * (1 - TRAVEL_RTOL)
 
 
 @lru_cache(maxsize=CAMS_KEPT)

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.arrays import LazySequence
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import Problem, SpecError
-from cfmkit.families.cam.assembly import CLOSE, Assembly, target_force
+from cfmkit.families.cam.assembly import TRAVEL_RTOL, Assembly, target_force
 from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, left_out, rules_of
@@ -32,7 +32,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     check_springs,
     displacement_origin,
 )
-from cfmkit.families.cam.scalar_results import QUANTITIES, contact_pressure, curve_cut_for
+from cfmkit.families.cam.scalar_results import SCALAR_QUANTITIES, contact_pressure, curve_cut_for
 from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
     from cfmkit.stock.parts_list import ListedPart
 
-UNLIKE = (
+UNEQUAL_SIDES_MESSAGE = (
     "the quasi-static model is symmetric and would give the force of two right sides: add 'analysis.dynamics' with a "
     "slow motion, or accept that with analysis.fidelity: quasi-static"
 )
@@ -83,7 +83,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         return analyze_built(spec)
     left = spec.mechanism.left
     if left is not None and left.moves_differently and spec.analysis.fidelity is None:
-        raise SpecError([Problem("", 0, 0, "mechanism.left", UNLIKE)])
+        raise SpecError([Problem("", 0, 0, "mechanism.left", UNEQUAL_SIDES_MESSAGE)])
     try:
         assembly = assemble(spec)
         check_first_pose(assembly)
@@ -105,7 +105,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         status=status,
         message=message,
         curves=(_curve(solution),),
-        values=values_of_one(QUANTITIES, solution) | smallest(solution),
+        values=values_of_one(SCALAR_QUANTITIES, solution) | smallest(solution),
         warnings=LazySequence(partial(_findings, solution, short)),
         travel=(
             solution.origin + float(solution.travel[0]),
@@ -211,8 +211,8 @@ def shortfalls(assembly: Assembly, reached: float) -> tuple[Finding, ...]:
     """Return why the curve ends, at a travel [m], before what was requested, or before the flank does."""
     found = [assembly.shortfall] if assembly.shortfall else []
     asked = assembly.spec.analysis.travel
-    short = asked is not None and reached < asked * (1 - CLOSE)
-    if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + CLOSE):
+    short = asked is not None and reached < asked * (1 - TRAVEL_RTOL)
+    if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
         found.append(
             finding(
                 "end_stop",

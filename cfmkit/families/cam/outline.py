@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import (
-    TOLERANCE,
+    OUTLINE_TOLERANCE,
     Arc,
     Contour,
     Curve2D,
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     Profiles = tuple[CamProfile, CamProfile]
     """The right flank and the left one, each as it would be on the right."""
 
-POINTS = 1201
+N_OUTLINE_POINTS = 1201
 TAB_CLEARANCE = 0.25
 """Space left between the tab and a roller, in roller radii."""
 
 
-def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
+def drawing(spec: CamSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the plate, the roller paths and their point tables of a cam specification.
 
     Raises
@@ -115,7 +115,7 @@ def _coordinates(profile: CamProfile, start: float) -> FloatArray:
     Equal shares of length and of turning lie between neighbours: a path that is nearly
     vertical at its end, or turns within its first micrometres, is followed as well.
     """
-    share = np.linspace(0.0, 1.0, POINTS)
+    share = np.linspace(0.0, 1.0, N_OUTLINE_POINTS)
     ends = np.concatenate([share**4, 1.0 - share**4, 0.3 * share + 0.7 * share**2])
     fine = np.unique(start + (profile.end - start) * ends)
     slope = profile.path.law.slope(fine)
@@ -123,7 +123,7 @@ def _coordinates(profile: CamProfile, start: float) -> FloatArray:
     measure = np.zeros_like(fine)
     for grown in (steps, np.abs(np.diff(np.arctan(slope))), np.diff(fine)):
         measure[1:] += np.cumsum(grown) / max(float(np.sum(grown)), 1e-300)
-    spread: FloatArray = np.interp(np.linspace(0.0, measure[-1], POINTS), measure, fine)
+    spread: FloatArray = np.interp(np.linspace(0.0, measure[-1], N_OUTLINE_POINTS), measure, fine)
     return spread
 
 

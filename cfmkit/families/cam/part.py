@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 
-SLENDER = 0.2
+MIN_ASPECT_RATIO = 0.2
 """A picture of the mechanism is at least this fraction of its height wide to each side: words need room."""
 
 
@@ -126,7 +126,7 @@ def scene(solution: Solution) -> Scene:
     """Return the parts that do not move, and what the mechanism sweeps over the whole solution."""
     (_, bottom), (across, top) = box(bodies(solution)).tolist()
     height = top - bottom
-    half = max(1.06 * across, SLENDER * height)
+    half = max(1.06 * across, MIN_ASPECT_RATIO * height)
     view = (-half, bottom - 0.03 * height, half, top + 0.14 * height)
     return Scene(polygons(_plate(solution), "cut"), surface(solution), roller_path(solution), view)
 

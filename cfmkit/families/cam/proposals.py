@@ -34,26 +34,26 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.families.suggestion_request import Request
 
-FRICTION = 0.002
+ROLLING_FRICTION = 0.002
 """Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
 
-SLIDING = 0.1
+SLIDING_FRICTION = 0.1
 """Friction of the plain slider pin, of the springs' hooks and of the guide where none is stated and hysteresis is
 required: greased steel; assumed."""
 
 PIN_SHARE = 0.25
 """Diameter of the slider pin and of the pins that springs hook on, over that of a roller: assumed."""
 
-DRAWN = 60_000
+N_PROPORTIONS = 60_000
 """Proportions that are looked at."""
 
-OFFERED = 16
+MAX_PROPOSALS = 16
 """Designs that are worth trying."""
 
-TAB, TOP, HOLE = 0.06, 0.02, 0.0066
+TAB_HEIGHT_RATIO, TOP_MARGIN_RATIO, MAX_HOLE_DIAMETER = 0.06, 0.02, 0.0066
 """Height of the plate's tab and of its margin above the flanks over that of the envelope; largest fixing hole [m]."""
 
-PLATE_MIN, LOAD = 0.002, 4.5
+PLATE_MIN, CONTACT_LIMITS = 0.002, 4.5
 """Thinnest plate [m]; largest force between roller and cam over the mechanism's, as in [SS]'s, where it is 4.1."""
 
 ROLLER_MIN = 0.0015
@@ -62,14 +62,14 @@ ROLLER_MIN = 0.0015
 SHAFT_ARM = 0.004
 """About how far from the braces a roller presses on its shaft [m]: half of a plate of 5 mm and of a brace."""
 
-COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
+SPRING_COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
 """Numbers of springs that are tried."""
 
 SPARE_SHARE, SPARE_LENGTH = 0.03, 0.3e-3
 """Of the travel, and [m]: beyond the window where made parts have to be good; holes that lie 0.05 mm off move the end
 of the travel by a few times as much."""
 
-RESERVE, FLAT_RESERVE = 0.97, 0.9
+RESERVE_SHARES, FLAT_RESERVE = 0.97, 0.9
 """Shares of envelope and ripple that closed forms may use: they leave out the plate's margins, and friction squared."""
 
 
@@ -79,7 +79,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
         return FamilyOffer(reason="a cam with rollers gives a force at its slider, no torque")
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a cam is fixed by its springs and cannot be adjusted")
-    draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
+    draw = np.random.default_rng(run.seed).uniform(size=(N_PROPORTIONS, 5)).T
     found = _size_proportions(request, draw)
     fitting = found["fits"] & found["flat"] & found["lossless"]
     if not fitting.any():
@@ -89,7 +89,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     for index in chosen:
         made = _candidate(request, {name: float(values[index]) for name, values in found.items()})
         candidates += [made, _from_catalogue(made)] if made else []
-        if len(candidates) >= OFFERED:
+        if len(candidates) >= MAX_PROPOSALS:
             break
     if not candidates:
         depth = "" if request.depth is None else f" within a depth of {mm(request.depth)}"
@@ -115,13 +115,13 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
         stretch = np.sqrt(2.0 * constant * places)
         x = start + stretch
         slope = stretch / constant + x / np.sqrt(brace**2 - x**2)
-        loss = FRICTION * (1.0 + slope**2) * constant / stretch
+        loss = ROLLING_FRICTION * (1.0 + slope**2) * constant / stretch
         ripple = 1.0 - (1.0 + loss.min(axis=0)) / (1.0 + loss.max(axis=0))
         down = 1.0 - (1.0 - loss.max(axis=0)) / (1.0 - loss.min(axis=0))
-    tab = TAB * along
+    tab = TAB_HEIGHT_RATIO * along
     width = 2.0 * (end + roller)
     height = stroke + rise + roller + np.maximum(roller, tab)
-    shaft = np.cbrt(32.0 * LOAD * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
+    shaft = np.cbrt(32.0 * CONTACT_LIMITS * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
     least = max(ROLLER_MIN, 0.5 * float(shaft) / SHAFT_IN_ROLLER)
     there = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
     ripple = np.where(there, np.maximum(ripple, down), np.inf)
@@ -130,9 +130,9 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
         "brace": brace, "start": start, "constant": constant, "roller": roller, "run_in": run_in, "end": end,
         "width": width, "height": height, "ripple": ripple, "hysteresis": hysteresis, "loss": loss.mean(axis=0),
         "there": there,
-        "fits": there & (width < RESERVE * across) & (height < RESERVE * along),
+        "fits": there & (width < RESERVE_SHARES * across) & (height < RESERVE_SHARES * along),
         "flat": there & (ripple < FLAT_RESERVE * request.ripple) & (loss.max(axis=0) < 0.2),
-        "lossless": there & (hysteresis < RESERVE * (request.hysteresis or np.inf)),
+        "lossless": there & (hysteresis < RESERVE_SHARES * (request.hysteresis or np.inf)),
     }  # fmt: skip
 
 
@@ -161,9 +161,9 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
             continue
         modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
         bearable = YIELD_PRESSURE * material.yield_strength / request.safety
-        thick = max(PLATE_MIN, 1.1 * LOAD * request.target * modulus / (np.pi * size["roller"] * bearable**2))
+        thick = max(PLATE_MIN, 1.1 * CONTACT_LIMITS * request.target * modulus / (np.pi * size["roller"] * bearable**2))
         depths = {}
-        for count in COUNTS:
+        for count in SPRING_COUNTS:
             springs = Springs(stiffness=total / count, count=count)
             depth = depth_of(thick, springs, stretch, size["start"])
             if depth is not None and depth <= (request.depth or sum(request.envelope)):
@@ -218,19 +218,19 @@ def _write_candidate(
         "rest_half_width": size["start"],
         "roller_radius": size["roller"],
         "springs": {"stiffness": total / count, "count": count},
-        "rolling_friction": FRICTION,
+        "rolling_friction": ROLLING_FRICTION,
         "profile": {"force_constant": size["constant"], "stroke": longer},
         "plate": {
-            "base_height": TAB * along,
-            "top_margin": min(TOP * along, 0.5 * size["roller"]),
-            "hole_diameter": min(HOLE, 0.4 * TAB * along),
+            "base_height": TAB_HEIGHT_RATIO * along,
+            "top_margin": min(TOP_MARGIN_RATIO * along, 0.5 * size["roller"]),
+            "hole_diameter": min(MAX_HOLE_DIAMETER, 0.4 * TAB_HEIGHT_RATIO * along),
         },
         "contact": {"width": thick, "material": material},
     }
     if request.hysteresis is not None:
         mechanism |= {
-            "pins": {"diameter": PIN_SHARE * 2.0 * size["roller"], "friction": SLIDING},
-            "guide": {"friction": SLIDING},
+            "pins": {"diameter": PIN_SHARE * 2.0 * size["roller"], "friction": SLIDING_FRICTION},
+            "guide": {"friction": SLIDING_FRICTION},
         }
     data = {
         "family": "cam",
@@ -254,7 +254,8 @@ def _explain_no_offer(request: Request, found: dict[str, Any]) -> FamilyOffer:
     if not flat.any():
         return FamilyOffer(reason="with the friction of the rollers, ripple or loss is larger than required")
     scale = (
-        np.maximum(found["width"] / request.envelope[0], found["height"] / request.envelope[1])[flat].min() / RESERVE
+        np.maximum(found["width"] / request.envelope[0], found["height"] / request.envelope[1])[flat].min()
+        / RESERVE_SHARES
     )
     need = " x ".join(mm(side * float(scale)) for side in request.envelope[:2])
     return FamilyOffer(reason=f"the rollers, the braces and the slider's travel need an envelope of about {need}")

@@ -28,7 +28,7 @@ def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
     return found
 
 
-PLACES = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.roller_radius"
+PLACE_KEYS = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.roller_radius"
 """Holes of the braces and the slider, and the contour: one that lies farther out by e meets a roller larger by e."""
 
 
@@ -37,4 +37,4 @@ def errors(spec: CamSpec) -> dict[str, str]:
     rate = spec.mechanism.springs.stiffness
     listed = [f".{number}" for number in range(len(rate))] if isinstance(rate, tuple) else [""]
     rates = {f"mechanism.springs.stiffness{item}": "rate" for item in listed}
-    return dict.fromkeys(PLACES, "position") | rates | {"mechanism.rolling_friction": "friction"}
+    return dict.fromkeys(PLACE_KEYS, "position") | rates | {"mechanism.rolling_friction": "friction"}

@@ -79,7 +79,7 @@ BUILT_DEFINITIONS = {
     ),
 }
 
-KINDS = {
+FRICTION_KINDS = {
     "rolling": "rolling on the cam dissipates",
     "bearings": "the rollers' bearings dissipate",
     "pins": "slider pin and spring hooks dissipate",
@@ -87,7 +87,7 @@ KINDS = {
 }
 """Of friction, and what each does."""
 
-DEFINITIONS = {
+SCALAR_DEFINITIONS = {
     "force_constant": ("length", "A of the cut profile; the force is 4 K A [SS, eq. 1]"),
     "spring_stiffness": ("stiffness", "K, the sum of all parallel springs"),
     "theoretical_force": (
@@ -130,7 +130,7 @@ DEFINITIONS = {
                 else f"share of the loop's area that {words}"
             ),
         )
-        for kind, words in KINDS.items()
+        for kind, words in FRICTION_KINDS.items()
         for what in ("energy", "share")
     },
     "contact_force_least": (
@@ -355,7 +355,7 @@ def _least_contact(solution: Solution) -> FloatArray:
     return -largest_of_each(*(-one[..., 1:] for one in both if one is not None))
 
 
-_FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution], bool] | None]] = {
+_SCALAR_FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution], bool] | None]] = {
     "force_constant": (lambda one: one.assembly.profile.path.law.force_constant, None),
     "spring_stiffness": (lambda one: one.assembly.loads.stiffness, None),
     "theoretical_force": (lambda one: constant_force(one.assembly), None),
@@ -373,8 +373,8 @@ _FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution], bool
     ),
     "friction_half_gap_max": (lambda one: one.flank.half_gap, None),
     "contact_pressure_max": (lambda one: one.flank.largest_pressure[0], _is_in_contact),
-    **{f"loop_energy_{kind}": (partial(_loop_energy, kind=kind), _rubs) for kind in KINDS},
-    **{f"loop_share_{kind}": (partial(_loop_share, kind=kind), _rubs) for kind in KINDS},
+    **{f"loop_energy_{kind}": (partial(_loop_energy, kind=kind), _rubs) for kind in FRICTION_KINDS},
+    **{f"loop_share_{kind}": (partial(_loop_share, kind=kind), _rubs) for kind in FRICTION_KINDS},
     "bearing_load_max": (_bearing_load, _has_bearings),
     "bearing_static_safety": (
         lambda one: one.mechanism.bearings.static_rating / _bearing_load(one),
@@ -393,22 +393,22 @@ _FUNCTIONS: dict[str, tuple[Callable[[Solution], Any], Callable[[Solution], bool
     "manufacturing_force_share_95": (_deviations(0.95), lambda one: one.band is not None),
 }
 
-QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{
-        name: ScalarQuantity(*DEFINITIONS[name], function, "", applies)
-        for name, (function, applies) in _FUNCTIONS.items()
+        name: ScalarQuantity(*SCALAR_DEFINITIONS[name], function, "", applies)
+        for name, (function, applies) in _SCALAR_FUNCTIONS.items()
     },
     **{name: _wire(name) for name in WIRE_DEFINITIONS},
 }
 """Every scalar result of a quasi-static cam as designed, in the order in which they are shown."""
 
-_OTHERS: dict[str, ScalarQuantity[Solution]] = {
+_OTHER_QUANTITIES: dict[str, ScalarQuantity[Solution]] = {
     name: ScalarQuantity(*about, lambda _solution: np.nan, applies=lambda _solution: False)
-    for name, about in DEFINITIONS.items()
-    if name not in QUANTITIES
+    for name, about in SCALAR_DEFINITIONS.items()
+    if name not in SCALAR_QUANTITIES
 }
 
-COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {**QUANTITIES, **_OTHERS}
+ROW_COLUMNS: Mapping[str, ScalarQuantity[Solution]] = {**SCALAR_QUANTITIES, **_OTHER_QUANTITIES}
 """What studies may ask of rows: of values that only motions and measured cams have their cells are empty."""
 
 

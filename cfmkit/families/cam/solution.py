@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
-from cfmkit.families.cam.assembly import CLOSE, constant_force
+from cfmkit.families.cam.assembly import TRAVEL_RTOL, constant_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.assembly import Assembly
 
 
-FEW = 100
+FEW_SAMPLES = 100
 """Of fewer samples than these all are looked at for jams; of more, only places between which a jam may begin."""
 
 ON_CORNER = np.linspace(0.0, 1.0, 34)[1:]
@@ -188,7 +188,7 @@ class Solution(ShortRepr):
         found: list[tuple[tuple[float, float], ...]] = [()] * self.count
         if not np.any(friction) and losses is None:
             return found
-        is_looked_at = np.isnan(self.up.slider).any(axis=-1) | (self.travel.shape[-1] < FEW)
+        is_looked_at = np.isnan(self.up.slider).any(axis=-1) | (self.travel.shape[-1] < FEW_SAMPLES)
         is_looked_at = np.broadcast_to(is_looked_at, self.count)
         total = self.column(self.travel[..., -1:])
         for states, some in ((None, ~is_looked_at), (self.states, is_looked_at)):
@@ -238,7 +238,7 @@ class Solution(ShortRepr):
         if analysis.travel is not None:
             return analysis.travel
         # the whole stroke but for rounding is the stroke: shares of the travel are then the same places in every run
-        is_whole = np.abs(last - stroke) <= CLOSE * np.maximum(np.abs(last), np.abs(stroke))
+        is_whole = np.abs(last - stroke) <= TRAVEL_RTOL * np.maximum(np.abs(last), np.abs(stroke))
         found = np.where(is_whole, stroke, last)
         return found if self.count > 1 else float(found[0])
 
@@ -258,11 +258,11 @@ class Solution(ShortRepr):
 
     def effort(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the force on the way up or down at displacements of each mechanism, or of some, (k, n) [N]."""
-        return self.evaluate_places(places, WAYS[branch], rows)[1].slider
+        return self.evaluate_places(places, BRANCH_DIRECTIONS[branch], rows)[1].slider
 
     def stress(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the stress below the contact at displacements, likewise [Pa]; NaN on the corner."""
-        states, found = self.evaluate_places(places, WAYS[branch], rows)
+        states, found = self.evaluate_places(places, BRANCH_DIRECTIONS[branch], rows)
         return stress(flank_pressure(self.assembly, states, found.contact, rows))
 
     def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
@@ -321,10 +321,10 @@ class Solution(ShortRepr):
             curve = self.branches[name].samples
             return [RowSamples(curve.motion, values, curve.count)]
 
-        def at(places: FloatArray, rows: Any) -> FloatArray:
+        def evaluate(places: FloatArray, rows: Any) -> FloatArray:
             return np.broadcast_to(self.stress(name, places, rows), places.shape)
 
-        return StressRows(read, at, self.column(np.nan if allowable is None else allowable))
+        return StressRows(read, evaluate, self.column(np.nan if allowable is None else allowable))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -401,11 +401,11 @@ def _clip_intervals(jams: tuple[tuple[float, float], ...], end: float) -> tuple[
     return tuple((max(low, 0.0), min(high, end)) for low, high in jams if low < end)
 
 
-WAYS = {"load": 1.0, "unload": -1.0}
+BRANCH_DIRECTIONS = {"load": 1.0, "unload": -1.0}
 """Up and down, by branch."""
 
 
-_SHARES = np.concatenate(
+_TRAVEL_SHARES = np.concatenate(
     [np.geomspace(1e-14, 1e-4, 51), np.linspace(0.0, 1.0, 181) ** 2, 1.0 - np.geomspace(1e-9, 0.03, 24)]
 )
 """Shares of the travel at which the force is looked at.
@@ -415,7 +415,7 @@ there, at even steps of the springs' stretch beyond, and close together before t
 horizontal.
 """
 
-_SORTED = np.sort(_SHARES)
+_SORTED_SHARES = np.sort(_TRAVEL_SHARES)
 _ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0, 61)])
 """The same on a corner, where it rises within a tenth of a millimetre."""
 
@@ -429,9 +429,9 @@ def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
         Travel of each cam, and that at which its roller leaves the corner; 0 without one [m].
     """
     if not corner.any():
-        return np.asarray(total[:, None] * _SORTED)
+        return np.asarray(total[:, None] * _SORTED_SHARES)
     on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER
-    return np.sort(np.concatenate([total[:, None] * _SHARES, on_corner], axis=1), axis=1)
+    return np.sort(np.concatenate([total[:, None] * _TRAVEL_SHARES, on_corner], axis=1), axis=1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -130,7 +130,7 @@ class Bearings(Model):
     name: str | None = Field(None, min_length=1, description="designation, for the parts list")
 
 
-MOUNTINGS = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
+MOUNTING_ANGLES = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
 
 
 class Mounting(Model):
@@ -152,9 +152,9 @@ def _mounting(value: Any) -> Any:
     """Return a word or an angle as the block that it is short for."""
     if isinstance(value, str):
         word = str(value).strip()
-        if word.isalpha() and word not in MOUNTINGS:
-            raise ValueError(f"{word!r} is not one of {', '.join(MOUNTINGS)}, nor an angle such as '30 deg'")
-        return {"elevation": MOUNTINGS.get(word, value)}
+        if word.isalpha() and word not in MOUNTING_ANGLES:
+            raise ValueError(f"{word!r} is not one of {', '.join(MOUNTING_ANGLES)}, nor an angle such as '30 deg'")
+        return {"elevation": MOUNTING_ANGLES.get(word, value)}
     return value
 
 

@@ -36,7 +36,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
-from cfmkit.families.guide_friction import FREE, GuideFriction
+from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import rows_of
 from cfmkit.numerics.where_condition_ends import last_places
 
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     Interval = tuple[float, float]
 
-GRAVITY = 9.80665
+STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, exact by definition (3rd CGPM, 1901) [m/s^2]."""
 
 JAM_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.geomspace(1e-6, 0.1, 20)]))
@@ -67,7 +67,7 @@ class Losses:
     # bearing, pin: friction couple per load of a roller's bearing, and of a pin (slider pin, spring hook): mu d/2 [m]
     bearing: float = 0.0
     pin: float = 0.0
-    guide: GuideFriction = FREE  # of the slider
+    guide: GuideFriction = FRICTIONLESS_GUIDE  # of the slider
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,8 @@ def check_target(target: CamDesign) -> None:
         raise Infeasible(
             finding(
                 "target_curve",
-                f"the target curve is {newton(float(curve.evaluate(at)))} at {mm(float(at))}: a cam holds up a force, which "
+                f"the target curve is {newton(float(curve.evaluate(at)))} at {mm(float(at))}: a cam holds "
+                f"up a force, which "
                 "must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
                 "do not have ('design.target')",
             )

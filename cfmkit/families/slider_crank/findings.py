@@ -9,7 +9,7 @@ from __future__ import annotations
 from cfmkit.families.end_stops import FINDINGS as ON_STOPS
 from cfmkit.families.findings import finder
 
-FINDINGS = {
+SLIDER_CRANK_FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the guide of the slider, or not in the unloaded position",
     "coupler_dead_point": "the motion ends where the coupler is perpendicular to the slider's path",
     "no_full_turn": "a full turn is requested, but the crank cannot make one",
@@ -65,5 +65,5 @@ FINDINGS = {
     "target_unreachable": "the target force cannot be reached within the given ranges",
 }
 
-finding = finder(FINDINGS)
-"""Return a finding of this family; the name must be one that `FINDINGS` explains."""
+finding = finder(SLIDER_CRANK_FINDINGS)
+"""Return a finding of this family; the name must be one that `SLIDER_CRANK_FINDINGS` explains."""

@@ -18,22 +18,22 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
-PLACES = 91
+N_MOTION_PLACES = 91
 """Places of the motion that are looked at for the largest effort."""
 
-FITTED = 49
+N_FITTED_PLACES = 49
 """Places of a window at which rates are fitted."""
 
-WINDOWS, NEARER = 21, 9
+N_WINDOWS, N_NEIGHBOUR_WINDOWS = 21, 9
 """Windows of the whole motion that are compared; and of those between the neighbours of the best."""
 
-SHARES = (0.5, 0.3, 0.7)
+PIVOT_ENVELOPE_SHARES = (0.5, 0.3, 0.7)
 """Of the room for springs on both sides of the links, what the pivot's has: the others are on the other side."""
 
-STILL = 1e-9
+TRAVEL_RTOL = 1e-9
 """Travels below this share of the slider's travel count as zero."""
 
-RESERVE = 0.999
+RATE_SHARE = 0.999
 """Share of the largest rate that is used: it is known to a few digits."""
 
 
@@ -60,7 +60,7 @@ class SprungMotion:
         """Room out of the plane that the pivot's spring and the others may have [m], as it may be shared."""
         if not self.shared:
             return ((self.deep, self.deep),)
-        return tuple((share * self.deep, (1.0 - share) * self.deep) for share in SHARES)
+        return tuple((share * self.deep, (1.0 - share) * self.deep) for share in PIVOT_ENVELOPE_SHARES)
 
     def largest_rates(self, places: FloatArray, since: int = 0) -> FloatArray:
         """Return the largest rates of springs that bear the motion up to each place [N m/rad, the last N/m].
@@ -81,7 +81,7 @@ class SprungMotion:
         """
         units = self.assembly.units(places)
         turns = np.maximum.accumulate(np.abs(units.turn), axis=1)
-        pushed = (np.minimum.accumulate(units.turn[3]) < -STILL * turns[3])[since:]
+        pushed = (np.minimum.accumulate(units.turn[3]) < -TRAVEL_RTOL * turns[3])[since:]
         rest, turns = float(units.position[0]), turns[:, since:]
         deep = np.array([(below, above, above) for below, above in self.depths])[:, :, None]
         # all depths in one call: there are few places, and a call takes longer than they do
@@ -110,7 +110,7 @@ def largest_effort(motion: SprungMotion) -> float:
     """
     if not motion.goes_so_far:
         return 0.0
-    places = np.linspace(motion.assembly.start, motion.high, PLACES)
+    places = np.linspace(motion.assembly.start, motion.high, N_MOTION_PLACES)
     first = int(np.searchsorted(places, motion.low))
     window = int(motion.length / (places[1] - places[0]))
     rates = motion.largest_rates(places, first + window)
@@ -129,11 +129,11 @@ def flattest_springs(motion: SprungMotion, effort: float, flat: float) -> HeldEf
     if not motion.goes_so_far:
         return None
     first, last = motion.low, max(motion.high - motion.length, motion.low)
-    best = _best_of(motion, effort, np.linspace(first, last, WINDOWS))
+    best = _best_of(motion, effort, np.linspace(first, last, N_WINDOWS))
     if best is None:
         return None
-    step = (last - first) / (WINDOWS - 1)
-    nearer = np.linspace(max(first, best.begin - step), min(last, best.begin + step), NEARER)
+    step = (last - first) / (N_WINDOWS - 1)
+    nearer = np.linspace(max(first, best.begin - step), min(last, best.begin + step), N_NEIGHBOUR_WINDOWS)
     found = best if last == first else _best_of(motion, effort, nearer) or best
     return _of_fewer(motion, effort, min(best, found, key=lambda one: one.deviation), flat)
 
@@ -141,8 +141,8 @@ def flattest_springs(motion: SprungMotion, effort: float, flat: float) -> HeldEf
 def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEffort | None:
     """Return the best springs of the best of some windows, by where they begin; None if there are none."""
     ends = begins + motion.length
-    places = np.unique([*np.linspace(motion.assembly.start, ends[-1], PLACES), *ends])
-    largest = RESERVE * motion.largest_rates(places)[:, :, np.searchsorted(places, ends)]
+    places = np.unique([*np.linspace(motion.assembly.start, ends[-1], N_MOTION_PLACES), *ends])
+    largest = RATE_SHARE * motion.largest_rates(places)[:, :, np.searchsorted(places, ends)]
     found = [
         one
         for k, begin in enumerate(begins.tolist())
@@ -164,7 +164,7 @@ def _of_fewer(motion: SprungMotion, effort: float, best: HeldEffort, flat: float
 
 
 def _window(motion: SprungMotion, begin: float) -> FloatArray:
-    return np.linspace(begin, begin + motion.length, FITTED)
+    return np.linspace(begin, begin + motion.length, N_FITTED_PLACES)
 
 
 def _fit_window(motion: SprungMotion, effort: float, begin: float, upper: FloatArray) -> HeldEffort | None:
@@ -172,6 +172,6 @@ def _fit_window(motion: SprungMotion, effort: float, begin: float, upper: FloatA
     units = motion.assembly.forces(_window(motion, begin))
     if not np.isfinite(units).all() or not upper.any():
         return None
-    goal = RateGoal(units.T / effort, np.ones(FITTED), upper)
+    goal = RateGoal(units.T / effort, np.ones(N_FITTED_PLACES), upper)
     rates = minimax(goal)
     return None if rates is None or not rates.any() else HeldEffort(begin, rates, upper, goal.deviation(rates))

@@ -19,7 +19,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-STRETCHED = 1e-12
+STRETCHED_ANGLE_TOL = 1e-12
 """An unloaded position so near to the stretched one [rad] is the stretched one."""
 
 
@@ -87,14 +87,14 @@ class Linkage:
         place, half = self.branch * float(self.slider_position(np.asarray(angle))), 0.5 * self.knee(angle)
         square, far = 4.0 * self.crank * self.coupler, self.stretched_position
 
-        def to(end: float) -> float:
+        def measure_distance(end: float) -> float:
             if end * place <= 0.0:
                 return abs(end - place)
             share = math.sin(half) if abs(end) == far else math.cos(half)
             return square * share**2 / abs(end + place)
 
         low, high = self.way(angle)
-        return to(low), to(high)
+        return measure_distance(low), measure_distance(high)
 
     def arc(self, angle: float) -> tuple[float, float]:
         """Return the ends of the crank angles that can be reached from `angle` [rad]; infinite for a full turn.
@@ -133,10 +133,10 @@ class Linkage:
 
     def knee(self, angle: float) -> float:
         """Return the angle from the coupler's direction to the crank's [rad]: 0 where stretched, pi where folded."""
-        if abs(math.remainder(angle - self.stretched_angle, 2.0 * math.pi)) <= STRETCHED:
+        if abs(math.remainder(angle - self.stretched_angle, 2.0 * math.pi)) <= STRETCHED_ANGLE_TOL:
             return 0.0
         folded = self.folded_angle
-        if folded is not None and abs(math.remainder(angle - folded, 2.0 * math.pi)) <= STRETCHED:
+        if folded is not None and abs(math.remainder(angle - folded, 2.0 * math.pi)) <= STRETCHED_ANGLE_TOL:
             return math.pi
         return math.remainder(angle - float(self.coupler_angle(np.asarray(angle))), 2.0 * math.pi)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import TOLERANCE, Arc, Line, Smooth, polygons
+from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc, Line, Smooth, polygons
 from cfmkit.families.base import function_named
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
+def drawing(spec: SliderCrankSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the outlines of one leg as the fidelity has it: of straight edges and arcs, exact.
 
     Raises

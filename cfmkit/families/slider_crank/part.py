@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.export.contours import TOLERANCE
+from cfmkit.export.contours import OUTLINE_TOLERANCE
 from cfmkit.export.posed_part import PosedBody
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
@@ -34,5 +34,5 @@ def part_over_motion(result: Result) -> PosedPart | None:
     if spec.built_as == "springs":
         return found
     cut = (one for one in drawing(spec).contours if one.layer == "cut" and not one.hole)
-    as_cut = (PosedBody.polygon("as cut", "free", one.points(TOLERANCE)) for one in cut)
+    as_cut = (PosedBody.polygon("as cut", "free", one.points(OUTLINE_TOLERANCE)) for one in cut)
     return replace(found, bodies=(*as_cut, *found.bodies))

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.families.findings import mm
 from cfmkit.families.flattest_window import flattest
 from cfmkit.families.slider_crank.printed.outline import drawing
-from cfmkit.families.slider_crank.printed.part import PAD
+from cfmkit.families.slider_crank.printed.part import PAD_SIZE
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.sprung_linkage_proposals import (
@@ -41,20 +41,20 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
 
 
-PUSHED = (
+PUSHED_PROPORTIONS = (
     Proportions(100.0 / 54.0, 60.0 / 54.0, 0.542, 38.0 / 54.0),  # Bilancia, Geraci, Berselli 2019
     Proportions(1.6, 1.0, 0.56, 0.8),
     Proportions(2.4, 1.1, 0.43, 0.6),
 )
 """For a force at the slider: the published lengths, and two linkages beside them, shorter and longer."""
 
-STARTS = (0.04, 0.1)
+START_SHARES = (0.04, 0.1)
 """Where the travel begins, over its length: before that the force of an elastic part comes up from zero."""
 
 EARLIEST_START, LATE_START = 0.026, 0.35
 """The same of a travel nearly as long as the reach of the linkage, and of flexures, whose force is level later."""
 
-SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
+RELATIVE_SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
 """Sizes that are tried, over the largest that the envelope allows."""
 
 FULL_PADS = 0.054
@@ -67,7 +67,7 @@ ROUNDED_BOX = 1.0 - 1e-4
 PAIR_GAP = (0.1, 4e-3)
 """Between the parts of a mirrored pair: a share of one's height, and a length [m], as they are drawn."""
 
-DOUBT = 3.0
+MAX_WIDTH_RATIO = 3.0
 """So much wider than there is room for a part may seem: the estimate is of one proportion and one run-in."""
 
 PROBABLY_TOO_WIDE = 1.3
@@ -76,25 +76,25 @@ PROBABLY_TOO_WIDE = 1.3
 FLEXURES_WIDER = 8.0
 """About how much wider than a strip flexures of a tenth of its free length have to be."""
 
-NODES = 5
+N_STRIP_NODES = 5
 """Thicknesses of a tapered strip: more of them take longer and are hardly flatter."""
 
-LATER = 10.0
+SLOW_PROMISE = 10.0
 """Promise of what takes seconds to design, where everything else takes a part of one."""
 
-FLEXURE = 0.2
+FLEXURE_LENGTH_RATIO = 0.2
 """Length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019."""
 
-THICKEST, THICKEST_TAPERED = 0.1, 0.05
+MAX_THICKNESS_RATIOS, THICKEST_TAPERED = 0.1, 0.05
 """Largest thickness of a strip, and of a tapered one, over the crank's length: thicker ones hardly bend as lines do."""
 
-OFFERED = 24
+MAX_PROPOSALS = 24
 
-HERE = "cfmkit.families.slider_crank.proposals"
-PART, CORRECT = f"{HERE}:part", f"{HERE}:correct"
+MODULE_NAME = "cfmkit.families.slider_crank.proposals"
+PART_FUNCTION, CORRECTION_FUNCTION = f"{MODULE_NAME}:part", f"{MODULE_NAME}:correct"
 """What finishes the parts of one piece, and what corrects them by their solids."""
 
-FARTHER = 1.1
+TRAVEL_EXTENSION = 1.1
 """How far a solid is followed, over its travel, to look for a flatter window."""
 
 
@@ -110,16 +110,16 @@ def propose(request: Request, run: Run) -> FamilyOffer:
 def _of_force(request: Request) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
-    tried = [one for lengths in PUSHED for one in _offer_pushed(request, lengths)]
+    tried = [one for lengths in PUSHED_PROPORTIONS for one in _offer_pushed(request, lengths)]
     if found := [one for one in tried if isinstance(one, Candidate)]:
         return FamilyOffer(tuple(_vary_by_turns(found)))
     reasons = []
-    fits = [largest_printed(request.envelope, lengths) for lengths in PUSHED]
+    fits = [largest_printed(request.envelope, lengths) for lengths in PUSHED_PROPORTIONS]
     wide = min((strip_width(request, block, one) for one in fits for block in _materials(request)), default=0.0)
-    if wide > DOUBT * (request.depth or max(request.envelope)):
+    if wide > MAX_WIDTH_RATIO * (request.depth or max(request.envelope)):
         reasons.append(f"a strip would have to be about {mm(wide)} wide")
     largest = max(fits)
-    if not _can_be_cut(request, THICKEST * largest):
+    if not _can_be_cut(request, MAX_THICKNESS_RATIOS * largest):
         text = f"strips are made {mm(request.thinnest)} thick at least, too thick for a crank of {mm(largest)}"
         reasons.append(f"{text}, the longest that fits")
     if most := max((one for one in tried if isinstance(one, float)), default=0.0):
@@ -129,8 +129,12 @@ def _of_force(request: Request) -> FamilyOffer:
         reasons.append(reason)
     if reasons:
         return FamilyOffer(reason="; ".join(reasons))
-    crank = request.travel * (1.0 + STARTS[0]) / PUSHED[0].reach
-    need = _printed_box(PUSHED[0], crank) if request.depth is not None else _pinned_box(PUSHED[0], crank)
+    crank = request.travel * (1.0 + START_SHARES[0]) / PUSHED_PROPORTIONS[0].reach
+    need = (
+        _printed_box(PUSHED_PROPORTIONS[0], crank)
+        if request.depth is not None
+        else _pinned_box(PUSHED_PROPORTIONS[0], crank)
+    )
     return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
 
 
@@ -187,14 +191,14 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
     )
     pins = explain_overfilled(request) is None
     found: list[Candidate | float] = []
-    for size in SIZES:
+    for size in RELATIVE_SIZES:
         pair = size * pair_size(request, lengths)
         for crank, parts in ((size * printed, _single_parts), (pair, _pairs)):
             for start in _starts(request, REACH * lengths.reach * crank):
                 found += parts(request, lengths, crank, _window(request, start))
-        if size in SIZES[:2]:
+        if size in RELATIVE_SIZES[:2]:
             found += _slow_parts(request, lengths, size * printed)
-        first, last = _window(request, STARTS[0])
+        first, last = _window(request, START_SHARES[0])
         if last <= lengths.reach * size * pinned and pins:
             found.append(pushed_linkage(request, lengths, size * pinned, first))
     return found
@@ -205,7 +209,7 @@ def _window(request: Request, start: float) -> tuple[float, float]:
     return start * request.travel, (1.0 + start) * request.travel * (1.0 + 1e-6)
 
 
-def _starts(request: Request, reach: float, wanted: Sequence[float] = STARTS) -> list[float]:
+def _starts(request: Request, reach: float, wanted: Sequence[float] = START_SHARES) -> list[float]:
     """Return starts with which the travel is within a reach [m]: the wanted ones, or else the earliest."""
     fitting = [start for start in wanted if _window(request, start)[1] <= reach]
     return fitting or [start for start in (EARLIEST_START,) if _window(request, start)[1] <= reach]
@@ -217,7 +221,8 @@ def _single_parts(request: Request, lengths: Proportions, crank: float, travel: 
     return [
         _strip(request, block, lengths, crank, travel)
         for block in _materials(request)
-        if strip_width(request, block, crank) <= DOUBT * deep and _can_be_cut(request, THICKEST * crank)
+        if strip_width(request, block, crank) <= MAX_WIDTH_RATIO * deep
+        and _can_be_cut(request, MAX_THICKNESS_RATIOS * crank)
     ]
 
 
@@ -227,10 +232,10 @@ def _slow_parts(request: Request, lengths: Proportions, crank: float) -> list[Ca
     found = []
     for block in _materials(request):
         wide = strip_width(request, block, crank)
-        if FLEXURES_WIDER * wide <= DOUBT * deep:
-            for start in _starts(request, reach, (LATE_START, *STARTS))[:2]:
+        if FLEXURES_WIDER * wide <= MAX_WIDTH_RATIO * deep:
+            for start in _starts(request, reach, (LATE_START, *START_SHARES))[:2]:
                 found.append(_flexures(request, block, lengths, crank, _window(request, start)))
-        if wide <= DOUBT * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
+        if wide <= MAX_WIDTH_RATIO * deep and _can_be_cut(request, THICKEST_TAPERED * crank):
             for start in _starts(request, reach)[-1:]:
                 found.append(_offer_tapered(request, block, lengths, crank, _window(request, start)))
     return found
@@ -252,7 +257,9 @@ def _pairs(request: Request, lengths: Proportions, crank: float, travel: tuple[f
     found = []
     for block in _materials(request):
         wide = 0.5 * strip_width(request, block, crank)
-        if wide <= DOUBT * (request.depth or max(request.envelope)) and _can_be_cut(request, THICKEST * crank):
+        if wide <= MAX_WIDTH_RATIO * (request.depth or max(request.envelope)) and _can_be_cut(
+            request, MAX_THICKNESS_RATIOS * crank
+        ):
             plain = _strip(request, block, lengths, crank, travel)
             spec = plain.spec.replace({"mechanism.copies": "mirrored"})
             variant = plain.variant.replace("strip", "pair of strips")
@@ -284,7 +291,7 @@ def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
     longest = max(map(len, rows))
     by_turns = [row[k] for k in range(longest) for row in rows if k < len(row)]
     # cut before what takes long goes to the end, or none of that would be left
-    return sorted(by_turns[:OFFERED], key=lambda one: one.promise >= LATER)
+    return sorted(by_turns[:MAX_PROPOSALS], key=lambda one: one.promise >= SLOW_PROMISE)
 
 
 def _materials(request: Request) -> list[dict[str, Any]]:
@@ -294,7 +301,7 @@ def _materials(request: Request) -> list[dict[str, Any]]:
 def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
     """Return the linkage of a printed part, and its pads where they are smaller than usual."""
     small = crank / FULL_PADS
-    pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD)}}
+    pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD_SIZE)}}
     return {
         "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
         "unloaded_angle": lengths.unloaded, **pads,
@@ -309,7 +316,7 @@ def _strip(
     travel: tuple[float, float],
 ) -> Candidate:
     """Return a strip of one thickness, to be sized by stress and force."""
-    thick, wide = (request.thinnest, THICKEST * crank), (request.thinnest, request.depth or crank)
+    thick, wide = (request.thinnest, MAX_THICKNESS_RATIOS * crank), (request.thinnest, request.depth or crank)
     data = {
         "family": "slider-crank",
         "name": "suggested",
@@ -329,9 +336,9 @@ def _strip(
         name_variant("strip", request, material),
         spec,
         True,
-        PART,
+        PART_FUNCTION,
         largest_first(crank, request),
-        correct=CORRECT,
+        correct=CORRECTION_FUNCTION,
         doubtful=doubtful,
     )
 
@@ -347,9 +354,9 @@ def _offer_tapered(
     plain = _strip(request, material, lengths, crank, travel)
     thick = (max(request.thinnest, 0.005 * crank), THICKEST_TAPERED * crank)
     wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
-    shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
+    shape = {"shape": "even", "nodes": N_STRIP_NODES, "goal": "ripple", "width": wide, "thickness": thick}
     spec = plain.spec.replace({"design.beam": shape})
-    promise = LATER + abs(crank / request.envelope[1] - 0.35)
+    promise = SLOW_PROMISE + abs(crank / request.envelope[1] - 0.35)
     return replace(plain, variant=name_variant("tapered strip", request, material), spec=spec, promise=promise)
 
 
@@ -363,7 +370,7 @@ def _flexures(
     """Return a chain of links and flexures: first the springs for the force, then flexures of that stiffness."""
     scale = crank / 0.054
     rate = request.target / 1.5 * scale
-    long = FLEXURE * crank
+    long = FLEXURE_LENGTH_RATIO * crank
     thick = 0.09 * long
     one = {"length": long, "thickness": thick, "width": 2.0 * thick}
     # rates per rad grow with force times length; those of Bilancia et al. 2019 are for 1.5 N at 54 mm
@@ -384,9 +391,9 @@ def _flexures(
         name_variant("flexures", request, material),
         spec,
         True,
-        PART,
+        PART_FUNCTION,
         largest_first(crank, request),
-        correct=CORRECT,
+        correct=CORRECTION_FUNCTION,
     )
 
 
@@ -402,7 +409,9 @@ def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     request = aim_below_stiffening(spec, request, analyze)
     solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
     _, end = solid.analysis.travel or (0.0, 0.0)
-    result = solve_solid(solid.replace({"analysis.travel": (0.0, FARTHER * end), "analysis.window": None}), Run())
+    result = solve_solid(
+        solid.replace({"analysis.travel": (0.0, TRAVEL_EXTENSION * end), "analysis.window": None}), Run()
+    )
     found, material = flattest(result, request.travel), solid.mechanism.material
     if found is None or material is None:
         return solid

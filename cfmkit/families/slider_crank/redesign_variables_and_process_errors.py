@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.designing.bounds_and_rounding import range_about
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
@@ -64,5 +64,5 @@ def errors(spec: SliderCrankSpec) -> dict[str, str]:
     friction = {f"mechanism.{name}.friction": "friction" for name in rubbing}
     given = {name: getattr(mechanism, name) for name in ("crank_length", "stretched_position", "offset")}
     found = {f"mechanism.{name}": "position" for name, value in given.items() if isinstance(value, float)}
-    rates = zip(JOINTS, mechanism.springs.rates, strict=True)
+    rates = zip(JOINT_NAMES, mechanism.springs.rates, strict=True)
     return found | {f"mechanism.springs.{name}": "rate" for name, rate in rates if rate > 0.0} | friction

@@ -16,17 +16,22 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm, percent
 from cfmkit.families.hardware import PartStrength
-from cfmkit.families.slider_crank.flattest_springs_that_fit import STILL, SprungMotion, flattest_springs, largest_effort
+from cfmkit.families.slider_crank.flattest_springs_that_fit import (
+    TRAVEL_RTOL,
+    SprungMotion,
+    flattest_springs,
+    largest_effort,
+)
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
-from cfmkit.families.slider_crank.springs.part import PLATES, height_of
+from cfmkit.families.slider_crank.springs.part import N_SHEETS, height_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.families.suggestion_request import Candidate, FamilyOffer
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -52,7 +57,7 @@ class Proportions:
     reach: float  # largest travel that is of use, over the crank's length
 
 
-TURNED = (
+TORQUE_PROPORTIONS = (
     (1.0, 5.0, 0.3, -5.0),
     (1.0, 5.0, 0.3, -9.0),
     (1.0, 2.5, 0.0, -8.0),
@@ -68,33 +73,33 @@ last three are the flattest of some thousands of random linkages over 40 to 90 d
 WOUND_UP = -math.radians(60.0)
 """Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
 
-SHRUNK = (0.99, 0.8)
+RELATIVE_SIZES = (0.99, 0.8)
 """Sizes of linkages for a torque over the largest that fits the envelope; smaller ones leave room for wider springs."""
 
-ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
+WIRE_ENERGY_DENSITY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
 """What round wire in bending holds at most, over its volume [J/m^3]."""
 
-STRONG = 4.0
+MAX_TORQUE_RATIO = 4.0
 """Torque that springs can hold by the bound over the one required, above which more of it says nothing."""
 
-FLAT, HOPELESS = 0.45, 0.25
+FLAT_DEVIATION_SHARE, MAX_DEVIATION_SHARE = 0.45, 0.25
 """Deviation over the ripple required that is flat enough: up to it springs for a torque are left out, and those for a
 force stay in the first window and the envelope; and the largest deviation that is worth a look."""
 
-WEAK = 0.9
+MIN_TORQUE_SHARE = 0.9
 """Of the torque required: linkages whose springs hold less by the bound are not designed; it knows some places only."""
 
 LINK_SHARES = (1.0 / 12.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.5, 1.0 / 4.5)
 """Thickness of links with springs at their pins over the depth required: three quarters to a third are left for the
 springs."""
 
-SLIDING = 0.1
+SLIDING_FRICTION = 0.1
 """Friction of plain pins and of a plain guide where none is stated: greased steel, or dry POM on steel; assumed."""
 
 PIN_IN_COIL = 0.9
 """Largest diameter of a pin over the inner one of a torsion spring around it, wound up: makers leave a tenth."""
 
-FINISH = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
+FINISH_FUNCTION = "cfmkit.families.slider_crank.sprung_linkage_proposals:finish"
 """What finishes linkages with springs at their pins."""
 
 
@@ -102,7 +107,7 @@ def turned_linkages(request: Request) -> FamilyOffer:
     """Return linkages for a torque at their crank, those whose springs can hold most of it first; or why none can."""
     if (reason := explain_overfilled(request)) is not None:
         return FamilyOffer(reason=reason)
-    found = [_offer_turned(request, size, one) for size in SHRUNK for one in TURNED]
+    found = [_offer_turned(request, size, one) for size in RELATIVE_SIZES for one in TORQUE_PROPORTIONS]
     candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
     if candidates:
         return FamilyOffer(tuple(candidates))
@@ -122,7 +127,7 @@ def _too_weak(request: Request, most: float) -> str:
 
 def explain_overfilled(request: Request) -> str | None:
     """Return what is wrong where springs at pins would fill more than the envelope, taken as deep as it is wide."""
-    wire = request.target * request.travel / ENERGY
+    wire = request.target * request.travel / WIRE_ENERGY_DENSITY
     deep = wire / (request.envelope[0] * request.envelope[1])
     if deep <= (request.depth or max(request.envelope[:2])):
         return None
@@ -147,7 +152,7 @@ def _offer_turned(request: Request, share: float, linkage: tuple[float, float, f
     size = share * min(max(request.envelope[:2]) / max(sides), min(request.envelope[:2]) / min(sides))
     link = Linkage(crank * size, coupler * size, offset * size)
     most = largest_effort(_turning(request, link, low))
-    if most < WEAK * request.low:
+    if most < MIN_TORQUE_SHARE * request.low:
         return most
     data = {
         "family": "slider-crank",
@@ -160,7 +165,11 @@ def _offer_turned(request: Request, share: float, linkage: tuple[float, float, f
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
     return Candidate(
-        "springs at pins", spec, finish=FINISH, promise=-min(most / request.target, STRONG), springs="custom"
+        "springs at pins",
+        spec,
+        finish=FINISH_FUNCTION,
+        promise=-min(most / request.target, MAX_TORQUE_RATIO),
+        springs="custom",
     )
 
 
@@ -175,7 +184,9 @@ def _turning(request: Request, link: Linkage, unloaded: float, sheet: float | No
     """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
     low, high = _angle_range(request, unloaded)
     ends = low, min(high, unloaded + math.pi)
-    return _sprung(request, Assembly(link, unloaded, np.zeros(len(JOINTS))), ends, min(link.crank, link.coupler), sheet)
+    return _sprung(
+        request, Assembly(link, unloaded, np.zeros(len(JOINT_NAMES))), ends, min(link.crank, link.coupler), sheet
+    )
 
 
 def _sprung(
@@ -188,7 +199,7 @@ def _sprung(
 
 def _depth_of_springs(request: Request, sheet: float) -> float:
     """Return how far springs may stand out from links of a sheet [m], on both sides of them together [m]."""
-    return max(request.envelope[:2]) if request.depth is None else request.depth - PLATES * sheet
+    return max(request.envelope[:2]) if request.depth is None else request.depth - N_SHEETS * sheet
 
 
 def _pushing(spec: SliderCrankSpec, request: Request, sheet: float | None = None) -> list[SprungMotion]:
@@ -254,7 +265,7 @@ def finish(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
 def _with_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> SliderCrankSpec:
     """Return a linkage with the springs that hold the torque or the force best, wound beside links of a sheet [m]."""
     held = _torque_held(spec, request, sheet) if request.kind == "torque" else _force_held(spec, request, sheet)
-    if held is None or held.deviation > HOPELESS:
+    if held is None or held.deviation > MAX_DEVIATION_SHARE:
         off = "" if held is None else f" nearer than {percent(held.deviation)}"
         raise SolutionError(f"no springs of steel wire that fit at the pins hold this {request.kind}{off}")
     name, dimension = ("angle", "angle") if request.kind == "torque" else ("travel", "length")
@@ -264,7 +275,7 @@ def _with_springs(spec: SliderCrankSpec, request: Request, sheet: float) -> Slid
     motion = min(start, window[0]), window[1]
     sprung = spec.replace(
         {
-            "mechanism.springs": dict(zip(JOINTS, held.rates.tolist(), strict=True)),
+            "mechanism.springs": dict(zip(JOINT_NAMES, held.rates.tolist(), strict=True)),
             "analysis.window": tuple(Place(end, dimension) for end in window),
             f"analysis.{name}": motion,
             f"analysis.reference_{name}": 0.5 * sum(window),
@@ -293,7 +304,7 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
         "mechanism.material": dict(block), "mechanism.links.width": link.width, "mechanism.pins.diameter": link.hole,
     }  # fmt: skip
     if request.hysteresis is not None:
-        changes |= {"mechanism.pins.friction": SLIDING, "mechanism.guide.friction": SLIDING}
+        changes |= {"mechanism.pins.friction": SLIDING_FRICTION, "mechanism.guide.friction": SLIDING_FRICTION}
     return spec.replace(changes)
 
 
@@ -321,7 +332,7 @@ def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
     low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
     turns = MotionExtremes(assembly, low, high).largest_turns[:, 0]
     bought = {one.at for one in spec.mechanism.springs.bought}
-    return {name: float(turn) for name, turn in zip(JOINTS[:3], turns, strict=False) if name in bought}
+    return {name: float(turn) for name, turn in zip(JOINT_NAMES[:3], turns, strict=False) if name in bought}
 
 
 def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
@@ -335,7 +346,7 @@ def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
 def _torque_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
     unloaded = float(spec.mechanism.unloaded_angle or 0.0)
     turning = _turning(request, linkage_of(spec.mechanism), unloaded, sheet)
-    return flattest_springs(turning, request.target, FLAT * request.ripple)
+    return flattest_springs(turning, request.target, FLAT_DEVIATION_SHARE * request.ripple)
 
 
 def _force_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEffort | None:
@@ -345,7 +356,7 @@ def _force_held(spec: SliderCrankSpec, request: Request, sheet: float) -> HeldEf
         held = flattest_springs(motion, request.target, 0.0)
         if held is not None and (best is None or held.deviation < best.deviation):
             best = held
-        if best is not None and best.deviation <= FLAT * request.ripple:
+        if best is not None and best.deviation <= FLAT_DEVIATION_SHARE * request.ripple:
             break
     return best
 
@@ -372,8 +383,8 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     # a spring at the slider lies beside the coupler and is stretched by a slider that leaves the pivot
     rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
     widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates
-    turns = {JOINTS[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
-    pulled = JOINTS[3] not in turns or low[3] > -STILL * turns[JOINTS[3]][1]
+    turns = {JOINT_NAMES[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
+    pulled = JOINT_NAMES[3] not in turns or low[3] > -TRAVEL_RTOL * turns[JOINT_NAMES[3]][1]
     part, pin = spec.mechanism.part, spec.mechanism.pins.diameter if spec.mechanism.pins else 0.0
     deep = room = _depth_of_springs(request, (part.sheet if part else None) or 0.0)
     if request.depth is not None and "pivot" in turns:
@@ -419,11 +430,13 @@ def pushed_linkage(request: Request, lengths: Proportions, crank: float, first: 
     most = 0.0
     for motion in _pushing(spec, request):
         most = max(most, largest_effort(motion))
-        if most >= WEAK * request.low:  # what more there is does not matter
+        if most >= MIN_TORQUE_SHARE * request.low:  # what more there is does not matter
             break
     else:
         return most
-    return Candidate("springs at pins", spec, finish=FINISH, promise=largest_first(crank, request), springs="custom")
+    return Candidate(
+        "springs at pins", spec, finish=FINISH_FUNCTION, promise=largest_first(crank, request), springs="custom"
+    )
 
 
 def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.linkage import Linkage
 
-JOINTS = ("pivot", "crank_pin", "slider_pin", "slider")
+JOINT_NAMES = ("pivot", "crank_pin", "slider_pin", "slider")
 """Where the springs are: A, B, C, and the slider; rows of every (4, n) array here."""
 
 
@@ -41,7 +41,7 @@ JOINTS = ("pivot", "crank_pin", "slider_pin", "slider")
 class UnitCurves(ShortRepr):
     """Efforts of a spring of rate 1 at each joint along the motion, n places.
 
-    Rows are those of `JOINTS`; the last row has a length [m] in the place of an angle [rad].
+    Rows are those of `JOINT_NAMES`; the last row has a length [m] in the place of an angle [rad].
     """
 
     angle: FloatArray  # (..., n), of the crank [rad]

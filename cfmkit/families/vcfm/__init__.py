@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, when_called
-from cfmkit.families.vcfm.findings import FINDINGS
-from cfmkit.families.vcfm.quantities import DEFINITIONS
+from cfmkit.families.vcfm.findings import VCFM_FINDINGS
+from cfmkit.families.vcfm.quantities import SCALAR_DEFINITIONS
 from cfmkit.families.vcfm.spec import VcfmSpec
 
 FAMILY = Family(
@@ -20,7 +20,7 @@ FAMILY = Family(
         "solid": "cfmkit.families.vcfm.plane_fem_analysis:analyze",
     },
     design=when_called("cfmkit.families.vcfm.design:design"),
-    values=DEFINITIONS,
+    values=SCALAR_DEFINITIONS,
     draw="cfmkit.families.vcfm.figures",
     dimension_drawing="cfmkit/families/vcfm/dimensions.svg",
     outline="cfmkit.families.vcfm.outline",
@@ -45,7 +45,7 @@ FAMILY = Family(
     ),
     branches=("load",),
     template="cfmkit/families/vcfm/template.yaml",
-    findings=FINDINGS,
+    findings=VCFM_FINDINGS,
     bibliography="cfmkit/families/vcfm/references.bib",
     references=(
         "B. Ding, X. Li, Y. Li, Configuration design and experimental verification of a variable constant-force "

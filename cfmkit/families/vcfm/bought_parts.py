@@ -27,10 +27,10 @@ def parts_of(spec: VcfmSpec) -> tuple[ListedPart, ...]:
     if flexures is not None:
         data = f"{flexures.structure}, {material}; geometry/vcfm.dxf"
         made.append(ListedPart("below the shuttle", "spring", 1, data, "make", f"{exact(flexures.width)} deep"))
-    return (*made, *([] if springs is None else [_bought(springs)]))
+    return (*made, *([] if springs is None else [_list_springs(springs)]))
 
 
-def _bought(springs: BoughtSprings) -> ListedPart:
+def _list_springs(springs: BoughtSprings) -> ListedPart:
     """Return the bought springs of the list."""
     data = [f"{springs.kind} spring, {rate(springs.rate)}"]
     if springs.initial_tension:

@@ -22,11 +22,11 @@ from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answere
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (
-    MIDDLE,
-    NEAR,
-    PASSES,
-    RESCALES,
-    SQUAT,
+    FITTED_REGION_SHARE,
+    FORCE_RTOL,
+    MAX_PASSES,
+    MIN_WIDTH_RATIO,
+    N_RESCALES,
     check_guide,
     complete_analysis,
     followable_stroke,
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-ROUNDS = 8
+MAX_ROUNDS = 8
 """Limits met one after the other on the way to what is feasible."""
 
 
@@ -77,7 +77,7 @@ def design(spec: VcfmSpec, run: Run) -> Design:
     """
     found = _attempt(spec)
     nearest, last = dict(found.nearest_feasible), found
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         if last.status is not Status.INFEASIBLE or not last.nearest_feasible:
             break
         # what cures one limit may break the next: what is proposed must meet all of them
@@ -157,14 +157,16 @@ def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip, thickness: 
 
 def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
     """Raise if the leaves would rather buckle out of the plane."""
-    if leaf.width >= SQUAT * leaf.thickness:
+    if leaf.width >= MIN_WIDTH_RATIO * leaf.thickness:
         return
 
     def wide_enough(steps: int) -> bool:
-        width = float(sized_leaf(spec, target, leaf.thickness, leaf.length * STEP**steps).width)
-        return width >= MARGIN * SQUAT * float(leaf.thickness)
+        width = float(sized_leaf(spec, target, leaf.thickness, leaf.length * LENGTH_STEP**steps).width)
+        return width >= LENGTH_MARGIN * MIN_WIDTH_RATIO * float(leaf.thickness)
 
-    longer = leaf.length * STEP ** bisect_left(range(MOST_STEPS), True, key=wide_enough)  # widths grow with lengths
+    longer = leaf.length * LENGTH_STEP ** bisect_left(
+        range(MOST_STEPS), True, key=wide_enough
+    )  # widths grow with lengths
     raise Infeasible(
         finding(
             "out_of_plane_buckling",
@@ -193,13 +195,13 @@ def write_sizes(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     )
 
 
-MARGIN = 1.01
+LENGTH_MARGIN = 1.01
 """On that where a leaf length is proposed: the exact model changes widths by less than a percent."""
 
-STEP, MOST_STEPS = 1.002, 10_000
+LENGTH_STEP, MOST_STEPS = 1.002, 10_000
 """Of leaf lengths that are proposed: leaves are made longer by so much, and so often at most, until they are wide."""
 
-ROOM = 1.02
+ENVELOPE_MARGIN = 1.02
 """On the room that is proposed: the exact stress may lengthen the spring, and so widen it."""
 
 
@@ -224,7 +226,7 @@ def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
             verb = "need" if name == "leaves" else "needs"
             raise Infeasible(
                 finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' allows {mm(limit)}"),
-                {f"design.{path}": format_at_least(ROOM * found[name])},
+                {f"design.{path}": format_at_least(ENVELOPE_MARGIN * found[name])},
             )
 
 
@@ -241,7 +243,7 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
     if (sheet := sheet_of(spec.mechanism.part)) is not None:
         return _refined_for_sheet(spec, target, sizes, sheet)
     allowable = spec.mechanism.allowable_stress or 0.0
-    for _ in range(RESCALES):
+    for _ in range(N_RESCALES):
         sizes, stresses = fit_widths(spec, target, sizes)
         over = [stress / allowable for stress in stresses]
         if max(over) <= 1.0 + 1e-4:
@@ -270,11 +272,11 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
 def _refined_for_sheet(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes, sheet: float) -> DesignSizes:
     """Return the sizes for which the widths that the exact model wants are the sheet."""
     allowable, least = spec.mechanism.allowable_stress or 0.0, target.min_thickness or 0.0
-    for _ in range(PASSES):
+    for _ in range(MAX_PASSES):
         fitted, stresses = fit_widths(spec, target, sizes)
         wide, stiff = fitted.leaf.width / sheet, fitted.side.width / sheet
         over = [stress / allowable for stress in stresses]
-        if max(over) <= 1.0 + 1e-4 and max(abs(wide - 1.0), abs(stiff - 1.0)) <= NEAR:
+        if max(over) <= 1.0 + 1e-4 and max(abs(wide - 1.0), abs(stiff - 1.0)) <= FORCE_RTOL:
             return sizes
         count, leaf = next_leaf(sizes.half_beams, sizes.leaf, wide, over[0], target.height)
         side = next_side(sizes.side, stiff, over[1], least)
@@ -296,7 +298,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
     first, last = sizes.linear
-    middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
+    middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
     full = target.preload_stroke
     made = write_sizes(spec, sizes).replace(

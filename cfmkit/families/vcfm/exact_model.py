@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
-from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, trace_leaf
+from cfmkit.families.vcfm.interpolated_equilibrium_path import COEFFICIENT_RTOL, trace_leaf
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, leaf_law, leaf_spring, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.stock.material_and_part_spec import MaterialSpec
 
-DOWN = -0.5 * np.pi
+DOWN_ANGLE = -0.5 * np.pi
 
 
 def section(strip: LeafStrip, thickness: Any = None, wide: bool = False) -> Any:
@@ -59,27 +59,30 @@ def leaf_network(spec: VcfmSpec) -> Network:
 
 
 def _network_of(about: Bistable, made_of: MaterialSpec, wide: bool) -> Network:
-    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, slider_support
+    from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Network, Node, Taper, slider_support
 
     law = leaf_law(about, made_of)
     strip = law.strip
     x, h = strip.reach, strip.rise
-    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, slider_support(0.5 * np.pi, rotates=not about.guided))}
+    nodes = {
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
+        "shuttle": Node(x, h, slider_support(0.5 * np.pi, rotates=not about.guided)),
+    }
     shape, mirrored = law.beam_shapes()
     shares, thicknesses = law.profile
     made = section(strip, Taper(np.array(shares), np.array(thicknesses)) if len(set(thicknesses)) > 1 else None, wide)
     beams = {"leaf": Beam("wall", "shuttle", made, shape)}
     if not about.guided:
-        nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)
+        nodes["far wall"] = Node(2.0 * x, 0, CLAMPED_SUPPORT)
         beams["mirrored leaf"] = Beam("far wall", "shuttle", made, mirrored)
     return Network(nodes, beams)
 
 
-KEPT = 128
+MAX_KEPT_PATHS = 128
 """Paths of leaves, some 50 kB each: a catalogue needs one leaf with many springs, `suggest` one in many envelopes."""
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=MAX_KEPT_PATHS)
 def _leaf_path(about: Bistable, made_of: MaterialSpec, wide: bool, end: float, branch: str | None) -> Traced:
     """Return what a leaf does up to `end` [m]; a branch is followed, and its waviness counts, where one is stated."""
     control = {} if branch is None else {"branch": branch, "imperfection": about.waviness}
@@ -97,11 +100,13 @@ def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
     from cfmkit.elastica import Displacement
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
 
-    found = [DrivenNetwork("vcfm-leaf", leaf_network(spec), Displacement("shuttle", DOWN, np.array([spec.travel])))]
+    found = [
+        DrivenNetwork("vcfm-leaf", leaf_network(spec), Displacement("shuttle", DOWN_ANGLE, np.array([spec.travel])))
+    ]
     if spec.mechanism.springs is None:
         chain = spring_chain(spec)
         end = chain.travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
-        drive = Displacement(chain.node, DOWN, np.array([end]))
+        drive = Displacement(chain.node, DOWN_ANGLE, np.array([end]))
         found.append(DrivenNetwork("vcfm-spring", chain.network, drive))
     return tuple(found)
 
@@ -124,7 +129,7 @@ class ExactSampler:
     pushed: Any
     pulled: Any
     sides: list[Any]  # of the spring, pushed and pulled
-    accuracy = RESOLVED
+    accuracy = COEFFICIENT_RTOL
     coils: Coils | None
     """The law of bought springs, which have no path; None if the spring is a structure of leaves."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
-from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
+from cfmkit.families.vcfm.exact_model import DOWN_ANGLE, leaf_network
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _with_nominal(
     """Return rows with the nominal stress of beams whose node has some travels (n,) [m]."""
     from cfmkit.elastica import Displacement
 
-    paths = partial(both_images, network, partial(Displacement, node, DOWN))
+    paths = partial(both_images, network, partial(Displacement, node, DOWN_ANGLE))
     return with_nominal(rows, nominal_stresses(rows, np.array(travel), paths, placed))
 
 

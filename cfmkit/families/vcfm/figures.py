@@ -24,14 +24,14 @@ from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    LINES,
-    OCHRE,
-    PURPLE,
-    SMALL,
-    VERMILLION,
+    LINE_BLACK,
+    LINE_BLUE,
+    LINE_COLOURS,
+    LINE_PURPLE,
+    LINE_VERMILLION,
+    SMALL_FONT,
+    SPRING_OCHRE,
+    TEXT_GREY,
     apply_style,
     axes_mm,
     new_figure,
@@ -48,14 +48,14 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.results import Result
 
-TRAVEL = Scale("displacement", "length")
-FINE = 241
+TRAVEL_SCALE = Scale("displacement", "length")
+N_WINDOW_PLACES = 241
 """Places from which on the start of a window is looked for."""
 
-COLORS = {"leaf": BLUE, "spring": OCHRE}
+ELEMENT_COLOURS = {"leaf": LINE_BLUE, "spring": SPRING_OCHRE}
 """Of what bends."""
 
-PRELOADS = 41
+N_PRELOADS = 41
 """Preloads of the map."""
 
 
@@ -92,18 +92,18 @@ def split(result: Result) -> Figure:
     solution: Solution = result.state
     push = solution.first
     series = [
-        Series(push.force, "sum", BLACK, prefer=0.55),
-        Series(push.spring_force, "spring", OCHRE, prefer=0.85),
-        Series(push.leaves.force, "leaves", BLUE, prefer=0.35),
+        Series(push.force, "sum", LINE_BLACK, prefer=0.55),
+        Series(push.spring_force, "spring", SPRING_OCHRE, prefer=0.85),
+        Series(push.leaves.force, "leaves", LINE_BLUE, prefer=0.35),
     ]
     if (truss := solution.leaf_kind.truss) is not None and solution.fidelity != "truss":
         bars = solution.parts.half_beams * np.asarray(truss(solution.parts.strip).force(push.travel))
-        series.append(Series(bars, "leaves by the truss law", GREY, dashed=True, prefer=0.4))
+        series.append(Series(bars, "leaves by the truss law", TEXT_GREY, dashed=True, prefer=0.4))
     found = list(_range_beyond(solution))
     low = float(solution.linear[0][0])
     if np.isfinite(low):
         found.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
-    diagram = Diagram(push.travel, TRAVEL, Scale("force", "force"), series, (), found)
+    diagram = Diagram(push.travel, TRAVEL_SCALE, Scale("force", "force"), series, (), found)
     subject = f"leaves and spring, preload {value_text(push.preload, 'length')}"
     return diagram_figure(Heading.from_result(result, subject), [diagram])
 
@@ -114,19 +114,19 @@ def stress(result: Result) -> Figure:
     nominal, most = solution.first, max(solution.pushes, key=lambda push: push.preload)
     over = most.travel
     series = [
-        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", BLUE, prefer=0.5),
+        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", LINE_BLUE, prefer=0.5),
     ]
     bought = solution.spec.mechanism.springs is not None  # whose wire is of another material, with another limit
     if not bought:
         pressed = np.interp(over, nominal.travel, nominal.spring_stress, left=np.nan)
-        series.append(Series(pressed, "spring", OCHRE, prefer=0.6))
+        series.append(Series(pressed, "spring", SPRING_OCHRE, prefer=0.6))
     if most is not nominal and not bought:
         text = f"spring, preload {value_text(most.preload, 'length')}"
-        series.append(Series(most.spring_stress, text, VERMILLION, prefer=0.5))
+        series.append(Series(most.spring_stress, text, LINE_VERMILLION, prefer=0.5))
     allowed = solution.spec.mechanism.allowable_stress
     passed = allowed is not None and bool(max(np.nanmax(item.values) for item in series) > allowed * 1.005)
     limits = [Limit(allowed, f"allowed {value_text(allowed, 'stress')}", trouble=passed)] if allowed else []
-    diagram = Diagram(over, TRAVEL, Scale("largest stress", "stress"), series, limits, _range_beyond(solution))
+    diagram = Diagram(over, TRAVEL_SCALE, Scale("largest stress", "stress"), series, limits, _range_beyond(solution))
     return diagram_figure(Heading.from_result(result, "largest stress"), [diagram])
 
 
@@ -158,7 +158,8 @@ def _curves(result: Result, subject: str, shifted: bool) -> Figure:
             back = (push.rest or 0.0) if shifted else 0.0
             ax.plot(
                 parts.mm(places - back), np.interp(places, push.travel, push.force), linestyle="", marker="|",
-                markersize=9, markeredgewidth=1.2, color=LINES[number % len(LINES)], zorder=4, gid="window",
+                markersize=9, markeredgewidth=1.2, color=LINE_COLOURS[number % len(LINE_COLOURS)], zorder=4,
+                gid="window",
             )  # fmt: skip
     if shifted:
         ax.set_xlabel("displacement from rest [mm]")
@@ -169,7 +170,7 @@ def adjustability(result: Result) -> Figure:
     """Return force in the window, rest position and start of the window, with the paper's straight rules."""
     solution: Solution = result.state
     given = np.array([push.preload for push in solution.pushes])
-    over = np.linspace(given.min(), given.max(), PRELOADS)
+    over = np.linspace(given.min(), given.max(), N_PRELOADS)
     one = solution.character
     places = np.linspace(*solution.window_of_one, 41)
     stops = solution.curves.stops
@@ -183,17 +184,17 @@ def adjustability(result: Result) -> Figure:
     by_rule = rest_shift(one.positive_stiffness, one.first_stiffness, over)
     constant = bool(np.isfinite(solution.constant_force[0]))
     x, first = Scale("preload", "length"), Scale("constant force" if constant else "mean force", "force")
-    forces = [Series(mean, "mean in the window", BLUE, prefer=0.4)]
+    forces = [Series(mean, "mean in the window", LINE_BLUE, prefer=0.4)]
     if np.abs(straight - mean).max() > 2e-3 * np.abs(mean).max():
-        forces.append(Series(straight, "F + K_p dr", GREY, dashed=True, prefer=0.7))
+        forces.append(Series(straight, "F + K_p dr", TEXT_GREY, dashed=True, prefer=0.7))
     shifts = [
-        Series(rests, "shift of the rest position", PURPLE, prefer=0.4),
-        Series(by_rule, "K_p dr/(K_p + K_b1)", GREY, dashed=True, prefer=0.7),
+        Series(rests, "shift of the rest position", LINE_PURPLE, prefer=0.4),
+        Series(by_rule, "K_p dr/(K_p + K_b1)", TEXT_GREY, dashed=True, prefer=0.7),
     ]
     starts = _starts(solution, over)
     begins = [
-        Series(starts, "start of the window, from the unloaded position", BLUE, prefer=0.4),
-        Series(starts + rests, "start of the window, from rest", PURPLE, prefer=0.7),
+        Series(starts, "start of the window, from the unloaded position", LINE_BLUE, prefer=0.4),
+        Series(starts + rests, "start of the window, from rest", LINE_PURPLE, prefer=0.7),
     ]
     diagrams = [Diagram(over, x, first, forces), Diagram(over, x, Scale("shift", "length"), shifts)]
     if np.isfinite(starts + rests).any():
@@ -203,14 +204,14 @@ def adjustability(result: Result) -> Figure:
 
 def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
     """Return where the longest window within the flatness starts at each preload [m]; NaN where there is none."""
-    travel = np.linspace(0.0, float(solution.first.travel[-1]), FINE)
+    travel = np.linspace(0.0, float(solution.first.travel[-1]), N_WINDOW_PLACES)
 
     def force_at(places: FloatArray) -> FloatArray:
         sampler = solution.sampler
         total = sampler.leaf_force(places) + sampler.spring(places + preloads[:, None])[0]
         return np.asarray(total + solution.curves.stops.force(places) if solution.curves.stops else total)
 
-    forces = force_at(np.broadcast_to(travel, (len(preloads), FINE)))
+    forces = force_at(np.broadcast_to(travel, (len(preloads), N_WINDOW_PLACES)))
     return flat_window(travel, forces, solution.spec.analysis.flatness, force_at)[0]
 
 
@@ -247,7 +248,7 @@ def mechanism(result: Result) -> Figure:
     for number, (text, travel, preload) in enumerate(poses):
         row, column = divmod(number, 2)
         ax = axes_mm(figure, (14.0 + column * (across + 5.0), 12.0 + (1 - row) * (up + 8.0), across, up))
-        parts.bodies(ax, shown, number, COLORS)
+        parts.bodies(ax, shown, number, ELEMENT_COLOURS)
         if travel > 0:
             tip = _pushed_at(shown, number)
             parts.force_arrow(ax, (tip[0], tip[1] + 0.9 * room), tip, "force")
@@ -257,7 +258,7 @@ def mechanism(result: Result) -> Figure:
             tail, tip = (away, base) if preload > 0 else (base, away)
             parts.force_arrow(ax, tail, tip, "preload")
         parts.to_scale(ax, view)
-        ax.set_title(text, fontsize=SMALL, loc="left")
+        ax.set_title(text, fontsize=SMALL_FONT, loc="left")
         ax.set_xlabel("x [mm]" if row else "")
         ax.set_ylabel("" if column else "y [mm]")
         ax.tick_params(labelbottom=bool(row), labelleft=not column)
@@ -313,7 +314,7 @@ def moving(result: Result) -> Moving:
     view, size = parts.box_around(shown, (0.06, 0.06, 0.06, 0.12))
 
     def draw(ax: Axes, number: int) -> None:
-        parts.bodies(ax, shown, number, COLORS)
+        parts.bodies(ax, shown, number, ELEMENT_COLOURS)
         x, y = _pushed_at(shown, number)
         parts.force_arrow(ax, (x, y + 0.06 * size), (x, y))
         parts.to_scale(ax, view)

@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretche
 from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
 from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, leaf_spring, spring_room
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
-from cfmkit.families.vcfm.leaves.s_form import POLE
+from cfmkit.families.vcfm.leaves.s_form import POLE_LOAD
 from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE
 from cfmkit.families.vcfm.range_of_closed_forms import (
     is_stocky,
@@ -38,7 +38,7 @@ from cfmkit.families.vcfm.range_of_closed_forms import (
     spring_out_of_range,
     stocky_leaves,
 )
-from cfmkit.families.vcfm.solution import ROUNDING, goes_beyond
+from cfmkit.families.vcfm.solution import LIMIT_RTOL, goes_beyond
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,10 +49,10 @@ if TYPE_CHECKING:
     Sentence = tuple[Any, ...]
 
 
-TRACED = ("exact", "solid")
+TRACED_MODELS = ("exact", "solid")
 """Models that follow leaves along their branches."""
 
-FINDINGS = {
+VCFM_FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
     "no_linear_region": "the leaves do not buckle: their negative stiffness is not constant",
     "not_flat": "the positive and the negative stiffness do not cancel: the force is not constant",
@@ -85,16 +85,16 @@ FINDINGS = {
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
 }
 
-finding = finder(FINDINGS)
-"""Return a finding of this family; the name must be one that `FINDINGS` explains."""
+finding = finder(VCFM_FINDINGS)
+"""Return a finding of this family; the name must be one that `VCFM_FINDINGS` explains."""
 
-WAVY = 0.02
+MAX_WAVINESS_RATIO = 0.02
 """Waviness over thickness from which on the flatness suffers."""
 
-TURNING = POLE / (4.0 * np.pi**2)
+TURNING_LOAD_RATIO = POLE_LOAD / (4.0 * np.pi**2)
 """Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
 
-ALIKE = 0.01
+STIFFNESS_RTOL = 0.01
 """Stiffnesses that differ by less than this share cancel."""
 
 EXACT_FORM = 2e-4
@@ -135,7 +135,7 @@ def is_closed(solution: Solution) -> NDArray[np.bool_]:
     """Return whether the spring is pressed together within the travel, (m,) of bool."""
     most = solution.column(lambda spec: max(spec.analysis.preloads))
     reach = np.minimum(solution.travel, solution.curves.stops.rigid_ends[1])
-    return np.asarray(most + reach > solution.column(spring_room) * (1 + ROUNDING))
+    return np.asarray(most + reach > solution.column(spring_room) * (1 + LIMIT_RTOL))
 
 
 def closed_spring(solution: Solution) -> Sentence:
@@ -227,7 +227,7 @@ def _is_not_flat(solution: Solution) -> Any:
 def _uneven_force(solution: Solution) -> Sentence:
     push, (low, high), one = solution.first, solution.window_of_one, solution.character
     ripple, allowed = ripple_inside(solution, solution.window), solution.spec.analysis.flatness
-    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
+    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < STIFFNESS_RTOL
     reported = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
     cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
     low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
@@ -245,7 +245,7 @@ def _uneven_force(solution: Solution) -> Sentence:
 def _stays(solution: Solution) -> Any:
     """Return which mechanisms do not come back by themselves, (m,): past its peak their force is not above rounding."""
     least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1)
-    return np.isfinite(least) & ~(least > ROUNDING * largest)
+    return np.isfinite(least) & ~(least > LIMIT_RTOL * largest)
 
 
 def _second_position(solution: Solution) -> Sentence:
@@ -285,7 +285,7 @@ def _forces_beyond_linear(solution: Solution) -> tuple[FloatArray, FloatArray]:
 
 def _is_overloaded(solution: Solution) -> Any:
     at_end, last = _forces_beyond_linear(solution)
-    saved = solution.curves.stops.free_end <= solution.linear[1] * (1 + ROUNDING)  # what rises there is the stop
+    saved = solution.curves.stops.free_end <= solution.linear[1] * (1 + LIMIT_RTOL)  # what rises there is the stop
     beyond = goes_beyond(solution.nominal.ends[1], solution.linear[1]) & ~saved
     return beyond & ~(last - at_end <= solution.spec.analysis.flatness * np.abs(last))
 
@@ -354,7 +354,7 @@ def _overstress(solution: Solution) -> Sentence:
     number = int(spring[0].argmax())
     if leaves[0] > spring[0, number]:  # at any preload: the first at which they are pushed so far
         tops = solution.curves.leaf_stress()
-        number = int((tops >= (1.0 - ROUNDING) * tops.max()).argmax())
+        number = int((tops >= (1.0 - LIMIT_RTOL) * tops.max()).argmax())
         name, top, share = "leaves", float(solution.travel_leaf_stress[0]), float(leaves[0])
     else:
         name, top, share = "spring", float(solution.travel_spring_stress[0, number]), float(spring[0, number])
@@ -377,9 +377,9 @@ def _overstress_in_short(solution: Solution) -> str:
 
 
 def _turning_shuttle(solution: Solution) -> Sentence:
-    hint = "" if solution.fidelity in TRACED else "; only 'analysis.fidelity: exact' shows it"
+    hint = "" if solution.fidelity in TRACED_MODELS else "; only 'analysis.fidelity: exact' shows it"
     return (
-        f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and their force "
+        f"the shuttle can turn, so the leaves buckle at {percent(TURNING_LOAD_RATIO)} of the load and their force "
         f"curve is no longer straight{hint}. Use two Vs at a distance, or a guide",
         "mechanism.bistable.guided=true",
     )
@@ -420,19 +420,19 @@ def _wide(name: str) -> FindingRule[Solution]:
 def _is_wavy(solution: Solution) -> Any:
     waviness = solution.column(lambda spec: spec.mechanism.bistable.waviness)
     share = waviness / solution.column(lambda spec: spec.mechanism.bistable.thickness)
-    return (share > WAVY) | ((waviness > 0) & (solution.fidelity not in TRACED))
+    return (share > MAX_WAVINESS_RATIO) | ((waviness > 0) & (solution.fidelity not in TRACED_MODELS))
 
 
 def _imperfection(solution: Solution) -> Sentence:
     about = solution.spec.mechanism.bistable
-    share, exact = about.waviness / about.thickness, solution.fidelity in TRACED
+    share, exact = about.waviness / about.thickness, solution.fidelity in TRACED_MODELS
     reported = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
-    effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
+    effect = "; it rounds the peak and lowers the negative stiffness" if share > MAX_WAVINESS_RATIO else ""
     return (f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {reported}{effect}",)
 
 
 def _is_unstable(solution: Solution) -> Any:
-    if solution.fidelity not in TRACED:
+    if solution.fidelity not in TRACED_MODELS:
         return False  # laws are those of stable branches
     return (~solution.nominal.leaves.stable & solution.nominal.there).any(axis=1)
 
@@ -446,7 +446,7 @@ def _unstable_branch(solution: Solution) -> Sentence:
     return f"{text}: analysis.branch: stable follows them", "analysis.branch=stable"
 
 
-RULES: tuple[FindingRule[Solution], ...] = (
+FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule("measured_contradiction", _contradicts, _contradiction),
     FindingRule("spring_closed", is_closed, closed_spring),
     FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _truss),

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import format_at_least, format_at_most, mm
-from cfmkit.families.vcfm.solution import ROUNDING
+from cfmkit.families.vcfm.solution import LIMIT_RTOL
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.solution import Solution
 
-TRIED = (0.998, 0.99, 0.97, 0.94, 0.9)
+FLATNESS_SHARES = (0.998, 0.99, 0.97, 0.94, 0.9)
 """Shares of the flatness that are looked for where a window is proposed: by the samples of a curve, with a corner cut
 off, the whole must be kept."""
 
-WIDEST = 50.0
+MAX_WIDTH_FACTOR = 50.0
 """Factor on a width up to which one is looked for that makes the force flat."""
 
 
@@ -39,9 +39,9 @@ def flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]
     why = ""
     if np.isfinite(first) and (low < first or high > last):
         why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
-    for share in TRIED:
+    for share in FLATNESS_SHARES:
         flat = solution.nominal.flat_parts(share * allowed)
-        if np.isfinite(flat[0][0]) and ripple_inside(solution, flat) <= (1.0 - ROUNDING) * allowed:
+        if np.isfinite(flat[0][0]) and ripple_inside(solution, flat) <= (1.0 - LIMIT_RTOL) * allowed:
             start, end = format_at_least(float(flat[0][0])), format_at_most(float(flat[1][0]))
             cure = f"analysis.window=[{start}, {end}]"
             return f"{why}; the force is flat from {start} to {end}: use that as the window", (cure,)
@@ -64,7 +64,7 @@ def _better_width(solution: Solution) -> tuple[float, float]:
     if not np.isfinite(leaves + spring).all():
         return 1.0, np.inf
     one = solution.character
-    factors = np.geomspace(1.0 / WIDEST, WIDEST, 801)
+    factors = np.geomspace(1.0 / MAX_WIDTH_FACTOR, MAX_WIDTH_FACTOR, 801)
     if one.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
         factors = np.append(factors, one.positive_stiffness / one.negative_stiffness)
     top, bottom = (extreme_sums(factors, leaves, spring, way) for way in (1.0, -1.0))

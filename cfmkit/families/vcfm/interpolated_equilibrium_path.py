@@ -24,43 +24,43 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
 
-DOWN = -0.5 * np.pi
+DOWN_ANGLE = -0.5 * np.pi
 
-GRIDS = (127, 113)
+GRID_SIZES = (127, 113)
 """Points requested first, to find the bifurcations; the second where the first leave a doubt."""
 
-CLOSE = 0.02
+BIFURCATION_DISTANCE = 0.02
 """Bifurcations closer than this share of the travel are looked at again."""
 
-TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
+PATH_TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
 """Of the path, relative to its largest force, which far beyond the flat pose is a thousand times the peak. Slender
 leaves that are pulled straight there do not reach the first: the next is taken."""
 
-RESOLVED = 3e-8
+COEFFICIENT_RTOL = 3e-8
 """Size of a panel's last coefficients, relative to the largest force so far, at which it has converged; where only a
 looser tolerance of the path was reached, or rounding of places leaves more, that: halving does not take it away."""
 
-WIDE, CORNERED = (4, 3, 5), 16
+PANEL_COUNTS, N_CORNER_PANELS = (4, 3, 5), 16
 """Panels of a piece at first, the next number where a path left its branch; and of one that may have corners."""
 
-CLEAR, INWARDS = 5e-4, 0.05
+BIFURCATION_CLEARANCE, PANEL_CLEARANCE = 5e-4, 0.05
 """Nodes keep this share of the travel away from a bifurcation, but no more than that share of their panel: the engine
 misses a branch of leaves just above the critical slenderness where a point is requested at 1e-4 of the travel behind
 its beginning. From 0.05 of a panel inside, the polynomial at its end makes 450 times the rounding, 1e-9 of the peak."""
 
-HALVINGS = 12
+MAX_HALVINGS = 12
 """At most so many: a corner left then is 1/16000 of its piece."""
 
 
-APART = 1e-3
+MIN_POINT_ANGLE = 1e-3
 """Least distance of points that the stress is interpolated between, in the angle that is pi for a piece [rad]."""
 
-SLIGHT = 1e-7
+NEGLIGIBLE_WAVINESS = 1e-7
 """Waviness, in parts of the travel, of leaves whose branch opens and closes again within so little that it is missed:
 with it they go round the corner. Just above the slenderness at which arches buckle, 1.0001 times that, their force is
 within 2e-6 of the peak of that of the unbuckled form."""
 
-EARLY = 0.25
+PEAK_TRAVEL_SHARE = 0.25
 """Part of the travel within which the leaves have their peak, which is the scale of all before it."""
 
 
@@ -166,7 +166,7 @@ def _stress_law(x: FloatArray, stress: FloatArray, low: float, high: float) -> C
     # the path's own points crowd at a bifurcation: two that all but coincide say nothing of the slope
     kept = [0] if len(around) else []
     for number in range(1, len(around)):
-        if around[number] - around[kept[-1]] > APART:
+        if around[number] - around[kept[-1]] > MIN_POINT_ANGLE:
             kept.append(number)
     if len(kept) < 2:
         return lambda place: np.full(place.shape, stress[0] if len(stress) else np.nan)
@@ -177,20 +177,20 @@ def _stress_law(x: FloatArray, stress: FloatArray, low: float, high: float) -> C
 def trace_leaf(network: Network, node: str, end: float, **control: Any) -> Traced:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
     route = Route(network, node, control)
-    for count in GRIDS:
+    for count in GRID_SIZES:
         first = _begin_path(route, end, count)
         gaps = np.abs(np.diff(first.edges[1:-1]))
         # bifurcations close together may come from a point requested next to one: other points tell
-        if first.problem or not (gaps < CLOSE * abs(end)).any():
+        if first.problem or not (gaps < BIFURCATION_DISTANCE * abs(end)).any():
             break
-    at_its_end = all(abs(first.edges[-1] - place) <= CLOSE * abs(end) for place in first.edges[1:-1])
+    at_its_end = all(abs(first.edges[-1] - place) <= BIFURCATION_DISTANCE * abs(end) for place in first.edges[1:-1])
     if first.problem and at_its_end and not control.get("imperfection"):
-        wavy = trace_leaf(network, node, end, **control | {"imperfection": SLIGHT * abs(end)})
+        wavy = trace_leaf(network, node, end, **control | {"imperfection": NEGLIGIBLE_WAVINESS * abs(end)})
         if not wavy.problem:
             return wavy
     if not first.edges[-1]:
         return Traced(first.points, None, first.edges, first.problem)
-    for number in WIDE:
+    for number in PANEL_COUNTS:
         panels, points, kept = _resolve_panels(route, first, number)
         if kept:
             break
@@ -214,7 +214,7 @@ class Route:
     network: Network
     node: str
     control: dict[str, Any]
-    tolerances: tuple[float, ...] = TOLERANCES
+    tolerances: tuple[float, ...] = PATH_TOLERANCES
     rounding: float = 0.0  # error that rounding leaves, relative to the largest force
 
     def trace_places(self, places: FloatArray) -> tuple[Path, FloatArray]:
@@ -222,7 +222,7 @@ class Route:
         from cfmkit.elastica import Control, Displacement, PathStatus, trace
         from cfmkit.elastica.results.member_efforts import effort_error
 
-        drive = Displacement(self.node, DOWN, places)
+        drive = Displacement(self.node, DOWN_ANGLE, places)
         for number, tolerance in enumerate(self.tolerances):
             path = trace(self.network, drive, Control(**({"tolerance": tolerance} | self.control)))
             if path.status is not PathStatus.INACCURATE:
@@ -238,7 +238,7 @@ class Route:
     @property
     def resolved(self) -> float:
         """Size of the last coefficients, relative to the largest force so far, at which a panel has converged."""
-        return max(RESOLVED, self.tolerances[0], self.rounding)
+        return max(COEFFICIENT_RTOL, self.tolerances[0], self.rounding)
 
 
 def _begin_path(route: Route, end: float, count: int) -> First:
@@ -288,33 +288,33 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
         Panels of a piece at first.
     """
     points, sense = first.points, np.sign(first.edges[-1])
-    ends, count = sense * np.array(first.edges), CORNERED if route.control.get("imperfection") else number
-    pieces, apart = list(pairwise(ends.tolist())), CLEAR * float(ends[-1])
+    ends, count = sense * np.array(first.edges), N_CORNER_PANELS if route.control.get("imperfection") else number
+    pieces, apart = list(pairwise(ends.tolist())), BIFURCATION_CLEARANCE * float(ends[-1])
     # points in every piece and those of the first path: none that follows may step over a bifurcation that this one saw
     guards = [np.linspace(*piece, 5)[1:-1] for piece in pieces]
     steps = sense * first.grid
     near = np.abs(steps[:, None] - ends[1:-1]).min(axis=1, initial=np.inf) < apart
     guards.append(steps[(steps < ends[-1]) & ~near])
-    early = min(float(ends[1]), EARLY * float(ends[-1]))
+    early = min(float(ends[1]), PEAK_TRAVEL_SHARE * float(ends[-1]))
     wanted = [panel for piece in pieces for panel in pairwise(np.linspace(*piece, count + 1).tolist())]
     done: dict[tuple[float, float], FloatArray] = {}
 
-    def inside(panel: tuple[float, float]) -> tuple[float, float]:
+    def shrink_panel(panel: tuple[float, float]) -> tuple[float, float]:
         """Return the part of a panel that has nodes: clear of bifurcations."""
         low, high = panel
-        margin = min(apart, INWARDS * (high - low))
+        margin = min(apart, PANEL_CLEARANCE * (high - low))
         return low + margin * (low in ends[1:-1]), high - margin * (high in ends[1:-1])
 
     kept = True  # no path has left its branch
-    for left in range(HALVINGS, -1, -1):
-        places = np.unique(np.concatenate([*guards, *(nodes_of(inside(panel)) for panel in wanted)]))
+    for left in range(MAX_HALVINGS, -1, -1):
+        places = np.unique(np.concatenate([*guards, *(nodes_of(shrink_panel(panel)) for panel in wanted)]))
         more = _points(*route.trace_places(sense * places))
         kept, points = kept and _alike(first, more), points.merge(more)
         size = sense * points.places
         largest = np.maximum.accumulate(np.abs(points.force))
         halves: list[tuple[float, float]] = []
         for panel in wanted:
-            found = coefficients(inside(panel), size, points.force)
+            found = coefficients(shrink_panel(panel), size, points.force)
             scale = largest[np.searchsorted(size, max(panel[1], early), side="right") - 1]
             if left and np.abs(found[-3:]).max() > route.resolved * scale:  # false where a node is missing
                 middle = 0.5 * (panel[0] + panel[1])
@@ -326,7 +326,7 @@ def _resolve_panels(route: Route, first: First, number: int) -> tuple[ChebyshevP
         wanted = halves
     ordered = sorted(done)
     borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
-    spans = np.array([inside(panel) for panel in ordered])
+    spans = np.array([shrink_panel(panel) for panel in ordered])
     return ChebyshevPanels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
 
 

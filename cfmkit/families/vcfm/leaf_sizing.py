@@ -20,7 +20,7 @@ from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.v_beam import STEEP, buckled_stress, critical_force, stress_overestimate
+from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, buckled_stress, critical_force, stress_overestimate
 from cfmkit.specs.units import format_short
 from cfmkit.specs.units.windows import TravelShare
 
@@ -30,23 +30,23 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 
-SQUAT = 2.0
+MIN_WIDTH_RATIO = 2.0
 """Least width of a leaf over its thickness: narrower ones buckle out of the plane."""
 
-SNAPPING = 3.2
+SNAPPING_RISE_RATIO = 3.2
 """Rise over thickness below which leaves that buckle may do so with a jump."""
 
-MIDDLE = 0.84
+FITTED_REGION_SHARE = 0.84
 """Part of the linear region over which the widths are fitted to the force."""
 
-RESCALES = 4
+N_RESCALES = 4
 """Two do for the shipped mechanisms."""
 
-ROUNDS = 40
+MAX_ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""
-CLOSE = 1e-6
+WIDTH_RTOL = 1e-6
 """TravelShare of the width that is left when sizes are found."""
-PASSES, NEAR = 12, 1e-5
+MAX_PASSES, FORCE_RTOL = 12, 1e-5
 """Of the exact model for a sheet, and how far its force may then be off: five passes are usual."""
 MOST_LEAVES = 1000
 """As `mechanism.bistable.half_beams` allows."""
@@ -132,9 +132,9 @@ def _stroke_for(rise: float, thickness: float) -> float:
 
 def followable_stroke(rise: float, leaf: LeafStrip) -> dict[str, str]:
     """Return the stroke from which on exact leaves buckle without a jump; nothing where that is not what is wrong."""
-    if rise >= SNAPPING * leaf.thickness:
+    if rise >= SNAPPING_RISE_RATIO * leaf.thickness:
         return {}
-    return {"design.stroke": format_at_least(_stroke_for(rise, rise / SNAPPING))}
+    return {"design.stroke": format_at_least(_stroke_for(rise, rise / SNAPPING_RISE_RATIO))}
 
 
 def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float:
@@ -143,7 +143,7 @@ def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float
     root = pi * thickness / rise
     u = min(1.0, 2.0 / 3.0 * (1.0 + sqrt(1.0 - root * root)))
     stressed = buckled_stress(rise, thickness, u)
-    return max(sqrt(made.modulus / (spec.mechanism.allowable_stress or 1.0) * stressed), rise / sin(STEEP))
+    return max(sqrt(made.modulus / (spec.mechanism.allowable_stress or 1.0) * stressed), rise / sin(MAX_LEAF_ANGLE))
 
 
 def complete_analysis(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], angle: float) -> VcfmSpec:
@@ -223,8 +223,8 @@ def leaf_of_sheet(
     Infeasible
         If the sheet is so thin that leaves would buckle out of the plane, or that there would be too many.
     """
-    if sheet < SQUAT * thickness:
-        least = format_at_least(SQUAT * thickness)
+    if sheet < MIN_WIDTH_RATIO * thickness:
+        least = format_at_least(MIN_WIDTH_RATIO * thickness)
         paths = ("part.sheet", "bistable.width", *(["positive.width"] if spec.mechanism.positive else []))
         raise Infeasible(
             finding(
@@ -236,9 +236,9 @@ def leaf_of_sheet(
         )
     leaf, have = sized_leaf(spec, target, thickness, shortest), spec.mechanism.bistable.half_beams
     count = leaves_for(have, have * leaf.width / sheet, sheet)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         wide = leaf.width * have / count / sheet
-        if abs(wide - 1.0) < CLOSE:
+        if abs(wide - 1.0) < WIDTH_RTOL:
             break
         leaf = sized_leaf(spec, target, thickness, float(leaf.length) * wide ** (-1.0 / 3.0))
     return count, replace(leaf, width=sheet)
@@ -258,9 +258,9 @@ def side_of_sheet(sized: Callable[[float], LeafStrip], side: LeafStrip, least: f
     sheet : float
         [m]
     """
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         side = sized(float(side.thickness) * (side.width / sheet) ** (2.0 / 3.0))
-        if abs(side.width / sheet - 1.0) < CLOSE:
+        if abs(side.width / sheet - 1.0) < WIDTH_RTOL:
             break
     longer = max(1.0, least / float(side.thickness))
     return replace(side, thickness=longer * side.thickness, length=longer * side.length, width=sheet)

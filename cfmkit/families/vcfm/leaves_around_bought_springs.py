@@ -19,11 +19,11 @@ from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import LeafLaws, coils, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
-    MIDDLE,
-    NEAR,
-    PASSES,
-    RESCALES,
-    SQUAT,
+    FITTED_REGION_SHARE,
+    FORCE_RTOL,
+    MAX_PASSES,
+    MIN_WIDTH_RATIO,
+    N_RESCALES,
     check_guide,
     complete_analysis,
     leaf_of_sheet,
@@ -32,7 +32,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     sized_leaf,
     thickness_for,
 )
-from cfmkit.families.vcfm.leaves.v_beam import STEEP, VBeam, onset_and_exit
+from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
 from cfmkit.stock.springs.guides import guide_words
@@ -49,14 +49,14 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
-BACK = 1.5
+RETURN_TRAVEL_RATIO = 1.5
 """How far back leaves are followed, over where the closed form has the shuttle at rest: their width is still open."""
 
-TRIED = 12
+MAX_TRIED_SPRINGS = 12
 """Springs, the best by the closed forms first, whose leaves are sized by the exact model until some keep the stress."""
 
 
-NOTED = 0.01
+PRELOAD_RTOL = 0.01
 """Preloads stated for other springs are reported beyond this: a force that is that far off shows [1]."""
 
 
@@ -133,10 +133,10 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
             (one for one in tried if isinstance(one, LeavesAroundSprings)), key=lambda one: one.rank(target)
         )
         missed = [one for one in tried if isinstance(one, Miss)]
-        for number, one in enumerate(fitting[:TRIED], 1):
+        for number, one in enumerate(fitting[:MAX_TRIED_SPRINGS], 1):
             found = _fit_width(spec, target, one) if target.refine else one
             if isinstance(found, LeavesAroundSprings):
-                others = tuple(partial(_with_next, spec, target, other) for other in fitting[number:TRIED])
+                others = tuple(partial(_with_next, spec, target, other) for other in fitting[number:MAX_TRIED_SPRINGS])
                 return replace(_make_design(spec, target, found), next_best=others)
             missed.append(found)
     except Infeasible as problem:
@@ -241,7 +241,7 @@ def _design_around(
 def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: float) -> LeafStrip:
     """Return a leaf that does not buckle out of the plane: a longer one has to be wider. A stated length stays."""
     leaf = sized_leaf(spec, own, thickness, length)
-    while leaf.width < SQUAT * leaf.thickness and own.leaf_length is None:
+    while leaf.width < MIN_WIDTH_RATIO * leaf.thickness and own.leaf_length is None:
         length *= 1.02
         leaf = sized_leaf(spec, own, thickness, length)
     return leaf
@@ -257,15 +257,20 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, o
         ("deflected by", most, np.inf if held.is_guided else held.unguided, "without a guide they buckle at"),
         ("between the walls", 2.0 * float(leaf.reach), target.max_span, "'design.max_span' is"),
         ("wide leaves", float(leaf.width), target.max_width, "'design.max_width' is"),
-        ("thick leaves, buckling out of the plane", SQUAT * leaf.thickness, float(leaf.width), "their width is"),
+        (
+            "thick leaves, buckling out of the plane",
+            MIN_WIDTH_RATIO * leaf.thickness,
+            float(leaf.width),
+            "their width is",
+        ),
     )
     for words, needed, limit, allowed in limits:
         if needed is not None and limit is not None and needed > limit * (1 + 1e-9):
             return Miss(
                 found.label, needed / limit - 1.0 if limit else 1.0, f"{words} {mm(needed)}, {allowed} {mm(limit)}"
             )
-    if leaf.angle > STEEP * (1 + 1e-9):
-        return Miss(found.label, float(leaf.angle) / STEEP - 1.0, "leaves steeper than 15 deg")
+    if leaf.angle > MAX_LEAF_ANGLE * (1 + 1e-9):
+        return Miss(found.label, float(leaf.angle) / MAX_LEAF_ANGLE - 1.0, "leaves steeper than 15 deg")
     if offer is not None and target.spring_life is not None:
         wanted = target.spring_life
         short = [miss for one in _in_use(spec, found, offer) if (miss := one.misses_life(wanted)) is not None]
@@ -308,13 +313,13 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -
 
     allowable, own = spec.mechanism.allowable_stress or 0.0, found.target
     first, last = found.linear
-    middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
+    middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
     worst, sheet = np.inf, sheet_of(spec.mechanism.part)
-    for _ in range(RESCALES if sheet is None else PASSES):
+    for _ in range(N_RESCALES if sheet is None else MAX_PASSES):
         made = _write_design(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
         # leaves are followed as far as the spring can push them, not through all of a long preload
-        back = min(own.preload_stroke, BACK * farthest_back(made, (own.preload_stroke,)))
+        back = min(own.preload_stroke, RETURN_TRAVEL_RATIO * farthest_back(made, (own.preload_stroke,)))
         sampler = ExactSampler(made, last, back)
         if sampler.problem:
             return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
@@ -324,7 +329,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -
         ends = np.linspace(-_rest(sampler, wide, own.preload_stroke), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable
         if sheet is not None:
-            if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= NEAR:
+            if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= FORCE_RTOL:
                 return _find_miss(spec, target, found, None) or found
             count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own.height)
             found = replace(found, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
@@ -359,7 +364,7 @@ def _make_design(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings)
     if own.preload_stroke:
         note += f", the preload for the adjustment is {mm(own.preload_stroke)}"
         stated = max((abs(one) for one in spec.analysis.preloads), default=0.0)
-        if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > NOTED * own.preload_stroke:
+        if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > PRELOAD_RTOL * own.preload_stroke:
             note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
     if (words := guide_words(found.held_springs)) and found.deflection > found.springs.unguided:
         note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(found.springs.unguided)}"

@@ -7,9 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.families.vcfm.leaves.cosine import COSINE
-from cfmkit.families.vcfm.leaves.hybrid import HYBRID
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import DIAMOND, FOLDED, STRAIGHT, U_SHAPE
+from cfmkit.families.vcfm.leaves.cosine import COSINE_LEAF
+from cfmkit.families.vcfm.leaves.hybrid import HYBRID_LEAF
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import (
+    DIAMOND_SPRING,
+    FOLDED_SPRING,
+    STRAIGHT_SPRING,
+    U_SHAPE,
+)
 from cfmkit.families.vcfm.leaves.v_beam import V_BEAM
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Angle, Ratio
@@ -19,8 +24,10 @@ if TYPE_CHECKING:
 
     from cfmkit.families.vcfm.leaves.kinds import LeafKind, SpringKind, StructureKind
 
-LEAF_KINDS: dict[str, LeafKind] = {kind.name: kind for kind in (V_BEAM, COSINE, HYBRID)}
-SPRING_KINDS: dict[str, SpringKind] = {kind.name: kind for kind in (DIAMOND, FOLDED, STRAIGHT, U_SHAPE)}
+LEAF_KINDS: dict[str, LeafKind] = {kind.name: kind for kind in (V_BEAM, COSINE_LEAF, HYBRID_LEAF)}
+SPRING_KINDS: dict[str, SpringKind] = {
+    kind.name: kind for kind in (DIAMOND_SPRING, FOLDED_SPRING, STRAIGHT_SPRING, U_SHAPE)
+}
 """Every kind of snap-through leaf, and of springs of leaves, in the order of the documentation.
 
 A new one is its file in `leaves/`, and its record here.
@@ -53,7 +60,7 @@ def _list_descriptions(kinds: Iterable[StructureKind]) -> str:
 class Positive(Model):
     """The spring: the structure with a positive stiffness, whose far end the preload moves."""
 
-    structure: SpringName = Field(DIAMOND.name, description=_list_descriptions(SPRING_KINDS.values()))
+    structure: SpringName = Field(DIAMOND_SPRING.name, description=_list_descriptions(SPRING_KINDS.values()))
     loaded: Literal["whole", "half"] = Field("whole", description="all of the structure, or one side of it only")
     length: PositiveLength = Field(description="of one flexible leaf, L1")
     angle: LeafAngle = Field(0.0, description="of a diamond's leaves from the direction across the motion, theta1")

@@ -19,10 +19,10 @@ from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.rows import SolvedRows, findings_of_one, valid, values_of_one
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
-from cfmkit.families.vcfm.findings import RULES, closed_spring, finding, is_closed
+from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stack_laws
-from cfmkit.families.vcfm.quantities import COLUMNS, QUANTITIES
+from cfmkit.families.vcfm.quantities import COLUMNS, SCALAR_QUANTITIES
 from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
@@ -82,7 +82,8 @@ def result_of(solution: Solution) -> Result:
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=reason if short else "",
         curves=curves,
-        values=values_of_one(QUANTITIES, solution) | stops.values(nominal.travel, pressed, solution.window_of_one),
+        values=values_of_one(SCALAR_QUANTITIES, solution)
+        | stops.values(nominal.travel, pressed, solution.window_of_one),
         warnings=LazySequence(partial(_findings, solution)),
         travel=(float(nominal.travel[0]), spec.travel),
         valid=((low, min(high, float(solution.reach[0]))),) if solution.is_linear[0] else None,
@@ -103,7 +104,7 @@ def result_of(solution: Solution) -> Result:
 
 
 def _findings(solution: Solution) -> Iterator[Finding]:
-    yield from findings_of_one(RULES, finding, solution)
+    yield from findings_of_one(FINDING_RULES, finding, solution)
     first = float(solution.first.force[0])
     pressed = first if first > solution.effort_error[0] else 0.0
     for name, message in solution.curves.stops.sentences(solution.first.travel, pressed):
@@ -153,7 +154,7 @@ def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for start in range(0, len(members), size):
             chosen = members[start : start + size]
             solution = _solve_kind([specs[index] for index in chosen])
-            yield np.array(chosen), SolvedRows(solution, COLUMNS, RULES, _is_complete(solution))
+            yield np.array(chosen), SolvedRows(solution, COLUMNS, FINDING_RULES, _is_complete(solution))
 
 
 def _is_complete(solution: Solution) -> NDArray[np.bool_]:

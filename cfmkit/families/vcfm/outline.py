@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Drawing, DrawnDimension, Region, Sheet, circle, mark
+from cfmkit.export.contours import (
+    OUTLINE_TOLERANCE,
+    Contour,
+    Curve2D,
+    Drawing,
+    DrawnDimension,
+    Region,
+    Sheet,
+    circle,
+    mark,
+)
 from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
 from cfmkit.export.posed_part import rectangle
@@ -26,14 +36,14 @@ if TYPE_CHECKING:
 
     from cfmkit.families.vcfm.spec import VcfmSpec
 
-GAP = 0.01
+PART_GAP = 0.01
 """Between the two parts of the drawing [m]."""
 
-FINE = 2e-4
+COSINE_TOLERANCE_RATIO = 2e-4
 """How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
 
 
-def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
+def drawing(spec: VcfmSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line.
 
     Raises
@@ -59,7 +69,7 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
         _sheet(spec, spring),
         tuple(_dimensions(spec, sizes)),
         tuple(_facts(spec)),
-        tolerance=min(TOLERANCE, FINE * thinnest),
+        tolerance=min(OUTLINE_TOLERANCE, COSINE_TOLERANCE_RATIO * thinnest),
         sections=sections,
     )
 
@@ -67,7 +77,7 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
 def _contours(spec: VcfmSpec) -> tuple[list[Contour], list[Contour], float]:
     """Return the contours of leaves and spring without fillets, the second ones below, and the spring's upper end."""
     leaves, low = leaves_contours(spec)
-    top = low - GAP
+    top = low - PART_GAP
     return leaves, [] if spec.mechanism.springs is not None else spring_contours(spec, top), top
 
 
@@ -138,7 +148,7 @@ def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:
     if not spring:
         return Sheet(spec.mechanism.bistable.width)
     x0, y0, x1, y1 = spring[0].extents
-    around = rectangle(x0, y0, x1, y1) + GAP / 4 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    around = rectangle(x0, y0, x1, y1) + PART_GAP / 4 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     return Sheet(spec.mechanism.bistable.width, (Region(around, spec.mechanism.flexures.width),))
 
 

@@ -20,7 +20,7 @@ from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
 from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.fillets import round_inside_corners
-from cfmkit.export.posed_part import MIRROR, PosedBody, PosedPart, band, in_poses, rectangle
+from cfmkit.export.posed_part import MIRROR_FACTORS, PosedBody, PosedPart, band, in_poses, rectangle
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_sizes
@@ -91,7 +91,7 @@ def _pose(
     """Yield everything in one pose."""
     for body in sizes.bodies():
         yield body.move(0.0, -travel) if body.role == "driven" else body
-    line = leaf.bent_line(travel)[::-1] * MIRROR + np.array([sizes.wall, -float(leaf.strip.rise)])
+    line = leaf.bent_line(travel)[::-1] * MIRROR_FACTORS + np.array([sizes.wall, -float(leaf.strip.rise)])
     half, spacing = 0.5 * leaf_thickness(leaf, len(line)), spec.mechanism.frame.spacing
     for number in range(spec.mechanism.bistable.half_beams):
         one = PosedBody.polygon("leaf", "free", band(line + np.array([0.0, number // 2 * spacing]), half))
@@ -169,7 +169,7 @@ def specified_pieces(spec: VcfmSpec, top: float) -> Iterator[SpecifiedPiece]:
         upper, lower = (_edge(law, side, apex) for side in (1.0, -1.0))
         leaf = np.vstack([_points(item) for item in (*upper, *_back(lower))])
         yield SpecifiedPiece((leaf,), tuple(leaf_sections(law, apex)))
-        yield SpecifiedPiece((leaf * MIRROR,))
+        yield SpecifiedPiece((leaf * MIRROR_FACTORS,))
     yield from (SpecifiedPiece((body.outline(),)) for body in sizes.bodies())
     if spec.mechanism.springs is None:
         thickness = _spring(spec).strip.thickness
@@ -310,7 +310,9 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
         shuttle = np.array([[0.0, over], [half, over], [half, -over], [0.0, -over]])
         return SolvedPiece(round_inside_corners(_contour(right), fillet)[0], shuttle, (wall,), True, sections)
     shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])
-    return SolvedPiece(round_inside_corners(_whole(right), fillet)[0], shuttle, (wall, wall * MIRROR), True, sections)
+    return SolvedPiece(
+        round_inside_corners(_whole(right), fillet)[0], shuttle, (wall, wall * MIRROR_FACTORS), True, sections
+    )
 
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart
     from cfmkit.solid.meshed_part import MeshSolution, Part
 
-GATHERED = 1.5
+POSE_EXPONENT = 1.5
 """Poses stand at (k/n) to this power of the travel: the peak of thin leaves is within its first twentieth."""
 
 
@@ -150,12 +150,12 @@ def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     """Return a piece of the drawing as it is solved."""
     from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
-    from cfmkit.solid.plane_stress_law import LAWS
+    from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     mechanism = spec.mechanism
     about = mechanism.bistable if piece.of_leaf else mechanism.flexures
     turns = piece.of_leaf and not mechanism.bistable.guided
-    law = LAWS[mechanism.material.law](mechanism.material.modulus, mechanism.material.poisson)
+    law = MATERIAL_LAWS[mechanism.material.law](mechanism.material.modulus, mechanism.material.poisson)
     across = np.array([[1.0], [0.0], [0.0]]) if piece.glides else np.zeros((3, 0))
     turning = np.array([[0.0], [0.0], [1.0]]) if turns else np.zeros((3, 0))
     shuttle = HeldOrDriven(
@@ -200,7 +200,7 @@ def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
 def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ()) -> tuple[float, ...]:
     """Return the travels to solve for, up to an end [m]: of the poses wanted one in `fewer`, and places on the way."""
     count = max(5, spec.analysis.solid.poses // fewer)
-    shares = np.linspace(0.0, 1.0, count) ** GATHERED
+    shares = np.linspace(0.0, 1.0, count) ** POSE_EXPONENT
     more = [place / end for place in places if 0.0 < place / end < 1.0]
     found = np.unique(np.concatenate([shares, more]))
     return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())

@@ -43,22 +43,22 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.design import DesignSizes
 
 
-SLENDERNESS = (3.7, 4.0, 4.25, 4.5, 5.5, 7.0)
+RISE_RATIOS = (3.7, 4.0, 4.25, 4.5, 5.5, 7.0)
 """Rise over thickness of the leaves: below 3.63 they are no longer buckled half way, above 7 they are thin and wide."""
 
-LONGER = (1.04, 1.15, 1.4, 1.8, 2.4)
+LENGTH_RATIOS = (1.04, 1.15, 1.4, 1.8, 2.4)
 """Leaf lengths, over the shortest that the stress allows: longer leaves are wider, and the force flatter."""
 
-PAIRS = (2, 1, 3, 4)
+PAIR_COUNTS = (2, 1, 3, 4)
 """Vs that carry the shuttle; one V alone needs a guide."""
 
-THICKER = (1.0, 1.6, 2.4)
+THICKNESS_RATIOS = (1.0, 1.6, 2.4)
 """Thickness of the diamond's leaves over that of the Vs."""
 
-MIDDLE = (0.8, 0.9, 0.98)
+REGION_SHARES = (0.8, 0.9, 0.98)
 """Share of the linear region that is used: the exact leaves depart from the line at its ends, which widths correct."""
 
-STRUCTURES = {
+STRUCTURE_BLOCKS = {
     kind.proposal.name: (block, kind.proposal)
     for block, kinds in (("positive", SPRING_KINDS.values()), ("bistable", LEAF_KINDS.values()))
     for kind in kinds
@@ -69,18 +69,18 @@ STRUCTURES = {
 SPRING_ANGLE = 7.0 * pi / 180.0
 """Of the diamond's leaves, as in Ding, Li and Li 2022."""
 
-SAFETY = 1.03
+STRESS_MARGIN = 1.03
 """On the stress: the exact model has a little more of it than the closed forms that give the leaf's length."""
 
-LITTLE = 0.02
+DEFAULT_ADJUSTMENT = 0.02
 """Adjustment, over the force, where none is required: every such mechanism has one."""
 
-TURNS = {"1 V": 2, "3 Vs": 4, "4 Vs": 5, "2 Vs, catalogue": 7} | {
-    one.variant: one.turn for _, one in STRUCTURES.values()
+VARIANT_ORDER = {"1 V": 2, "3 Vs": 4, "4 Vs": 5, "2 Vs, catalogue": 7} | {
+    one.variant: one.turn for _, one in STRUCTURE_BLOCKS.values()
 }
 """Variants by their first words, in the order in which they are tried behind two Vs with a diamond."""
 
-SOFTEST = 0.9
+MIN_RISE_RATIO = 0.9
 """Smallest rise over that of the leaves that helical springs may ask for: the nearest of the series is taken."""
 
 WIDE_LAST = 100.0
@@ -89,14 +89,14 @@ WIDE_LAST = 100.0
 FARTHEST = 1.2
 """End of the travel over that of the linear region: the flattest window may lie farther."""
 
-APART = 1.2
+SPRING_CLEARANCE_RATIO = 1.2
 """Room across that a helical spring takes, over its diameter: as they are drawn."""
 
-OFFERED = 28
+MAX_PROPOSALS = 28
 
-FINISH = "cfmkit.families.vcfm.proposals:finish"
+FINISH_FUNCTION = "cfmkit.families.vcfm.proposals:finish"
 FINISH_WITH = "cfmkit.families.vcfm.proposals:finish_with"
-CORRECT = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
+CORRECTION_FUNCTION = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
 """What finishes what the family's design has made, and what corrects it by its solids."""
 
 
@@ -120,13 +120,15 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 thick = min(sizes.leaf.thickness, sizes.side.thickness)
                 promise = over["across"] * over["along"] if request.good_parts is None else -thick
                 promise += WIDE_LAST * _is_too_wide(request, block, sizes)
-                found.append(Candidate(variant, spec, True, FINISH, float(promise), correct=CORRECT))
+                found.append(
+                    Candidate(variant, spec, True, FINISH_FUNCTION, float(promise), correct=CORRECTION_FUNCTION)
+                )
             if (coiled := _offer_coiled(request, block, spec, sizes)) is not None:
                 found.append(coiled)
     if found:
         ranked = sorted(found, key=lambda one: one.promise)
         plain = [one for one in ranked if one.promise < 0.5 * WIDE_LAST] or ranked
-        return FamilyOffer(tuple(_vary_by_turns([*plain, *_with_structures(plain)])[:OFFERED]))
+        return FamilyOffer(tuple(_vary_by_turns([*plain, *_with_structures(plain)])[:MAX_PROPOSALS]))
     if closest is None:
         return FamilyOffer(
             reason=f"no leaf as thin as {mm(request.thinnest)} or thicker, too wide to buckle out of the plane, has "
@@ -154,15 +156,15 @@ def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
 
 def _turn(variant: str) -> int:
     """Return when a variant has its turn: what is most often possible first, then what differs from it most."""
-    return next((turn for words, turn in TURNS.items() if variant.startswith(words)), 0)
+    return next((turn for words, turn in VARIANT_ORDER.items() if variant.startswith(words)), 0)
 
 
 def _designs(request: Request, material: dict[str, Any]) -> Any:
     """Yield (specification, sizes) of every choice that the closed forms allow."""
-    base, adjustment = request.target, LITTLE * request.target
+    base, adjustment = request.target, DEFAULT_ADJUSTMENT * request.target
     if request.adjustable is not None:
         adjustment = 1.03 * max(request.adjustable[1] - base, base - request.adjustable[0], adjustment)
-    for share, slender, pairs, thicker in product(MIDDLE, SLENDERNESS, PAIRS, THICKER):
+    for share, slender, pairs, thicker in product(REGION_SHARES, RISE_RATIOS, PAIR_COUNTS, THICKNESS_RATIOS):
         stroke = request.travel / share
         rise = 0.75 * stroke / sqrt(1.0 - (pi / slender) ** 2)
         thin = rise / slender
@@ -172,7 +174,7 @@ def _designs(request: Request, material: dict[str, Any]) -> Any:
             "name": "suggested",
             "mechanism": {
                 "material": material,
-                "safety_factor": SAFETY / request.strength_used,
+                "safety_factor": STRESS_MARGIN / request.strength_used,
                 "positive": {
                     "structure": "diamond", "length": 20.0 * thin * thicker, "angle": SPRING_ANGLE,
                     "thickness": thin * thicker, "width": 5.0 * thin,
@@ -206,7 +208,7 @@ def _lengths(spec: VcfmSpec, request: Request) -> Any:
             return
     target = spec.design
     assert target is not None
-    for more in LONGER:
+    for more in LENGTH_RATIOS:
         # a length above zero needs no other check, and validating it took longer than the closed forms
         length = {"leaf_length": float(first.leaf.length) * more}
         made = spec.model_copy(update={"design": target.model_copy(update=length)})
@@ -274,7 +276,9 @@ def _offer_coiled(request: Request, block: MaterialBlock, spec: VcfmSpec, sizes:
     # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
     listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": request.depth})
     variant = name_variant("2 Vs, catalogue springs", request, block)
-    return Candidate(variant, listed, True, FINISH, float(promise), correct=CORRECT, springs="catalogue")
+    return Candidate(
+        variant, listed, True, FINISH_FUNCTION, float(promise), correct=CORRECTION_FUNCTION, springs="catalogue"
+    )
 
 
 def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: float) -> Iterator[CatalogueSpring]:
@@ -286,11 +290,11 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
         wide = one.outer_diameter or 0.0
         # a pulled spring stands above a shuttle that goes down, and the preload moves its other end up
         long = (one.free_length or 0.0) + (target.stroke + preload if one.kind == "extension" else 0.0)
-        stretched = (one.largest or 0.0) > SOFTEST * (travel + preload)
+        stretched = (one.largest or 0.0) > MIN_RISE_RATIO * (travel + preload)
         if long > place or wide > (request.depth or np.inf) or not stretched:
             continue
-        most = request.envelope[0] / (APART * wide)
-        counts = tuple(n for n in one.counts if softest <= n * one.rate <= softest / SOFTEST and n <= most)
+        most = request.envelope[0] / (SPRING_CLEARANCE_RATIO * wide)
+        counts = tuple(n for n in one.counts if softest <= n * one.rate <= softest / MIN_RISE_RATIO and n <= most)
         if counts:
             yield CatalogueSpring.from_offer(replace(one, counts=counts))
 
@@ -307,14 +311,14 @@ def _with_structures(found: list[Candidate]) -> Iterator[Candidate]:
     """Yield the same with other springs and leaves: of two Vs, a small, a larger and a large one of each structure."""
     plain = [one for one in found if _turn(one.variant) == 0]
     chosen = [plain[k] for k in dict.fromkeys(len(plain) * part // 8 for part in (0, 3, 6))] if plain else []
-    for name, (_, structure) in STRUCTURES.items():
+    for name, (_, structure) in STRUCTURE_BLOCKS.items():
         for one in chosen:
             yield replace(one, variant=one.variant.replace("2 Vs", structure.variant), finish=f"{FINISH_WITH}:{name}")
 
 
 def finish_with(name: str, spec: VcfmSpec, request: Request) -> VcfmSpec:
-    """Return a designed mechanism with another structure, of `STRUCTURES`."""
-    strength = request.strength_used * (spec.mechanism.material.allowable(SAFETY) or 0.0)
+    """Return a designed mechanism with another structure, of `STRUCTURE_BLOCKS`."""
+    strength = request.strength_used * (spec.mechanism.material.allowable(STRESS_MARGIN) or 0.0)
     design = spec.design
     raised = 0.0 if request.adjustable is None or design is None or not design.adjustment else max(request.adjustable)
     forces = request.target, max(raised, request.target)
@@ -345,10 +349,10 @@ def _use_flattest_window(spec: VcfmSpec, request: Request, preloads: tuple[float
     return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
 
 
-CENTRES = np.linspace(0.5, 1.5, 41)
+WINDOW_CENTRES = np.linspace(0.5, 1.5, 41)
 """Middles of windows that are looked at, over the rise: that of Vs is 1, that of cosine arches 4/3."""
 
-ROUNDS = 3
+N_LENGTHENINGS = 3
 """Times that parts are made longer: stress falls a little less than with the square of the length."""
 
 
@@ -378,7 +382,7 @@ def with_structure(
     spec : VcfmSpec
         With a diamond and straight leaves.
     name : str
-        Of `STRUCTURES`.
+        Of `STRUCTURE_BLOCKS`.
     forces : (float, float)
         The one without preload, and the largest, for whose preload the spring is sized, too [N].
     travel, strength : float
@@ -389,13 +393,13 @@ def with_structure(
     cfmkit.errors.SolutionError
         If no widths above zero fit, or the leaves cannot be followed that far.
     """
-    block, structure = STRUCTURES[name]
+    block, structure = STRUCTURE_BLOCKS[name]
     keys = structure.changes(getattr(spec.mechanism, block)).items()
     changes = {f"mechanism.{block}.{key}": value for key, value in keys}
     made = spec.replace({**changes, "design": None, "requirements": (), "mechanism.safety_factor": 1.0})
     made = made.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0,), "analysis.window": None})
     found = _fit_widths(made, forces, travel)
-    for _ in range(ROUNDS):
+    for _ in range(N_LENGTHENINGS):
         over = [stress / strength for stress in found.stresses]
         if max(over) <= 1.0:
             break
@@ -413,7 +417,7 @@ def _fit_widths(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
     rise = spec.mechanism.bistable.length * sin(spec.mechanism.bistable.angle)
-    centres = [one * rise for one in CENTRES if one * rise > 0.51 * travel]
+    centres = [one * rise for one in WINDOW_CENTRES if one * rise > 0.51 * travel]
     if not centres:
         raise SolutionError("the leaves are too flat for the travel")
     end = max(centres) + 0.5 * travel

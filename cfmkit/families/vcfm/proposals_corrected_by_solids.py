@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.flattest_window import INSIDE
+from cfmkit.families.flattest_window import WINDOW_EXTENSION_SHARE
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
 from cfmkit.families.vcfm.exact_model import analyze
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
     from cfmkit.families.vcfm.spec import VcfmSpec
 
-NEARBY = np.linspace(0.9, 1.1, 21)
+WINDOW_CENTRE_RATIOS = np.linspace(0.9, 1.1, 21)
 """Middles of windows of a solid that are looked at, over that of its beams."""
 
 
@@ -35,7 +35,9 @@ def correct(spec: VcfmSpec, request: Request) -> VcfmSpec:
     solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
     window = solid.analysis.window
     middle = 0.5 * (float(window[0]) + float(window[1])) if window else 0.5 * spec.travel
-    ends = [share * middle + 0.5 * request.travel for share in NEARBY if share * middle > 0.5 * request.travel]
+    ends = [
+        share * middle + 0.5 * request.travel for share in WINDOW_CENTRE_RATIOS if share * middle > 0.5 * request.travel
+    ]
     if not ends:
         return solid
     free = {"analysis.travel": max(ends), "analysis.window": None, "analysis.preloads": (0.0,)}
@@ -59,7 +61,7 @@ def correct(spec: VcfmSpec, request: Request) -> VcfmSpec:
         preloads = preloads_for(spec, request, 1.0 / rate, preloads)
     made = lengthen(solid, longer)
     made = widen(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
-    begin = last - request.travel * (1.0 + INSIDE)
+    begin = last - request.travel * (1.0 + WINDOW_EXTENSION_SHARE)
     changes = {
         "analysis.window": (Place(begin, "length"), Place(last, "length")), "analysis.travel": last,
         "analysis.preloads": preloads,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.end_stops import OF_STOPS
-from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
 from cfmkit.families.rows import ScalarQuantity, without_values
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
@@ -144,7 +144,7 @@ def _of_wire(name: str) -> ScalarQuantity[Solution]:
     )
 
 
-QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **{
         name: ScalarQuantity(
             *about,
@@ -269,8 +269,8 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result of the family, in the order in which they are shown."""
 
-COLUMNS = without_values(OF_STOPS) | dict(QUANTITIES)
+COLUMNS = without_values(OF_STOPS) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows; a mechanism with stops is solved by itself."""
 
-DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()} | OF_STOPS
+SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_STOPS
 """Name -> dimension and definition."""

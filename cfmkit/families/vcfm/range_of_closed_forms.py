@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm, percent
-from cfmkit.families.vcfm.leaves.v_beam import RELIABLE, STEEP, STOCKY, THICK
+from cfmkit.families.vcfm.leaves.v_beam import MAX_LEAF_ANGLE, MAX_TRAVEL_RATIO, STOCKY_LEAF_RATIO, THICK_LEAF_RATIO
 from cfmkit.families.vcfm.solution import goes_beyond
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def _slimness(solution: Solution) -> FloatArray:
 
 def is_stocky(solution: Solution) -> Any:
     """Return which leaves are so thick that no model here is for them, (m,)."""
-    return (_slimness(solution) > STOCKY) & (solution.fidelity != "truss")
+    return (_slimness(solution) > STOCKY_LEAF_RATIO) & (solution.fidelity != "truss")
 
 
 def leaves_out_of_range(solution: Solution) -> Any:
@@ -37,10 +37,10 @@ def leaves_out_of_range(solution: Solution) -> Any:
         return False
     if solution.leaf_kind.shortcoming is not None:
         return ~is_stocky(solution)
-    reach = RELIABLE * solution.of_mechanisms(solution.parts.balance)
-    steep = solution.of_mechanisms(solution.parts.strip.angle) > STEEP
+    reach = MAX_TRAVEL_RATIO * solution.of_mechanisms(solution.parts.balance)
+    steep = solution.of_mechanisms(solution.parts.strip.angle) > MAX_LEAF_ANGLE
     far = goes_beyond(solution.nominal.ends[1], reach)
-    return ~is_stocky(solution) & ((_slimness(solution) > THICK) | steep | far)
+    return ~is_stocky(solution) & ((_slimness(solution) > THICK_LEAF_RATIO) | steep | far)
 
 
 def range_of_leaves(solution: Solution) -> Sentence:
@@ -49,18 +49,19 @@ def range_of_leaves(solution: Solution) -> Sentence:
     verify = "verify with 'analysis.fidelity: exact'"
     if (shortcoming := solution.leaf_kind.shortcoming) is not None:
         return f"{shortcoming(solution.parts.leaf)}. V{verify[1:]}", cure
-    if share > THICK:
+    if share > THICK_LEAF_RATIO:
         return (
             f"the thickness of the leaves is {percent(share)} of their length: the closed forms are for thin leaves, "
             f"and are off by 5 to 10 % or more here; {verify}",
             cure,
         )
-    if float(strip.angle) > STEEP:
+    if float(strip.angle) > MAX_LEAF_ANGLE:
         text = f"leaves at {degrees(strip.angle):.3g} deg: the closed forms hold for small angles, up to 15 deg"
         return f"{text}; {verify}", cure
     return (
-        f"the travel goes to {mm(float(solution.first.travel[-1]))}, beyond {RELIABLE} times the rise "
-        f"({mm(RELIABLE * float(solution.parts.balance))}): the force there is off by several per cent; {verify}",
+        f"the travel goes to {mm(float(solution.first.travel[-1]))}, beyond {MAX_TRAVEL_RATIO} times the rise "
+        f"({mm(MAX_TRAVEL_RATIO * float(solution.parts.balance))}): the force there is off by several per "
+        f"cent; {verify}",
         cure,
     )
 
@@ -69,11 +70,14 @@ def range_of_leaves_in_short(solution: Solution) -> str:
     """Return the same in short; empty where the sentence is short enough."""
     if (
         solution.leaf_kind.shortcoming is not None
-        or _slimness(solution)[0] > THICK
-        or float(solution.parts.strip.angle) > STEEP
+        or _slimness(solution)[0] > THICK_LEAF_RATIO
+        or float(solution.parts.strip.angle) > MAX_LEAF_ANGLE
     ):
         return ""
-    return f"closed forms are off by several per cent beyond {mm(RELIABLE * float(solution.parts.balance))} of travel"
+    return (
+        f"closed forms are off by several per cent beyond "
+        f"{mm(MAX_TRAVEL_RATIO * float(solution.parts.balance))} of travel"
+    )
 
 
 def _worst_compression(solution: Solution, limits: tuple[float, float]) -> FloatArray:
@@ -93,7 +97,7 @@ def spring_out_of_range(solution: Solution) -> Any:
         return False
     worst = _worst_compression(solution, limits)
     share = np.abs(worst) / (2.0 * solution.of_mechanisms(spring.strip.length))
-    steep = solution.of_mechanisms(spring.strip.angle) > STEEP
+    steep = solution.of_mechanisms(spring.strip.angle) > MAX_LEAF_ANGLE
     return ~is_stocky(solution) & (steep | (share > np.where(worst > 0, *limits)))
 
 
@@ -101,7 +105,7 @@ def range_of_spring(solution: Solution) -> Sentence:
     """Return why the closed form is not for this spring."""
     spring: Any = solution.parts.spring
     worst = float(_worst_compression(solution, spring.deflection_limits)[0])
-    if spring.strip.angle > STEEP:
+    if spring.strip.angle > MAX_LEAF_ANGLE:
         angle = degrees(spring.strip.angle)
         text = f"the leaves of the spring are at {angle:.3g} deg: its stiffness changes with its compression"
     else:

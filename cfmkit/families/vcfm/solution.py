@@ -42,19 +42,19 @@ FLAT_PLACES = 401
 MEAN_PLACES = 201
 """Even places of the window at which the forces of all preloads are averaged."""
 
-ROUNDING = 1e-9
+LIMIT_RTOL = 1e-9
 """A force or a travel beyond its limit by this share is on it: conversions of units and sums leave less."""
 
-EVEN = 257
+N_EVEN_PLACES = 257
 """Places at even steps: the force beyond the peak is smooth, and the leaves' law has no shorter waves."""
 
-CROWDED = np.geomspace(1e-6, 1.0, 73)
+CROWDED_SHARES = np.geomspace(1e-6, 1.0, 73)
 """Shares of the travel, and of the way from an end of the constant stiffness, at which more places stand."""
 
 
 def goes_beyond(travel: FloatArray, end: FloatArray) -> Any:
     """Return whether travels go beyond ends [m], by more than rounding."""
-    return travel > end * (1 + ROUNDING)
+    return travel > end * (1 + LIMIT_RTOL)
 
 
 def target_of(spec: VcfmSpec) -> float | None:
@@ -368,11 +368,11 @@ class Solution(ShortRepr):
     def dense(self) -> FloatArray:
         """Increasing travels of each shuttle, (m, q), so dense that the force hides nothing between two [m]."""
         low, high = (end[:, None] for end in self.nominal.ends)
-        grid = [np.linspace(low[:, 0], high[:, 0], EVEN, axis=1)]
+        grid = [np.linspace(low[:, 0], high[:, 0], N_EVEN_PLACES, axis=1)]
         grid += [np.clip(np.full_like(low, place), low, high) for place in self.curves.stops.marks]
         with np.errstate(all="ignore"):
             for mark in (*(end[:, None] for end in self.linear), np.zeros_like(low)):
-                crowd = np.hstack([mark, mark - CROWDED * (high - low), mark + CROWDED * (high - low)])
+                crowd = np.hstack([mark, mark - CROWDED_SHARES * (high - low), mark + CROWDED_SHARES * (high - low)])
                 inside = (mark >= low) & (mark < high) & (crowd >= low) & (crowd <= high)
                 grid.append(np.where(inside, crowd, low))
         return np.sort(np.hstack(grid), axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import Border, arc_weights, force_change, largest_motion
-from cfmkit.numerics.continuation.steps import CHORD_COSINE, FORCE_SHARE, ROUNDING
+from cfmkit.numerics.continuation.steps import CHORD_COSINE, FORCE_SHARE, MOTION_ROUNDING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 MISSED_SHARE = 0.4  # of a step by which the tangent may miss
 GOOD_MISS = 0.05  # below which the next step is longer
-GROWTH = 1.6
+STEP_GROWTH = 1.6
 LONGEST_BEND = 2.0  # times the step before, up to which the cubic through its ends says where the next one leads
 N_HALVINGS = 12  # until a guess within a step lies at its drive
 TURN_COSINE = 0.7  # between the tangents at both ends of a step: at least
-SHORTEST_SHARE, SHORTEST = 1e-9, 1e-12  # of the first step, and at all
+SHORTEST_SHARE, MIN_STEP_LENGTHS = 1e-9, 1e-12  # of the first step, and at all
 
 
 class ArcStep(NamedTuple):
@@ -114,7 +114,7 @@ def follow_arc(
     """Yield accepted steps along the arc from an equilibrium, until none is found."""
     first, weights = length, arc_weights(problem, options.span)
     before: ArcMove | None = None
-    while length > max(SHORTEST_SHARE * first, SHORTEST):
+    while length > max(SHORTEST_SHARE * first, MIN_STEP_LENGTHS):
         bend = before.bend(length) if before is not None and length <= LONGEST_BEND * before.length else None
         step = step_along(problem, here, tangent, length, options.span, bend)
         if (
@@ -128,7 +128,7 @@ def follow_arc(
         yield before
         here, tangent = step.new, step.tangent
         if step.missed < GOOD_MISS * length:
-            length *= GROWTH
+            length *= STEP_GROWTH
 
 
 def _accept(
@@ -149,7 +149,7 @@ def _accept(
         return False
     if force_change(problem, here.x, step.new.x, options.largest_force, FORCE_SHARE) > 1.5:
         return False
-    if moved <= ROUNDING:
+    if moved <= MOTION_ROUNDING:
         return True
     size = float(np.linalg.norm(chord[motions]))
     ends = (tangent[:-1][motions] for tangent in (before, step.tangent))

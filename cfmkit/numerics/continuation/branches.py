@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
-AMPLITUDES, LAST_AMPLITUDES = (0.06, 0.02), (0.006, 0.002)
+MODE_AMPLITUDES, LAST_AMPLITUDES = (0.06, 0.02), (0.006, 0.002)
 """Largest motion of the mode with which a branch is entered."""
 FIRST_REACH, LONGEST_REACH = 1e-3, 0.05  # of steps down from a saddle
 MAX_STEPS_DOWN = 100
-STILL = 1e-6  # step from which Newton's method reaches an equilibrium
-NEARBY = 0.5  # motion behind which an equilibrium is no more near a saddle
+NEWTON_STEP_TOL = 1e-6  # step from which Newton's method reaches an equilibrium
+SADDLE_DISTANCE = 0.5  # motion behind which an equilibrium is no more near a saddle
 AMPLITUDE_SLACK = 0.3  # of the amplitude expected: how far an equilibrium on a branch may be off
 BESIDE_TOLERANCE = 1e-12  # of the drive, as a share of the way to where the branch was entered
 SMALLEST_AMPLITUDE = 1e-6  # as a share of that where the branch was entered: less is the singular point itself
@@ -66,13 +66,13 @@ def descend(problem: ContinuationProblem, saddle: PathEquilibrium, sign: int) ->
         values, modes = problem.modes(saddle._replace(x=x), len(x))
         falling = modes[:, values < 0]
         step = newton[:, 0] - 2 * falling @ (falling[problem.motions].T @ newton[problem.motions, 0])
-        if largest_motion(problem, step) < STILL:
+        if largest_motion(problem, step) < NEWTON_STEP_TOL:
             if not falling.shape[1]:
                 return correct(problem, x, saddle.drive)
             step = sign * FIRST_REACH * problem.orient(falling)
         x = x + step * min(1.0, reach / largest_motion(problem, step))
         reach = min(2 * reach, LONGEST_REACH)
-        if largest_motion(problem, x - saddle.x) > NEARBY:
+        if largest_motion(problem, x - saddle.x) > SADDLE_DISTANCE:
             return None
     return None
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
 TOO_SHARP = "the drive cannot go on at {place}: it locks, or turns too sharply to follow"
 FIRST_LENGTH = 0.02  # where no step before says better
-LENGTHS = 1e-6, 0.05  # shortest and longest first step
+FIRST_STEP_LENGTHS = 1e-6, 0.05  # shortest and longest first step
 STEADY_STEPS = 3  # in which the drive leads, until it does so again
 STEADY_SHARE = 2.0  # motion by the slope over that of the step, up to which the drive leads
 STEADY_STEP = 1e-3  # share of the range that such a step must bring
@@ -43,7 +43,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         return None
     along = np.append(begin.rate, 1.0) * walk.sense
     moved = walk.measure_motion(walk.before) if walk.before is not None else FIRST_LENGTH
-    length = float(np.clip(fineness * moved, *LENGTHS))
+    length = float(np.clip(fineness * moved, *FIRST_STEP_LENGTHS))
     tangent = unit_tangent(problem, begin, along, options.span)
     steady = 0
     for count, move in enumerate(follow_arc(problem, begin, tangent, length, options), 1):

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.problem import ContinuationProblem
 
-TOLERANCE = 1e-10  # of a step: of motions, and of forces over their size or ten units
+STEP_TOLERANCE = 1e-10  # of a step: of motions, and of forces over their size or ten units
 MAX_ITERATIONS = 14
 MAX_MOTION = 50.0  # in one iteration: what moves further is lost
 MAX_FORCE = 1e8  # units: what bears more is locked
 FLOOR_OF_MOTION, FLOOR_OF_FORCE = 1e-7, 2e-5
 """Steps below which rounding is accepted where it keeps Newton's method from converging further."""
-STAGNATION = 0.3  # of a step as a share of the one before
+STAGNATION_RATIO = 0.3  # of a step as a share of the one before
 FORCE_UNITS = 10.0  # forces are compared with themselves, at least with so many units
 
 
@@ -59,8 +59,8 @@ def correct(
             x, drive = x + step, drive + change
             if float((np.abs(x) / problem.unit)[~problem.motions].max(initial=0.0)) > MAX_FORCE:
                 return None
-            stagnant = motion < FLOOR_OF_MOTION and largest < FLOOR_OF_FORCE and largest > STAGNATION * last
-            converged = largest < TOLERANCE * (1 + largest_motion(problem, x)) or stagnant
+            stagnant = motion < FLOOR_OF_MOTION and largest < FLOOR_OF_FORCE and largest > STAGNATION_RATIO * last
+            converged = largest < STEP_TOLERANCE * (1 + largest_motion(problem, x)) or stagnant
             if converged and (iteration > 0 or border is None):  # a first step may have changed the drive alone
                 return PathEquilibrium(x, float(drive), rate, here.unstable)
             last = largest

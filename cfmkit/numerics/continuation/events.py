@@ -26,7 +26,7 @@ MAX_SAMPLES = 40
 JUST_BEFORE = 1e-4  # of a step: how far the last equilibrium before a fold lies from it
 SAME_PATH_VALUE = 0.03  # share of the first values below which a sample comes on one path
 SAME_PATH_WIDTH = 5.0  # times its width by which the ends of a bracket may lie apart on one path
-HALVINGS = 40  # until only one direction changes its stability
+MAX_HALVINGS = 40  # until only one direction changes its stability
 ONE_LOSS = 1e-4  # share of the way from the piece's begin below which several losses are one
 
 
@@ -159,7 +159,7 @@ def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
     problem, here, widest = walk.problem, walk.here, walk.options.corner * walk.options.span or np.inf
     begin = walk.trail[0].drive
     narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(here.drive - begin) + 1e-12 * walk.options.span)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         width = abs(new.drive - here.drive)
         if (abs(new.unstable - here.unstable) <= 1 and width <= widest) or width < narrowest:
             break

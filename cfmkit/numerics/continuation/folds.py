@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.events import Located
     from cfmkit.numerics.continuation.losses import Items
 
-BEYOND = 0.5  # share of the range by which a path may leave it
+MAX_OVERSHOOT_SHARE = 0.5  # share of the range by which a path may leave it
 SHORTEST_RETRY = 1e-4  # of the first step, where a step ends on another path
 STEADY_STEPS = 3  # in which the drive leads, until it does so again
 STEADY_SHARE = 1.5  # motion by the slope over that of the step, up to which the drive leads
@@ -88,7 +88,7 @@ def _run(walk: Walk) -> range:
 
 
 def _limits(walk: Walk) -> tuple[float, float]:
-    beyond = BEYOND * walk.options.span
+    beyond = MAX_OVERSHOOT_SHARE * walk.options.span
     return min(0.0, float(walk.targets.min())) - beyond, max(0.0, float(walk.targets.max())) + beyond
 
 

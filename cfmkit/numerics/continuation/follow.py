@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.steps import Trial
 
 NEARLY_CRITICAL = 1e-5  # stiffness of a mode; one a hundred times as large says that no bifurcation is very near
-LANDING = 1.3  # steps by which a step may be stretched to land on a requested value
+LANDING_STRETCH = 1.3  # steps by which a step may be stretched to land on a requested value
 GOOD_MISFIT = 0.1  # of predictions after which the step grows
-SHRINK, POOR_MISFIT = 0.8, 0.25
+STEP_SHRINK, POOR_MISFIT = 0.8, 0.25
 FORCE_MARGIN = 0.7  # of the allowed change of forces that a shortened step aims at
 ARC_AFTER = 7  # rejections, two each less one for an accepted step, above which the arc length leads
 ARC_ANYWAY = 24  # rejections above which it leads even where the slope is not steep
-STEEP = 0.5  # motion over the drive's range, by the slope
+STEEP_SLOPE = 0.5  # motion over the drive's range, by the slope
 MAX_REJECTIONS = 90
 SHORT_STEP = 1e-9  # share of the range: shorter steps count as rejections
-LOCKED = "the drive cannot go on at {place}: the structure locks, a force grows beyond all bounds"
+LOCKED_MESSAGE = "the drive cannot go on at {place}: the structure locks, a force grows beyond all bounds"
 LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
 """Force, in its unit, and step as a share of the range, from which on a structure is locked: pulled straight, say."""
 
@@ -160,11 +160,11 @@ def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
     here, sense = walk.here, walk.sense
     if _is_locked(walk):
-        return PathStop(WhyStopped.LIMIT_POINT, here.drive, LOCKED)
+        return PathStop(WhyStopped.LIMIT_POINT, here.drive, LOCKED_MESSAGE)
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = replace(walk, before=None)
     target = float(walk.targets[walk.number])
-    lands = abs(target - here.drive) <= LANDING * walk.step
+    lands = abs(target - here.drive) <= LANDING_STRETCH * walk.step
     goal = target if lands else here.drive + sense * walk.step
     trial = advance(walk, goal)
     if trial.excess > 1:
@@ -230,7 +230,7 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
 def _next_step(walk: Walk, misfit: float, step: float, landed: bool) -> float:
     if misfit < GOOD_MISFIT:
         return min(walk.options.span, walk.options.growth * (walk.step if landed else max(walk.step, step)))
-    return SHRINK * step if misfit > POOR_MISFIT else walk.step
+    return STEP_SHRINK * step if misfit > POOR_MISFIT else walk.step
 
 
 def _shorten_for_forces(walk: Walk, goal: float, excess: float) -> Walk:
@@ -253,7 +253,7 @@ def _reject(walk: Walk, goal: float) -> Items:
             return outcome
     walk = walk.shorten(0.5 * abs(goal - here.drive))
     if walk.rejections > ARC_AFTER:
-        steep = largest_motion(walk.problem, here.rate) * options.span > STEEP
+        steep = largest_motion(walk.problem, here.rate) * options.span > STEEP_SLOPE
         if steep or walk.rejections > ARC_ANYWAY:
             outcome = yield from follow_by_arc(walk)
             if outcome is not None:

@@ -11,8 +11,8 @@ import numpy as np
 from cfmkit.numerics.continuation.arc import step_along
 from cfmkit.numerics.continuation.branch_ends import primary_slope
 from cfmkit.numerics.continuation.branches import (
-    AMPLITUDES,
     LAST_AMPLITUDES,
+    MODE_AMPLITUDES,
     descend,
     enter_branch,
     find_beside,
@@ -43,10 +43,10 @@ LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
 LOOK_PAST_BY = 2e-3, 2e-2
 """Shares of the range ahead of here and of the goal at which the path may be less stable."""
 LOOK_PAST_MISS = 0.02  # motion
-CRITICAL = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
+CRITICAL_STIFFNESS = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
 FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there
 BESIDE_CORNER = 1 / 16  # share of the way onto a branch at which its stiffness is taken
-FORWARD = 1e-13  # share of the range: less is rounding
+DRIVE_RTOL = 1e-13  # share of the range: less is rounding
 FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
 
@@ -128,7 +128,7 @@ def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, .
     by the way to the first.
     """
     width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.trail[0].drive)
-    yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), AMPLITUDES + LAST_AMPLITUDES
+    yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), MODE_AMPLITUDES + LAST_AMPLITUDES
     if way < NEARLY_RIGID * walk.options.span:
         yield tuple(factor * way for factor in RIGID_CLUSTERS), ()
     yield tuple(factor * width for factor in WIDE_CLUSTERS), ()
@@ -212,10 +212,10 @@ def start_critical(walk: Walk) -> Walk | None:
     """
     problem, start = walk.problem, walk.here
     is_stiff = getattr(problem, "is_stiff", None)
-    if is_stiff is not None and is_stiff(start, CRITICAL):
+    if is_stiff is not None and is_stiff(start, CRITICAL_STIFFNESS):
         return None
     values, modes = problem.modes(start, 1)
-    if abs(values[0]) > CRITICAL:
+    if abs(values[0]) > CRITICAL_STIFFNESS:
         return None
     tangent = np.append(problem.orient(modes), 0.0)
     tangent /= np.sqrt(arc_weights(problem, walk.options.span) @ tangent**2)
@@ -223,7 +223,7 @@ def start_critical(walk: Walk) -> Walk | None:
         for sign in (walk.options.sign, -walk.options.sign):
             step = step_along(problem, start, sign * tangent, FIRST_AMPLITUDE * 0.5**halvings, walk.options.span)
             forward = 0.0 if step is None else (step.new.drive - start.drive) * walk.sense
-            if step is None or step.new.unstable or forward <= FORWARD * walk.options.span:
+            if step is None or step.new.unstable or forward <= DRIVE_RTOL * walk.options.span:
                 continue
             if not walk.targets_up_to(step.new.drive):
                 return walk.restart(step.new, abs(step.new.drive - start.drive))

@@ -18,7 +18,7 @@ FORCE_SHARE = 0.5  # of a force by which a step may change it, besides `Options.
 MISSED_SHARE = 0.4  # of a step's motion by which its prediction may miss
 CHORD_COSINE = 0.5  # between a step and the slopes at both its ends: at least
 CHORD_MISFIT = 0.25  # of a step, to the mean of these slopes
-ROUNDING = 1e-7  # motions that small say nothing
+MOTION_ROUNDING = 1e-7  # motions that small say nothing
 
 
 class Trial(NamedTuple):
@@ -67,7 +67,7 @@ def advance(walk: Walk, goal: float) -> Trial:
     excess = force_change(problem, here.x, new.x, options.largest_force, FORCE_SHARE)
     if excess > 1:
         return Trial(None, excess=excess)
-    if missed > MISSED_SHARE * moved + ROUNDING or not _keeps_direction(walk, new, moved):
+    if missed > MISSED_SHARE * moved + MOTION_ROUNDING or not _keeps_direction(walk, new, moved):
         return Trial(None)
     return Trial(new, missed / (moved + 1e-8))
 
@@ -78,7 +78,7 @@ def _keeps_direction(walk: Walk, new: PathEquilibrium, moved: float) -> bool:
     Without the second a step hops from the end of a branch onto the path that it joins, unnoticed.
     """
     here, motions = walk.here, walk.problem.motions
-    if moved <= ROUNDING or new.unstable != here.unstable:
+    if moved <= MOTION_ROUNDING or new.unstable != here.unstable:
         return True
     change = new.drive - here.drive
     chord, slopes = (new.x - here.x)[motions], (here.rate[motions], new.rate[motions])
@@ -86,4 +86,4 @@ def _keeps_direction(walk: Walk, new: PathEquilibrium, moved: float) -> bool:
     if any(np.sign(change) * (chord @ slope) < CHORD_COSINE * size * np.linalg.norm(slope) for slope in slopes):
         return False
     misfit = np.abs(chord - 0.5 * change * (slopes[0] + slopes[1])).max()
-    return bool(misfit <= CHORD_MISFIT * moved + ROUNDING)
+    return bool(misfit <= CHORD_MISFIT * moved + MOTION_ROUNDING)

@@ -54,10 +54,18 @@ from cfmkit.specs.units.quantities import (
     read_quantity,
 )
 from cfmkit.specs.units.strict_decimal_number import read_number
-from cfmkit.specs.units.table import DIMENSIONS, UNITS, Dimension, border_factor, border_unit, from_border, to_border
+from cfmkit.specs.units.table import (
+    DIMENSIONS_BY_NAME,
+    UNIT_TABLE,
+    Dimension,
+    border_factor,
+    border_unit,
+    from_border,
+    to_border,
+)
 from cfmkit.specs.units.unit_size import unit_table
 from cfmkit.specs.units.windows import (
-    SHARE,
+    SHARE_DIMENSION,
     Ends,
     TravelShare,
     WindowEnd,
@@ -68,9 +76,9 @@ from cfmkit.specs.units.windows import (
 )
 
 __all__ = [
-    "DIMENSIONS",
-    "SHARE",
-    "UNITS",
+    "DIMENSIONS_BY_NAME",
+    "SHARE_DIMENSION",
+    "UNIT_TABLE",
     "Acceleration",
     "Angle",
     "AngularAcceleration",

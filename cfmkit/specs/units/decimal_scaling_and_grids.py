@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-DIGITS = 15
+MAX_FLOAT_DIGITS = 15
 """Every decimal with so many digits survives the way through a float."""
 
-_EXACT = 22
+_MAX_EXACT_POWER = 22
 """Powers of ten up to this one are exact floats."""
 
-_POWERS = np.array([float(f"1e{power}") for power in range(-_EXACT, _EXACT + 1)])
+_POWERS_OF_TEN = np.array([float(f"1e{power}") for power in range(-_MAX_EXACT_POWER, _MAX_EXACT_POWER + 1)])
 
-_WIDE = Context(prec=800)
+_WIDE_CONTEXT = Context(prec=800)
 """Wide enough for the exact digits of any float."""
 
 
@@ -63,8 +63,8 @@ def shift_decimal(values: ArrayLike, power: int) -> FloatArray:
     >>> float(shift_decimal(0.0041, 3))
     4.1
     """
-    if not -DIGITS <= power <= DIGITS:
-        raise ValueError(f"the decimal point can move by -{DIGITS} to {DIGITS} places, not {power}")
+    if not -MAX_FLOAT_DIGITS <= power <= MAX_FLOAT_DIGITS:
+        raise ValueError(f"the decimal point can move by -{MAX_FLOAT_DIGITS} to {MAX_FLOAT_DIGITS} places, not {power}")
     given = np.asarray(values, dtype=np.float64)
     flat = given.ravel()
     shifted = _times(flat, power)
@@ -109,9 +109,13 @@ def even_grid(start: float, stop: float, count: int) -> FloatArray:
 def _shift_short(flat: FloatArray, power: int, shifted: FloatArray) -> None:
     """Correct, in place, the entries of `shifted` that are short decimals."""
     size = np.abs(flat)
-    leading = np.searchsorted(_POWERS, size, side="right") - 1 - _EXACT
-    places = DIGITS - 1 - leading
-    fast = (leading < _EXACT) & (np.abs(places) <= _EXACT) & (np.abs(power - places) <= _EXACT)
+    leading = np.searchsorted(_POWERS_OF_TEN, size, side="right") - 1 - _MAX_EXACT_POWER
+    places = MAX_FLOAT_DIGITS - 1 - leading
+    fast = (
+        (leading < _MAX_EXACT_POWER)
+        & (np.abs(places) <= _MAX_EXACT_POWER)
+        & (np.abs(power - places) <= _MAX_EXACT_POWER)
+    )
     places[~fast] = 0
     digits = np.rint(_times(flat, places))
     short = fast & (_times(digits, -places) == flat)
@@ -123,7 +127,7 @@ def _shift_short(flat: FloatArray, power: int, shifted: FloatArray) -> None:
 
 def _times(values: FloatArray, power: int | NDArray[np.intp]) -> FloatArray:
     """Return ``values * 10**power`` with a single rounding, for powers of -22 to 22."""
-    scale: FloatArray = _POWERS[np.abs(power) + _EXACT]
+    scale: FloatArray = _POWERS_OF_TEN[np.abs(power) + _MAX_EXACT_POWER]
     with np.errstate(all="ignore"):
         product: FloatArray = np.where(np.less(power, 0), values / scale, values * scale)
     return product
@@ -133,6 +137,6 @@ def _shift_one(value: float, power: int) -> float:
     """Return one shifted value of any magnitude, by decimal arithmetic."""
     decimal = Decimal(repr(value))
     # Below the normal floats 15 digits do not tell one float from the next any more.
-    if len(decimal.normalize().as_tuple().digits) > DIGITS or abs(value) < sys.float_info.min:
+    if len(decimal.normalize().as_tuple().digits) > MAX_FLOAT_DIGITS or abs(value) < sys.float_info.min:
         decimal = Decimal(value)
-    return float(decimal.scaleb(power, _WIDE))
+    return float(decimal.scaleb(power, _WIDE_CONTEXT))

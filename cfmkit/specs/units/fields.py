@@ -26,7 +26,7 @@ from cfmkit.specs.units.quantities import (
     read_one_of,
 )
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.specs.units.table import DIMENSIONS, UNITLESS, dimension_of
+from cfmkit.specs.units.table import DIMENSIONS_BY_NAME, UNITLESS_DIMENSIONS, dimension_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
     from pydantic_core import CoreSchema
 
-PLACES = ("length", "angle")
-SMALLEST, LARGEST = 1e-30, 1e30
+PLACE_DIMENSIONS = ("length", "angle")
+MIN_QUANTITY, MAX_QUANTITY = 1e-30, 1e30
 """Sizes that a specification may give, in SI units: their squares and products are still numbers."""
 
 MOST_TURNS = 10_000
 """Angles that a specification may give, in turns: arrays are made as long as a shape winds."""
 
-_BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
+_BOUND_OPERATORS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
     "gt": (">", operator.gt),
     "ge": (">=", operator.ge),
     "lt": ("<", operator.lt),
@@ -78,10 +78,10 @@ class UnitField:
             With what is wrong and what to write instead.
         """
         number, dimension = self._read(value)
-        if number and not SMALLEST <= abs(number) <= LARGEST:
+        if number and not MIN_QUANTITY <= abs(number) <= MAX_QUANTITY:
             reported = value.strip() if isinstance(value, str) else decimal_text(number)
             raise QuantityError(
-                f"{reported} is outside the range of the computation: {SMALLEST:g} to {LARGEST:g} in SI units"
+                f"{reported} is outside the range of the computation: {MIN_QUANTITY:g} to {MAX_QUANTITY:g} in SI units"
             )
         if dimension == "angle" and abs(number) > MOST_TURNS * math.tau:
             reported = value.strip() if isinstance(value, str) else format_quantity(number, "angle")
@@ -111,7 +111,7 @@ class UnitField:
         cfmkit.errors.QuantityError
             With the value as it was given, and the bounds with units.
         """
-        if all(_BOUNDS[name][1](value, bound) for name, bound in bounds.items()):
+        if all(_BOUND_OPERATORS[name][1](value, bound) for name, bound in bounds.items()):
             return value
         reported = given.strip() if isinstance(given, str) else self.format_value(value)
         raise QuantityError(f"{reported} is not allowed: must be {self.describe_allowed(bounds, reported)}")
@@ -120,17 +120,17 @@ class UnitField:
         """Return bounds in words, with the percentage that was meant by a number above 1, if it keeps them."""
         meant = meant_as_percent(given) if self.dimensions == ("ratio",) else ""
         share = read_one_of(meant, self.dimensions)[0] if meant else 0.0
-        fits = meant and all(_BOUNDS[name][1](share, bound) for name, bound in bounds.items())
+        fits = meant and all(_BOUND_OPERATORS[name][1](share, bound) for name, bound in bounds.items())
         return f"{self.limits(bounds)}; did you mean {meant}?" if fits else self.limits(bounds)
 
     def limits(self, bounds: Mapping[str, float]) -> str:
         """Return bounds in words with units: ``> 0 and <= 500 mm``."""
-        return " and ".join(f"{_BOUNDS[name][0]} {self.format_value(bound)}" for name, bound in bounds.items())
+        return " and ".join(f"{_BOUND_OPERATORS[name][0]} {self.format_value(bound)}" for name, bound in bounds.items())
 
     @property
     def needs_unit(self) -> bool:
         """Whether a number other than zero must carry a unit in a file."""
-        return self.dimensions[0] not in UNITLESS
+        return self.dimensions[0] not in UNITLESS_DIMENSIONS
 
     def format_value(self, value: float) -> str:
         """Return an SI value with its unit, for a message."""
@@ -138,7 +138,7 @@ class UnitField:
 
     def json_schema(self, bounds: Mapping[str, float]) -> dict[str, Any]:
         """Return the JSON schema of such a value."""
-        items = [DIMENSIONS[name] for name in self.dimensions]
+        items = [DIMENSIONS_BY_NAME[name] for name in self.dimensions]
         kind = "string" if self.needs_unit else ["number", "string"]
         about = {"x-dimension": " or ".join(item.name for item in items), "examples": [item.example for item in items]}
         return {"type": kind} | about | ({"x-allowed": self.limits(bounds)} if bounds else {})
@@ -148,7 +148,7 @@ class UnitField:
         from pydantic_core import core_schema
 
         inner: Any = handler(source)
-        bounds = {name: inner.pop(name) for name in _BOUNDS if name in inner}
+        bounds = {name: inner.pop(name) for name in _BOUND_OPERATORS if name in inner}
 
         def read(value: Any) -> float:
             return self.check(self.read(value)[0], bounds, value)
@@ -175,7 +175,7 @@ class Place(float):
 
     def __new__(cls, value: float, dimension: str = "length") -> Place:
         """Return `value` as a place of that dimension."""
-        if dimension not in PLACES:
+        if dimension not in PLACE_DIMENSIONS:
             raise ValueError(f"a place is a length or an angle, not {dimension!r}")
         place = super().__new__(cls, value)
         place.dimension = dimension
@@ -197,14 +197,16 @@ class Place(float):
     @classmethod
     def __get_pydantic_json_schema__(cls, _core: Any, _handler: Any) -> dict[str, Any]:
         """Describe the text that is expected."""
-        return PLACE.json_schema({})
+        return PLACE_FIELD.json_schema({})
 
 
-PLACE = UnitField(PLACES)
+PLACE_FIELD = UnitField(PLACE_DIMENSIONS)
 
 
 def _read_place(value: Any) -> Place:
-    return value if isinstance(value, Place) and value.dimension in PLACES else Place(*PLACE.read(value))
+    return (
+        value if isinstance(value, Place) and value.dimension in PLACE_DIMENSIONS else Place(*PLACE_FIELD.read(value))
+    )
 
 
 def write_place(value: float) -> str:

@@ -17,18 +17,27 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.strict_decimal_number import NUMBER, number_complaint, odd_character, quote, read_number
-from cfmkit.specs.units.table import COMMON, DIMENSIONS, SYMBOLS, UNITLESS, UNITS, border_unit, dimension_of, to_border
+from cfmkit.specs.units.strict_decimal_number import NUMBER_PATTERN, number_complaint, odd_character, quote, read_number
+from cfmkit.specs.units.table import (
+    COMMON_UNIT_SIZES,
+    DIMENSIONS_BY_NAME,
+    UNIT_TABLE,
+    UNITLESS_DIMENSIONS,
+    UNITS_BY_SYMBOL,
+    border_unit,
+    dimension_of,
+    to_border,
+)
 from cfmkit.specs.units.unit_size import Size, border_size, is_unit, unit_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-LONGEST = 100
+MAX_TEXT_LENGTH = 100
 _UNIT_START = re.compile(r"$| *[^\W\d_]| *[%°\"'(]| *1 */")
-_PREFIX = re.compile("[-+]?0[xXoObB][0-9a-fA-F]")
-_PRECISE = Context(prec=60)
+_RADIX_PREFIX = re.compile("[-+]?0[xXoObB][0-9a-fA-F]")
+_PRECISE_CONTEXT = Context(prec=60)
 
 
 def read_quantity(text: str, dimension: str) -> float:
@@ -67,8 +76,8 @@ def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     if not unit:
         return _bare(value, number, dimensions), dimensions[0]
     for name in dimensions:
-        if (name, unit) in COMMON:
-            return _scale_number(number, unit, COMMON[name, unit]), name
+        if (name, unit) in COMMON_UNIT_SIZES:
+            return _scale_number(number, unit, COMMON_UNIT_SIZES[name, unit]), name
     if not is_unit(unit):
         raise QuantityError(unit_complaint(unit, dimensions))
     size = unit_size(unit)
@@ -129,7 +138,7 @@ def format_quantity(value: float, dimension: str, unit: str | None = None) -> st
     unit = item.unit if unit is None else unit
     if unit in ("1", ""):
         return decimal_text(value)
-    factor = COMMON.get((dimension, unit)) or unit_size(unit).factor
+    factor = COMMON_UNIT_SIZES.get((dimension, unit)) or unit_size(unit).factor
     return f"{_shortest(float(value), factor)} {unit}"
 
 
@@ -140,15 +149,17 @@ def decimal_text(value: float) -> str:
 
 def describe_dimensions(dimensions: tuple[str, ...]) -> str:
     """Return ``a length`` or ``a length or an angle``."""
-    return " or ".join(DIMENSIONS[name].phrase for name in dimensions) or "a number with a unit"
+    return " or ".join(DIMENSIONS_BY_NAME[name].phrase for name in dimensions) or "a number with a unit"
 
 
 def example(dimensions: tuple[str, ...], number: str = "") -> str:
     """Return what to write, quoted: the user's own number with a unit that fits, or the dimension's example."""
     if not dimensions:
         return "'5 mm'"
-    items = [DIMENSIONS[name] for name in dimensions]
-    texts = [f"{number} {item.unit}" if number and item.name not in UNITLESS else item.example for item in items]
+    items = [DIMENSIONS_BY_NAME[name] for name in dimensions]
+    texts = [
+        f"{number} {item.unit}" if number and item.name not in UNITLESS_DIMENSIONS else item.example for item in items
+    ]
     return " or ".join(quote(text) for text in texts)
 
 
@@ -161,12 +172,12 @@ def _split_number(text: str, dimensions: tuple[str, ...]) -> tuple[str, str]:
         raise QuantityError(
             f"the text is empty; {describe_dimensions(dimensions)} is needed, e.g. {example(dimensions)}"
         )
-    if len(text) > LONGEST:
+    if len(text) > MAX_TEXT_LENGTH:
         raise QuantityError(
-            f"{quote(text)} is too long for {describe_dimensions(dimensions)}: at most {LONGEST} characters"
+            f"{quote(text)} is too long for {describe_dimensions(dimensions)}: at most {MAX_TEXT_LENGTH} characters"
         )
-    match = NUMBER.match(text)
-    if not match or not _UNIT_START.match(rest := text[match.end() :]) or _PREFIX.match(text):
+    match = NUMBER_PATTERN.match(text)
+    if not match or not _UNIT_START.match(rest := text[match.end() :]) or _RADIX_PREFIX.match(text):
         raise QuantityError(_no_number(text, dimensions))
     return match[0], rest.strip(" ")
 
@@ -183,15 +194,15 @@ def _bare(value: float, number: str, dimensions: tuple[str, ...]) -> float:
     """Return a number without a unit, where that is enough."""
     if value == 0:
         return 0.0
-    if dimensions[0] not in UNITLESS:
+    if dimensions[0] not in UNITLESS_DIMENSIONS:
         raise QuantityError(f"{number} has no unit; write {example(dimensions, number)}")
     return value
 
 
 def _kind(size: Size) -> str:
     """Return what a unit measures: ``a force``."""
-    names = (name for name in DIMENSIONS if name != "text" and border_size(name).powers == size.powers)
-    return next((DIMENSIONS[name].phrase for name in names), "of another kind")
+    names = (name for name in DIMENSIONS_BY_NAME if name != "text" and border_size(name).powers == size.powers)
+    return next((DIMENSIONS_BY_NAME[name].phrase for name in names), "of another kind")
 
 
 def _scale_number(number: str, unit: str, factor: Fraction) -> float:
@@ -220,7 +231,7 @@ def _shortest(value: float, factor: Fraction) -> str:
     if value == 0:
         return "0"
     exact = Fraction(value) / factor
-    decimal = _PRECISE.divide(Decimal(exact.numerator), Decimal(exact.denominator))
+    decimal = _PRECISE_CONTEXT.divide(Decimal(exact.numerator), Decimal(exact.denominator))
     for digits in (15, 16, 17) if abs(value) > sys.float_info.min * 16 else range(1, 18):
         rounded = Context(prec=digits).plus(decimal)
         if _fits(rounded, factor, value):
@@ -243,9 +254,20 @@ def _plain(decimal: Decimal) -> str:
     return format(short, "e").replace("e+", "e")
 
 
-_TYPOGRAPHY = {"²": "^2", "³": "^3", "⁴": "^4", "⁻": "^-", "¹": "1", "·": "*", "×": "*", "⋅": "*", "∙": "*", "°": "deg"}
-_TYPOGRAPHY |= {"µ": "u", "μ": "u", "″": "in", '"': "in", "′": "ft", "(": "", ")": ""}
-_NAMES = {unit.name.lower(): unit.symbol for unit in UNITS} | {
+_TYPOGRAPHIC_MARKS = {
+    "²": "^2",
+    "³": "^3",
+    "⁴": "^4",
+    "⁻": "^-",
+    "¹": "1",
+    "·": "*",
+    "×": "*",
+    "⋅": "*",
+    "∙": "*",
+    "°": "deg",
+}
+_TYPOGRAPHIC_MARKS |= {"µ": "u", "μ": "u", "″": "in", '"': "in", "′": "ft", "(": "", ")": ""}
+_UNIT_NAMES = {unit.name.lower(): unit.symbol for unit in UNIT_TABLE} | {
     "metre": "m", "millimetre": "mm", "centimetre": "cm", "micron": "um", "feet": "ft", "inches": "in", "sec": "s",
     "secs": "s", "hr": "h", "mins": "min", "kilo": "kg", "pct": "%", "radians": "rad", "lbs": "lb",
     "pounds": "lb", "rps": "rev/s", "turn": "rev", "lbin": "lbf*in", "lbft": "lbf*ft", "nm": "N*m",
@@ -257,7 +279,9 @@ def unit_complaint(unit: str, dimensions: Sequence[str]) -> str:
     """Return an error that `unit` is none, with the nearest one, of the wanted dimensions if possible."""
     if "(" in unit and is_unit(re.sub("[()]", "", unit)):
         return f"{quote(unit)} has parentheses; write the unit without them, e.g. N/mm/s"
-    if re.search(r"[A-Za-z%)] +[A-Za-z(]", unit) and all(word in SYMBOLS for word in re.findall("[A-Za-z%]+", unit)):
+    if re.search(r"[A-Za-z%)] +[A-Za-z(]", unit) and all(
+        word in UNITS_BY_SYMBOL for word in re.findall("[A-Za-z%]+", unit)
+    ):
         return f"{quote(unit)} has two units side by side; put * or / between them"
     guess = nearest_unit(unit, dimensions)
     hint = f"did you mean {guess!r}?" if guess else "`cfmkit show units` lists them"
@@ -274,7 +298,7 @@ def nearest_unit(unit: str, dimensions: Sequence[str]) -> str | None:
 
 def _guesses(unit: str) -> Iterator[str]:
     """Yield the unit with every word replaced by what it may mean."""
-    tidy = "".join(_TYPOGRAPHY.get(char, char) for char in unit[:60])
+    tidy = "".join(_TYPOGRAPHIC_MARKS.get(char, char) for char in unit[:60])
     tidy = re.sub(r"\bper\b", "/", tidy)
     tidy = re.sub(r"([A-Za-z])([2-4])\b", r"\1^\2", tidy)
     tidy = re.sub(r" *([*/^]+) *", r"\1", tidy).strip().replace(" ", "*")
@@ -285,24 +309,24 @@ def _guesses(unit: str) -> Iterator[str]:
 
 def _meanings(word: str) -> Iterator[str]:
     """Yield the unit symbols that `word` may stand for, the likeliest first."""
-    if word in SYMBOLS:
+    if word in UNITS_BY_SYMBOL:
         yield word
         return
     lower = word.lower()
-    yield from (symbol for symbol in SYMBOLS if word == 2 * symbol)  # such as "%%"
-    yield from (symbol for symbol in SYMBOLS if symbol.lower() == lower)
-    yield from (_NAMES[name] for name in (lower, lower.removesuffix("s")) if name in _NAMES)
+    yield from (symbol for symbol in UNITS_BY_SYMBOL if word == 2 * symbol)  # such as "%%"
+    yield from (symbol for symbol in UNITS_BY_SYMBOL if symbol.lower() == lower)
+    yield from (_UNIT_NAMES[name] for name in (lower, lower.removesuffix("s")) if name in _UNIT_NAMES)
     yield from _products(word)
-    near = difflib.get_close_matches(lower, list(_NAMES), n=2, cutoff=0.75)
-    yield from (_NAMES[name] for name in near)
-    yield from difflib.get_close_matches(word, list(SYMBOLS), n=2, cutoff=0.75)
+    near = difflib.get_close_matches(lower, list(_UNIT_NAMES), n=2, cutoff=0.75)
+    yield from (_UNIT_NAMES[name] for name in near)
+    yield from difflib.get_close_matches(word, list(UNITS_BY_SYMBOL), n=2, cutoff=0.75)
 
 
 def _products(word: str) -> Iterator[str]:
     """Yield the splits of ``Nmm`` into two known symbols; nobody multiplies by a percentage."""
     for cut in range(1, len(word)):
         first, second = word[:cut], word[cut:]
-        if first != second and first in SYMBOLS and second in SYMBOLS and "%" not in word:
+        if first != second and first in UNITS_BY_SYMBOL and second in UNITS_BY_SYMBOL and "%" not in word:
             yield f"{first}*{second}"
 
 

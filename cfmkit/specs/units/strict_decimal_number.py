@@ -16,19 +16,19 @@ from cfmkit.errors import QuantityError, visible
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-LONGEST = 40
+MAX_NUMBER_LENGTH = 40
 
-NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+NUMBER_PATTERN = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """Sign, digits, dot, exponent; leading zeros are refused separately, with a hint."""
 
 _LEADING_ZERO = re.compile(r"([-+]?)0+([0-9].*)")
 _MINUS_SIGNS = "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"
-_SHOWN = 50
+_MAX_SHOWN_LENGTH = 50
 
 
 def quote(text: str) -> str:
     """Return `text` quoted for a message: on one line, escaped where it cannot be seen, cut where it is long."""
-    cut = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    cut = text if len(text) <= _MAX_SHOWN_LENGTH else text[: _MAX_SHOWN_LENGTH - 3] + "..."
     return f"'{visible(cut)}'"
 
 
@@ -78,9 +78,9 @@ def read_number(text: str) -> float:
     >>> read_number("1e-3")
     0.001
     """
-    if len(text) > LONGEST:
-        raise QuantityError(f"{quote(text)} is too long for a number: at most {LONGEST} characters")
-    if not NUMBER.fullmatch(text):
+    if len(text) > MAX_NUMBER_LENGTH:
+        raise QuantityError(f"{quote(text)} is too long for a number: at most {MAX_NUMBER_LENGTH} characters")
+    if not NUMBER_PATTERN.fullmatch(text):
         raise QuantityError(_complaint(text))
     if zeros := _LEADING_ZERO.fullmatch(text):
         raise QuantityError(f"{quote(text)} has a leading zero; write {zeros[1]}{zeros[2]}")
@@ -109,7 +109,7 @@ def number_complaint(text: str, only_traps: bool = False) -> str | None:
     """
     if odd := odd_character(text):
         return f"{quote(text)} holds {odd[1]}"
-    for trap, pattern, explain in _REASONS:
+    for trap, pattern, explain in _TRAP_REASONS:
         if (trap or not only_traps) and pattern.fullmatch(text):
             return f"{quote(text)} {explain(text)}"
     return None
@@ -119,7 +119,7 @@ def _fixed_format(sentence: str) -> Callable[[str], str]:
     return lambda _text: sentence
 
 
-_PATTERNS: tuple[tuple[bool, str, Callable[[str], str]], ...] = (
+_TRAP_PATTERNS: tuple[tuple[bool, str, Callable[[str], str]], ...] = (
     (True, rf"[{_MINUS_SIGNS}][0-9.].*", lambda text: f"has a unicode minus (U+{ord(text[0]):04X}); write -{text[1:]}"),
     (False, rf".*[0-9eE][{_MINUS_SIGNS}][0-9].*", _fixed_format("has a unicode minus or dash; write the ASCII '-'")),
     (
@@ -144,7 +144,7 @@ _PATTERNS: tuple[tuple[bool, str, Callable[[str], str]], ...] = (
     (False, r"[-+]?[0-9.]*(?![0-9])\d.*", _fixed_format("has digits that are not 0-9; write ASCII digits")),
     (False, r"[-+]?[0-9]*(\.[0-9]*){2,}", _fixed_format("has more than one dot; write e.g. 1234.5")),
 )
-_REASONS = tuple((trap, re.compile(pattern), explain) for trap, pattern, explain in _PATTERNS)
+_TRAP_REASONS = tuple((trap, re.compile(pattern), explain) for trap, pattern, explain in _TRAP_PATTERNS)
 """What people write instead of a number, in the order in which the explanations should be tried.
 
 True marks the traps: nobody means them as text, and other YAML readers take them for a number.

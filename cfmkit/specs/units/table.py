@@ -39,11 +39,11 @@ class Dimension:
         return f"{'an' if words[0] in 'aeiou' else 'a'} {words}"
 
 
-_DEGREES = 180 / math.pi
+_DEGREES_PER_RADIAN = 180 / math.pi
 
-_DIMENSIONS = (
+_DIMENSION_LIST = (
     Dimension("length", "mm", "length, displacement, elongation", "200 mm", up=1e3),
-    Dimension("angle", "deg", "plane angle, rotation", "30 deg", up=_DEGREES),
+    Dimension("angle", "deg", "plane angle, rotation", "30 deg", up=_DEGREES_PER_RADIAN),
     Dimension("ratio", "1", "ratio, fraction, coefficient", "5 %"),
     Dimension("force", "N", "force", "50 N"),
     Dimension("torque", "N*mm", "moment of a force", "1200 N*mm", up=1e3),
@@ -64,8 +64,8 @@ _DIMENSIONS = (
     Dimension("second_moment", "mm^4", "second moment of an area", "2.5 mm^4", up=1e12),
     Dimension("curvature", "1/mm", "inverse of a radius", "0.05 1/mm", down=1e3),
     Dimension("flexural_rigidity", "N*mm^2", "bending stiffness EI of a section", "800 N*mm^2", up=1e6),
-    Dimension("angular_velocity", "deg/s", "angle per time", "90 deg/s", up=_DEGREES),
-    Dimension("angular_acceleration", "deg/s^2", "angular velocity per time", "90 deg/s^2", up=_DEGREES),
+    Dimension("angular_velocity", "deg/s", "angle per time", "90 deg/s", up=_DEGREES_PER_RADIAN),
+    Dimension("angular_acceleration", "deg/s^2", "angular velocity per time", "90 deg/s^2", up=_DEGREES_PER_RADIAN),
     Dimension("damping", "N*s/mm", "force per velocity", "0.01 N*s/mm", down=1e3),
     Dimension("rotational_damping", "N*mm*s/rad", "torque per angular velocity", "2 N*mm*s/rad", up=1e3),
     Dimension("factor", "1", "multiple of a value", "1.5"),
@@ -73,25 +73,25 @@ _DIMENSIONS = (
     Dimension("text", "", "a word, not a number", "load"),
 )
 
-DIMENSIONS: Mapping[str, Dimension] = MappingProxyType({item.name: item for item in _DIMENSIONS})
+DIMENSIONS_BY_NAME: Mapping[str, Dimension] = MappingProxyType({item.name: item for item in _DIMENSION_LIST})
 """Every dimension by name."""
 
-_PI = "3.14159265358979323846264338327950288419716939937510582097494459230781640629"
+_PI_DIGITS = "3.14159265358979323846264338327950288419716939937510582097494459230781640629"
 
 
 def _exact(item: Dimension) -> Fraction:
     """Return the SI size of a border unit; that of a degree to the digits of pi above."""
-    up = Fraction(180) / Fraction(_PI) if item.up == _DEGREES else Fraction(item.up)
+    up = Fraction(180) / Fraction(_PI_DIGITS) if item.up == _DEGREES_PER_RADIAN else Fraction(item.up)
     return Fraction(item.down) / up
 
 
-COMMON: Mapping[tuple[str, str], Fraction] = MappingProxyType(
-    {(item.name, item.unit): _exact(item) for item in _DIMENSIONS if item.unit}
+COMMON_UNIT_SIZES: Mapping[tuple[str, str], Fraction] = MappingProxyType(
+    {(item.name, item.unit): _exact(item) for item in _DIMENSION_LIST if item.unit}
     | {("ratio", "%"): Fraction(1, 100), ("angle", "rad"): Fraction(1), ("stress", "GPa"): Fraction(10**9)}
 )
 """Exact SI size of what nearly every file says, by (dimension, unit): these need no look into pint's registry."""
 
-UNITLESS = ("ratio", "factor", "count")
+UNITLESS_DIMENSIONS = ("ratio", "factor", "count")
 """Dimensions whose numbers need no unit."""
 
 
@@ -110,7 +110,7 @@ class Unit:
     aliases: tuple[str, ...] = ()
 
 
-UNITS = (
+UNIT_TABLE = (
     Unit("m", "meter", "[length]", "length"),
     Unit("cm", "centimeter", "0.01 * meter", "length"),
     Unit("mm", "millimeter", "0.001 * meter", "length"),
@@ -119,7 +119,7 @@ UNITS = (
     Unit("ft", "foot", "0.3048 * meter", "length", input_only=True),
     Unit("rad", "radian", "[angle]", "angle"),
     Unit("mrad", "milliradian", "0.001 * radian", "angle"),
-    Unit("deg", "degree", f"{_PI} / 180 * radian", "angle"),
+    Unit("deg", "degree", f"{_PI_DIGITS} / 180 * radian", "angle"),
     Unit("rev", "revolution", "360 * degree", "angle"),
     Unit("%", "percent", "0.01", "ratio", aliases=("percent",)),
     Unit("kg", "kilogram", "[mass]", "mass"),
@@ -154,7 +154,9 @@ UNITS = (
 )
 """The whole list; there are no prefixes beyond what it spells out."""
 
-SYMBOLS: Mapping[str, Unit] = MappingProxyType({word: unit for unit in UNITS for word in (unit.symbol, *unit.aliases)})
+UNITS_BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
+    {word: unit for unit in UNIT_TABLE for word in (unit.symbol, *unit.aliases)}
+)
 """Every accepted spelling of a unit, case-sensitive."""
 
 
@@ -167,9 +169,9 @@ def dimension_of(name: str) -> Dimension:
         If there is none; the message lists them.
     """
     try:
-        return DIMENSIONS[name]
+        return DIMENSIONS_BY_NAME[name]
     except KeyError:
-        raise KeyError(f"there is no dimension {name!r}; there are {', '.join(DIMENSIONS)}") from None
+        raise KeyError(f"there is no dimension {name!r}; there are {', '.join(DIMENSIONS_BY_NAME)}") from None
 
 
 def border_unit(dimension: str) -> str:

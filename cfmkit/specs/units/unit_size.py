@@ -15,11 +15,11 @@ from typing import Any
 
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.specs.units.table import SYMBOLS, UNITS, dimension_of
+from cfmkit.specs.units.table import UNIT_TABLE, UNITS_BY_SYMBOL, dimension_of
 
-_FACTOR = re.compile(r" *([*/]?) *([A-Za-z%]+|1) *(?:(?:\^|\*\*) *(-?[1-9])(?![0-9]))? *")
+_FACTOR_PATTERN = re.compile(r" *([*/]?) *([A-Za-z%]+|1) *(?:(?:\^|\*\*) *(-?[1-9])(?![0-9]))? *")
 _MOST_FACTORS = 8
-_BASES = {"meter": "m", "kilogram": "kg", "second": "s", "radian": "rad"}
+_BASE_UNITS = {"meter": "m", "kilogram": "kg", "second": "s", "radian": "rad"}
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def unit_size(text: str) -> Size:
     if factors is None:
         raise QuantityError(f"{quote(text)} is not a unit")
     registry = _registry()
-    product = registry.parse_units("*".join(f"{SYMBOLS[symbol].name}**{power}" for symbol, power in factors))
+    product = registry.parse_units("*".join(f"{UNITS_BY_SYMBOL[symbol].name}**{power}" for symbol, power in factors))
     factor, base = registry.get_base_units(product)
-    powers = sorted((_BASES[name], int(power)) for name, power in dict(base._units).items())
+    powers = sorted((_BASE_UNITS[name], int(power)) for name, power in dict(base._units).items())
     return Size(Fraction(factor), tuple(powers))
 
 
@@ -70,7 +70,7 @@ def unit_table() -> list[tuple[str, str, str, float, bool]]:
             float(unit_size(unit.symbol).factor),
             unit.input_only,
         )
-        for unit in UNITS
+        for unit in UNIT_TABLE
     ]
 
 
@@ -80,14 +80,14 @@ def _factors(text: str) -> tuple[tuple[str, int], ...] | None:
     factors: list[tuple[str, int]] = []
     position = 0
     while position < len(text) and len(factors) < _MOST_FACTORS:
-        match = _FACTOR.match(text, position)
+        match = _FACTOR_PATTERN.match(text, position)
         if not match or bool(match[1]) != (position > 0):
             return None
         symbol, power = match[2], int(match[3] or 1)
         if symbol == "1":
             if position > 0 or match[3] or match.end() == len(text):
                 return None
-        elif symbol in SYMBOLS:
+        elif symbol in UNITS_BY_SYMBOL:
             factors.append((symbol, -power if match[1] == "/" else power))
         else:
             return None
@@ -101,6 +101,6 @@ def _registry() -> Any:
     import pint
 
     registry: Any = pint.UnitRegistry(None, non_int_type=Fraction, cache_folder=None)
-    for unit in UNITS:
+    for unit in UNIT_TABLE:
         registry.define(f"{unit.name} = {unit.definition}")
     return registry

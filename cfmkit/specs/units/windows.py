@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.errors import InputError, QuantityError
-from cfmkit.specs.units.fields import PLACES, Place, UnitField, plain_schema, write_place
+from cfmkit.specs.units.fields import PLACE_DIMENSIONS, Place, UnitField, plain_schema, write_place
 from cfmkit.specs.units.quantities import format_quantity
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
-SHARE = "ratio"
+SHARE_DIMENSION = "ratio"
 """Dimension of an end of a window that is given as a share of the travel."""
 
 
@@ -24,7 +24,7 @@ class TravelShare(Place):
     def __new__(cls, value: float) -> TravelShare:
         """Return `value` as a share."""
         share = float.__new__(cls, value)
-        share.dimension = SHARE
+        share.dimension = SHARE_DIMENSION
         return share
 
     def __eq__(self, other: object) -> bool:
@@ -37,7 +37,7 @@ class TravelShare(Place):
 
     def __hash__(self) -> int:
         """Distinguish a share from a place of the same number."""
-        return hash((SHARE, float(self)))
+        return hash((SHARE_DIMENSION, float(self)))
 
     def __reduce__(self) -> tuple[type[TravelShare], tuple[float]]:  # type: ignore[override]
         """Return what copying and pickling need."""
@@ -54,12 +54,12 @@ class _WindowEnd(UnitField):
 
     def read(self, value: Any) -> tuple[float, str]:
         number, dimension = super().read(value)
-        if dimension == SHARE and not 0 <= number <= 1:
+        if dimension == SHARE_DIMENSION and not 0 <= number <= 1:
             raise QuantityError(f"{str(value).strip()} is not allowed: shares of the travel are 0 % to 100 %")
         return number, dimension
 
     def write(self, value: float) -> str:
-        return format_quantity(value, SHARE, "%") if isinstance(value, TravelShare) else write_place(value)
+        return format_quantity(value, SHARE_DIMENSION, "%") if isinstance(value, TravelShare) else write_place(value)
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         """Build the validator and the serialiser."""
@@ -76,10 +76,10 @@ class _WindowEnd(UnitField):
 
 def place_of(value: float, dimension: str) -> Place:
     """Return a number that knows what it is: a length, an angle, or with the dimension ``ratio`` a share."""
-    return TravelShare(value) if dimension == SHARE else Place(value, dimension)
+    return TravelShare(value) if dimension == SHARE_DIMENSION else Place(value, dimension)
 
 
-WindowEnd = Annotated[float, _WindowEnd((*PLACES, SHARE))]
+WindowEnd = Annotated[float, _WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION))]
 Ends = tuple[WindowEnd, WindowEnd]
 
 
@@ -91,7 +91,7 @@ def ends_increase(ends: Ends) -> bool:
 
 def dimension_of_end(end: float) -> str:
     """Return ``length``, ``angle`` or ``ratio``; a plain number is a length."""
-    return str(getattr(end, "dimension", PLACES[0]))
+    return str(getattr(end, "dimension", PLACE_DIMENSIONS[0]))
 
 
 def window_places(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
@@ -119,6 +119,6 @@ def window_places(ends: Ends, travel: tuple[float, float]) -> tuple[float, float
     start, stop = travel
     places = [start + float(end) * (stop - start) if isinstance(end, TravelShare) else float(end) for end in ends]
     if places[0] == places[1]:
-        reported = " and ".join(_WindowEnd((*PLACES, SHARE)).write(end) for end in ends)
+        reported = " and ".join(_WindowEnd((*PLACE_DIMENSIONS, SHARE_DIMENSION)).write(end) for end in ends)
         raise InputError(f"a window from {reported} has no width on this travel")
     return min(places), max(places)

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 from pydantic import BaseModel
 
-from cfmkit.specs.units.fields import PLACE, MetricValue, Place, UnitField
+from cfmkit.specs.units.fields import PLACE_FIELD, MetricValue, Place, UnitField
 from cfmkit.specs.units.quantities import describe_dimensions, example
 
 if TYPE_CHECKING:
     from cfmkit.specs.yamlio.path_notation import Path
 
-_PRIMITIVES = {int: "a whole number", float: "a number", str: "text", bool: "true or false", dict: "a block"}
-_OPEN = get_args(MetricValue)[1]
-MISSING = object()
+_PRIMITIVE_WORDS = {int: "a whole number", float: "a number", str: "text", bool: "true or false", dict: "a block"}
+_METRIC_MARKER = get_args(MetricValue)[1]
+MISSING_VALUE = object()
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Slot:
     def quantity(self) -> UnitField | None:
         """The quantity, if a number with a unit is meant."""
         if self.kind is Place:
-            return PLACE
+            return PLACE_FIELD
         return next((item for item in self.metadata if isinstance(item, UnitField)), None)
 
     @property
@@ -85,7 +85,7 @@ class Slot:
         """Return what to write, with an example: ``a length, e.g. '200 mm'``."""
         if self.quantity:
             return f"{describe_dimensions(self.quantity.dimensions)}, e.g. {example(self.quantity.dimensions)}"
-        if _OPEN in self.metadata:
+        if _METRIC_MARKER in self.metadata:
             return "a number with the unit of the metric, e.g. '5 %'"
         if self.choices:
             return "one of " + ", ".join(map(repr, self.choices)) if len(self.choices) > 1 else repr(self.choices[0])
@@ -93,7 +93,7 @@ class Slot:
             return "a block with " + ", ".join(required_keys(self.model) or list(self.model.model_fields)[:6])
         if self.origin in (tuple, list):
             return f"a list{self._length()}, each item {describe_expected(self.child(0), plain=True)}"
-        return _PRIMITIVES.get(self.origin, "a value")
+        return _PRIMITIVE_WORDS.get(self.origin, "a value")
 
     def _length(self) -> str:
         arguments = get_args(self.kind)
@@ -172,11 +172,11 @@ def _step_down(here: Trace, item: str | int) -> Trace:
     """
     allowed = tuple(slot for parent in here.slots for slot in parent.child(item))
     step = _step(here.node, item)
-    if step is MISSING and not allowed:
+    if step is MISSING_VALUE and not allowed:
         return here
     if (
-        step is MISSING
-        and here.node is not MISSING
+        step is MISSING_VALUE
+        and here.node is not MISSING_VALUE
         and not isinstance(here.node, dict if isinstance(item, str) else tuple)
     ):
         return Trace(here.path, here.node, allowed, here.slots, here.tags)
@@ -185,9 +185,9 @@ def _step_down(here: Trace, item: str | int) -> Trace:
 
 def _step(node: Any, item: str | int) -> Any:
     if isinstance(node, BaseModel):
-        return getattr(node, str(item), MISSING)
+        return getattr(node, str(item), MISSING_VALUE)
     if isinstance(node, dict):
-        return node.get(item, MISSING)
+        return node.get(item, MISSING_VALUE)
     if isinstance(node, tuple) and isinstance(item, int) and 0 <= item < len(node):
         return node[item]
-    return MISSING
+    return MISSING_VALUE

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import SpecError, reason_of, visible
 from cfmkit.specs.yamlio.document import read_document
-from cfmkit.specs.yamlio.text_decoding import LARGEST
+from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES
 
 if TYPE_CHECKING:
     from cfmkit.specs.yamlio.document import YamlDocument
@@ -50,7 +50,7 @@ def with_base(document: YamlDocument, above: tuple[str, ...] = ()) -> YamlDocume
     source = os.path.join(os.path.dirname(document.source), named)
     try:
         with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
+            data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise SpecError(
             [document.problem((BASE_KEY,), f"{visible(named)} cannot be read: {reason_of(error)}")]

@@ -20,8 +20,8 @@ from cfmkit.specs.units.fields import BareFloat, BareInt
 from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
 from cfmkit.specs.yamlio.path_notation import Path, parse_indices, to_dotted
-from cfmkit.specs.yamlio.text_decoding import LARGEST, Fault
-from cfmkit.specs.yamlio.tree_builder import DEEPEST, Reading, read_text
+from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES, Fault
+from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, Reading, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -218,7 +218,7 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
 
 def _lines_of(data: bytes | str) -> tuple[str, ...]:
     """Return the lines of a text, as YAML counts them; none of what is larger than a specification may be."""
-    if len(data) > LARGEST:
+    if len(data) > MAX_FILE_BYTES:
         return ()
     text = data.decode("utf-8", "replace") if isinstance(data, bytes) else data
     return tuple(re.split("\r\n|[\r\n\x85\u2028\u2029]", text.removeprefix("\ufeff")))
@@ -270,8 +270,8 @@ class Option:
         return "--set " + to_dotted(self.path)
 
 
-_PART = r"""(?:\s*"[^"]+"\s*|\s*'[^']+'\s*|[^."'=]+)"""
-_OPTION = re.compile(rf"({_PART}(?:\.{_PART})*)=(.*)", re.DOTALL)
+_PART_PATTERN = r"""(?:\s*"[^"]+"\s*|\s*'[^']+'\s*|[^."'=]+)"""
+_OPTION_PATTERN = re.compile(rf"({_PART_PATTERN}(?:\.{_PART_PATTERN})*)=(.*)", re.DOTALL)
 
 
 SHORT_FOR = {"material": "name"}
@@ -290,13 +290,13 @@ def parse_option(text: str) -> Option:
     cfmkit.errors.UsageError
         If there is no ``=``, no path or no value.
     """
-    found = _OPTION.fullmatch(text)
+    found = _OPTION_PATTERN.fullmatch(text)
     path, equals, value = (found[1], "=", found[2]) if found else text.partition("=")
-    parts = [part.strip() for part in re.findall(_PART, path)] if found else []
+    parts = [part.strip() for part in re.findall(_PART_PATTERN, path)] if found else []
     example = "write e.g. --set mechanism.springs.count=2"
     if not equals or not value.strip():
         raise UsageError(f"--set {quote(text)}: no value; {example}")
-    if not all(parts) or not 0 < len(parts) <= DEEPEST:
+    if not all(parts) or not 0 < len(parts) <= MAX_DEPTH:
         raise UsageError(f"--set {quote(text)}: {quote(path)} is not a dotted path; {example}")
     return _read_value(tuple(_unquote(part) for part in parts), value.strip())
 

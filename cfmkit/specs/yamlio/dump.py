@@ -15,8 +15,8 @@ from cfmkit.specs.units.strict_decimal_number import odd_character
 from cfmkit.specs.yamlio.allowed_at_path import Slot
 from cfmkit.specs.yamlio.scalars import read_plain
 
-WIDTH = 100
-_PLAIN = re.compile(r"[\w.+(/][^:#\[\]{},\"'&*!|>%@`\\=?-]*(?:[-%=?'*](?! )[^:#\[\]{},\"&!|>@`\\]*)*")
+LINE_WIDTH = 100
+_PLAIN_PATTERN = re.compile(r"[\w.+(/][^:#\[\]{},\"'&*!|>%@`\\=?-]*(?:[-%=?'*](?! )[^:#\[\]{},\"&!|>@`\\]*)*")
 _OLD_WORDS = re.compile("(?i)(y|yes|n|no|on|off|=|<<|-|[-+]?[0-9]{1,4}-[0-9]{1,2}-[0-9]{1,2}.*)")
 
 
@@ -115,7 +115,7 @@ def _wrap_list(words: list[str], pad: str) -> Iterator[str]:
     line = f"{pad}["
     for number, word in enumerate(words):
         piece = word + ("]" if number == len(words) - 1 else ",")
-        if len(line) + len(piece) + 1 > WIDTH and line.strip() != "[":
+        if len(line) + len(piece) + 1 > LINE_WIDTH and line.strip() != "[":
             yield line
             line = f"{pad} {piece}"
         else:
@@ -125,7 +125,7 @@ def _wrap_list(words: list[str], pad: str) -> Iterator[str]:
 
 def _is_short(items: list[Any]) -> bool:
     """Return whether a list fits on its key's line: plain values, or a few pairs of numbers."""
-    return not any(isinstance(item, dict) for item in items) and len(_flow(items)) <= WIDTH - 40
+    return not any(isinstance(item, dict) for item in items) and len(_flow(items)) <= LINE_WIDTH - 40
 
 
 def _flow(value: Any) -> str:
@@ -143,7 +143,7 @@ def _flow(value: Any) -> str:
 
 def _text(text: str) -> str:
     """Return text as a scalar, quoted where a reader could take it for something else."""
-    plain = _PLAIN.fullmatch(text) and text == text.strip() and text.isprintable()
+    plain = _PLAIN_PATTERN.fullmatch(text) and text == text.strip() and text.isprintable()
     return text if plain and not _OLD_WORDS.fullmatch(text) and _reads_as_text(text) else _quote(text)
 
 

@@ -123,7 +123,7 @@ def _complaint(line: _Error) -> Complaint:
         return Complaint(line.trace.path, _unknown_key(line.trace), at_key=True)
     if line.kind.startswith("union_tag"):
         return _unknown_kind(line)
-    explainer = _EXPLAINERS.get(line.kind, _in_pydantics_words)
+    explainer = _EXPLAINER_BY_TYPE.get(line.kind, _in_pydantics_words)
     return Complaint(line.trace.path, " ".join(explainer(line).split()))
 
 
@@ -274,7 +274,7 @@ def _in_pydantics_words(line: _Error) -> str:
     return line.text.replace("Input should", f"{describe_value(line.trace.node)} should").replace("Value error, ", "")
 
 
-_EXPLAINERS: dict[str, Callable[[_Error], str]] = {
+_EXPLAINER_BY_TYPE: dict[str, Callable[[_Error], str]] = {
     "value_error": _own_words,
     "assertion_error": _own_words,
     "string_type": _no_text,

@@ -10,15 +10,15 @@ import re
 from typing import Any
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.strict_decimal_number import LONGEST, NUMBER, number_complaint, read_number
+from cfmkit.specs.units.strict_decimal_number import MAX_NUMBER_LENGTH, NUMBER_PATTERN, number_complaint, read_number
 
-_WORDS: dict[str, bool | None] = {
+_CONSTANT_WORDS: dict[str, bool | None] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-_INTEGER = re.compile("[-+]?[0-9]+")
+_CONTROL_PATTERN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+_INTEGER_PATTERN = re.compile("[-+]?[0-9]+")
 
 
 def read_plain(text: str) -> Any:
@@ -29,11 +29,11 @@ def read_plain(text: str) -> Any:
     cfmkit.errors.QuantityError
         If it looks like a number but is none that everybody reads the same way.
     """
-    if text in _WORDS:
-        return _WORDS[text]
-    if NUMBER.fullmatch(text):
+    if text in _CONSTANT_WORDS:
+        return _CONSTANT_WORDS[text]
+    if NUMBER_PATTERN.fullmatch(text):
         return _number(text)
-    if len(text) <= LONGEST and (complaint := number_complaint(text, only_traps=True)):
+    if len(text) <= MAX_NUMBER_LENGTH and (complaint := number_complaint(text, only_traps=True)):
         raise QuantityError(_or_quote(complaint))
     return text
 
@@ -46,7 +46,7 @@ def check_text(text: str) -> str:
     cfmkit.errors.QuantityError
         If an escape put a control character into it.
     """
-    if match := _CONTROL.search(text):
+    if match := _CONTROL_PATTERN.search(text):
         raise QuantityError(f"the text holds the control character U+{ord(match[0]):04X}; remove it")
     return text
 
@@ -56,7 +56,7 @@ def _number(text: str) -> int | float:
         value = read_number(text)
     except QuantityError as error:
         raise QuantityError(_or_quote(str(error))) from None
-    return int(text) if _INTEGER.fullmatch(text) else value
+    return int(text) if _INTEGER_PATTERN.fullmatch(text) else value
 
 
 def _or_quote(complaint: str) -> str:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from cfmkit.specs.units.strict_decimal_number import odd_character
 
-LARGEST = 1_000_000
+MAX_FILE_BYTES = 1_000_000
 MOST_KINDS = 20
-_FOREIGN = {
+_FOREIGN_MARKS = {
     b"\xff\xfe\x00\x00": "UTF-32",
     b"\x00\x00\xfe\xff": "UTF-32",
     b"\xff\xfe": "UTF-16",
@@ -48,11 +48,11 @@ def decode(data: bytes | str) -> str:
     Unreadable
         If it is too large, or not UTF-8.
     """
-    if len(data) > LARGEST:
-        raise Unreadable(Fault(1, 1, (), f"the file is larger than {LARGEST} bytes; put long data elsewhere"))
+    if len(data) > MAX_FILE_BYTES:
+        raise Unreadable(Fault(1, 1, (), f"the file is larger than {MAX_FILE_BYTES} bytes; put long data elsewhere"))
     if isinstance(data, str):
         return data.removeprefix("\ufeff")
-    for mark, name in _FOREIGN.items():
+    for mark, name in _FOREIGN_MARKS.items():
         if data.startswith(mark):
             raise Unreadable(Fault(1, 1, (), f"the file is {name}; save it as UTF-8"))
     try:

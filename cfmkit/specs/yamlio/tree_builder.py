@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     from cfmkit.specs.yamlio.path_notation import Path
 
 
-_LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
+_YAML_LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
 """libyaml where PyYAML has it; its complaints vary with its version, so errors are reported by the one in Python."""
 
-DEEPEST = 32
+MAX_DEPTH = 32
 MOST_NODES = 100_000
 MOST_FAULTS = 1000
-_WHOLE, _DIGITS = re.compile("[-+]?[0-9]+"), re.compile("[0-9]")
-_ZERO, _WITH_UNIT = re.compile("[-+]?0+"), re.compile("(?>[0-9]+(?:[eE][-+]?[0-9]+)?) *[^-+0-9., ].*")
+_WHOLE_PATTERN, _DIGIT_PATTERN = re.compile("[-+]?[0-9]+"), re.compile("[0-9]")
+_ZERO_PATTERNS, _WITH_UNIT = re.compile("[-+]?0+"), re.compile("(?>[0-9]+(?:[eE][-+]?[0-9]+)?) *[^-+0-9., ].*")
 
 
 @dataclass
@@ -76,7 +76,7 @@ def read_text(data: bytes | str) -> Reading:
 
 def _parse(text: str) -> Reading:
     """Return the reading of clean text, by the fast parser, or in the words of the one that is everywhere."""
-    for loader in _LOADERS:
+    for loader in _YAML_LOADERS:
         reading = Reading()
         try:
             reading.tree = _Builder(reading, yaml.parse(text, Loader=loader)).document()
@@ -92,7 +92,7 @@ def _parse(text: str) -> Reading:
 
 def read_trusted(text: str) -> Any:
     """Return what YAML of the package's own data files holds, which no user writes: no places, limits or hints."""
-    return yaml.load(text, _LOADERS[0])
+    return yaml.load(text, _YAML_LOADERS[0])
 
 
 class _Builder:
@@ -130,8 +130,8 @@ class _Builder:
         self.nodes += 1
         if self.nodes > MOST_NODES:
             raise Unreadable(_fault(event, (), f"more than {MOST_NODES} values; put long data into a separate file"))
-        if len(path) > DEEPEST:
-            raise Unreadable(_fault(event, (), f"blocks and lists are nested more than {DEEPEST} deep"))
+        if len(path) > MAX_DEPTH:
+            raise Unreadable(_fault(event, (), f"blocks and lists are nested more than {MAX_DEPTH} deep"))
 
     def _refuse_decoration(self, event: Event, path: Path) -> None:
         anchor = getattr(event, "anchor", None)
@@ -155,7 +155,7 @@ class _Builder:
         last, zeros, spaced = None, [], False  # the item before, and what may be a zero or the start of 0,5 mm
         while not isinstance(event := next(self.events), SequenceEndEvent):
             if last is not None and _split_at_comma(last, event):
-                if _ZERO.fullmatch(getattr(last, "value", "")):
+                if _ZERO_PATTERNS.fullmatch(getattr(last, "value", "")):
                     zeros.append((last, event))
                 else:
                     self._decimal_comma(last, event, (*path, len(items) - 1))
@@ -219,7 +219,7 @@ def _goes_on(value: Event, key: Event) -> bool:
     """Return True if what stands where a key should be is the rest of the number before it."""
     if not isinstance(value, ScalarEvent) or not isinstance(key, ScalarEvent) or value.style or key.style:
         return False
-    return bool(_WHOLE.fullmatch(value.value) and _DIGITS.match(key.value))
+    return bool(_WHOLE_PATTERN.fullmatch(value.value) and _DIGIT_PATTERN.match(key.value))
 
 
 def _split_at_comma(value: Event, item: Event) -> bool:

@@ -53,10 +53,10 @@ END_CONDITION: Mapping[Seats, float] = MappingProxyType(
 )
 """alpha of the buckling of a compression spring [Sh, Table 10-2]; fixed is an end that stands flat on a plate."""
 
-SMALL_HOLE, SMALL_HOLE_CLEARANCE, CLEARANCE = 0.013, 0.10, 0.05
+SMALL_HOLE, SMALL_HOLE_CLEARANCE, ROD_CLEARANCE = 0.013, 0.10, 0.05
 """Clearance of a spring on a rod, in diameters of its inside: below 13 mm, and above [N]."""
 
-LOOSEST = 0.20
+MAX_GUIDE_CLEARANCE = 0.20
 """Largest clearance of a guide, in diameters of the inside (rod) or outside (tube): twice that of [N], assumed. In a
 looser one a spring bows as far as the clearance lets it."""
 
@@ -173,17 +173,17 @@ class Wound:
     def fitting_rod(self) -> float:
         """Diameter of the thickest rod that guides the spring with clearance [m]."""
         inner = self.inner_diameter
-        return inner * (1.0 - (SMALL_HOLE_CLEARANCE if inner < SMALL_HOLE else CLEARANCE))
+        return inner * (1.0 - (SMALL_HOLE_CLEARANCE if inner < SMALL_HOLE else ROD_CLEARANCE))
 
     @property
     def thinnest_guide_rod(self) -> float:
         """Diameter of the thinnest rod that still guides a compression spring [m]."""
-        return self.inner_diameter * (1.0 - LOOSEST)
+        return self.inner_diameter * (1.0 - MAX_GUIDE_CLEARANCE)
 
     @property
     def widest_guide_tube(self) -> float:
         """Inner diameter of the widest tube that still guides a compression spring [m]."""
-        return self.outer_diameter * (1.0 + LOOSEST)
+        return self.outer_diameter * (1.0 + MAX_GUIDE_CLEARANCE)
 
 
 def buckling_deflection(

@@ -20,19 +20,19 @@ from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
-INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
+SPRING_INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 """Mean diameter of the coil over that of the wire: what is wound easily."""
 
-THINNEST = 0.2e-3
+MIN_WIRE_DIAMETER = 0.2e-3
 """Wire that springs are usually wound of [m]."""
 
-FEWEST = 3.0
+MIN_TURNS = 3.0
 """Turns below which the loops decide the rate."""
 
 PIN_SHARE = 0.9
 """Diameter of a pin over the inside of a torsion spring that is wound up: what spring makers leave as clearance."""
 
-HALVINGS = 16
+N_HALVINGS = 16
 """Of the wire's diameter, where the length decides it."""
 
 
@@ -107,27 +107,27 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
     >>> [bool(torsion_spring(share * rate, 1.0, 30e-3).outer_diameter <= 5e-3) for share in (0.999, 1.001)]
     [True, False]
     """
-    units = [Wound(kind, 1e-3, index * 1e-3, 1.0) for index in INDICES]
+    units = [Wound(kind, 1e-3, index * 1e-3, 1.0) for index in SPRING_INDICES]
     rate, stress = (np.array(one)[:, None] for one in zip(*((one.rate, one.stress(1.0)) for one in units), strict=True))
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
-    index = np.array(INDICES)[:, None]
+    index = np.array(SPRING_INDICES)[:, None]
     # in wires: one more than the turns, and what winds up, or both loops
     ends = 1.0 + (deflection / (2.0 * pi) if kind == "torsion" else 2.0 * (index - 1.0))
     falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
     each = rate * stress * np.maximum(deflection, 1e-12) / (share * tensile_strength(1e-3))
 
     def turns(wire: FloatArray) -> FloatArray:  # of a wire in mm at its allowed stress: load is as its square or cube
-        return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), FEWEST))
+        return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), MIN_TURNS))
 
     # the thicker the wire, the stiffer, and the longer
     thickest = np.minimum(1e3 * widest / (index + 1.0), 1e3 * MUSIC_WIRE.thickest) + np.zeros(each.shape)
-    low = np.full(each.shape, THINNEST / 1e-3)
+    low = np.full(each.shape, MIN_WIRE_DIAMETER / 1e-3)
     high = np.maximum(thickest, low)
-    for _ in range(HALVINGS):
+    for _ in range(N_HALVINGS):
         middle = 0.5 * (low + high)
         fits = (turns(middle) + ends) * middle * 1e-3 <= room
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    there = (thickest >= THINNEST / 1e-3) & ((turns(low) + ends) * low * 1e-3 <= room)
+    there = (thickest >= MIN_WIRE_DIAMETER / 1e-3) & ((turns(low) + ends) * low * 1e-3 <= room)
     return np.asarray(np.where(there, rate * low**power / turns(low), 0.0).max(axis=0))
 
 
@@ -138,7 +138,7 @@ def loaded_length(spring: Wound) -> float:
 
 def _candidates(kind: Kind, rate: float, deflection: float) -> list[Wound]:
     """Return the spring of each index whose wire is drawn so thick."""
-    springs = [_size_spring(kind, index, rate, deflection) for index in INDICES]
+    springs = [_size_spring(kind, index, rate, deflection) for index in SPRING_INDICES]
     return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
 
 
@@ -149,15 +149,15 @@ def _fit_over_pin(springs: list[Wound], turn: float, pin: float) -> list[Wound]:
 
 def _size_spring(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
     """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
-    unit = Wound(kind, 1e-3, index * 1e-3, FEWEST)
+    unit = Wound(kind, 1e-3, index * 1e-3, MIN_TURNS)
     # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls
     # with the 0.145th power: with 1 mm as the unit of the wire
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
     falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
     exponent = (3.0 if kind == "torsion" else 2.0) - falls
     wire = (unit.stress(rate * deflection) / (share * tensile_strength(1e-3))) ** (1.0 / exponent)
-    wire = max(wire, THINNEST / 1e-3)
-    turns = FEWEST * unit.rate * wire**power / rate
-    if turns < FEWEST:
-        wire, turns = (rate / unit.rate) ** (1.0 / power), FEWEST
+    wire = max(wire, MIN_WIRE_DIAMETER / 1e-3)
+    turns = MIN_TURNS * unit.rate * wire**power / rate
+    if turns < MIN_TURNS:
+        wire, turns = (rate / unit.rate) ** (1.0 / power), MIN_TURNS
     return Wound(kind, 1e-3 * wire, 1e-3 * index * wire, turns)

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
 
-GENERIC = "generic"
+GENERIC_SERIES = "generic"
 """The word for the series that ships with the package."""
 
-WIRES = (0.4, 0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
-INDICES = (6.0, 8.0, 10.0, 12.5)
-COILS = (6, 8, 10, 12, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160)
+WIRE_DIAMETERS = (0.4, 0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
+SPRING_INDICES = (6.0, 8.0, 10.0, 12.5)
+COIL_COUNTS = (6, 8, 10, 12, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160)
 TORSION_TURNS = (3, 4, 5, 6, 8, 10, 12)
-COUNTS = (1, 2, 4)
+SPRING_COUNTS = (1, 2, 4)
 """The generic series: wires [mm] and numbers of turns are preferred numbers (ISO 3, R10)."""
 
 SHEAR_SHARE, BENDING_SHARE = 0.38, 0.60
@@ -89,9 +89,9 @@ def generic(kind: Kind) -> tuple[Offer, ...]:
     'generic-torsion-d0.4-D2.4-n3'
     """
     found = []
-    for wire in WIRES:
-        for index in INDICES:
-            for turns in TORSION_TURNS if kind == "torsion" else COILS:
+    for wire in WIRE_DIAMETERS:
+        for index in SPRING_INDICES:
+            for turns in TORSION_TURNS if kind == "torsion" else COIL_COUNTS:
                 coil = round(index * wire, 6)  # 4.8, not 4.800000000000001, in what is written of it
                 found.append(_generic(Wound(kind, wire * 1e-3, coil * 1e-3, float(turns))))
     return tuple(found)
@@ -115,7 +115,7 @@ def _generic(wound: Wound) -> Offer:
         wound.body_length,
         outer_diameter=wound.outer_diameter,
         wound=wound,
-        counts=COUNTS,
+        counts=SPRING_COUNTS,
     )
     # a rod in the spring is part of the offer where the whole of its deflection needs one
     return offer if offer.unguided >= largest else replace(offer, guide_rod=guide_rod_for(wound))

@@ -17,9 +17,9 @@ from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness,
 from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
 from cfmkit.stock.springs.helical_spring_formulas import Wound
-from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
+from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC_SERIES, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport
-from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES, WireName, WireOutOfRange
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
 from cfmkit.tables.lab_columns import split_header
 from cfmkit.tables.lab_file import decode_file, lines_of
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import Kind
 
 Positive = Field(gt=0)
-AGREE = 0.1
+RATE_RTOL = 0.1
 """A stated rate may be off by so much from that of wire, coil and turns: makers' tolerance."""
 
 
-TIGHTEST = 3.0
+MAX_TENSION_RATIO = 3.0
 """Largest initial tension over the upper end of what is easily wound: springs that are wound on a bench have more, but
 none has more than this."""
 
@@ -66,7 +66,7 @@ class WireLimits(Model):
         for key in ("shear_modulus", "youngs_modulus"):
             if getattr(self, key) is None:
                 # past the frozen model, and not counted as set: another material then has others
-                object.__setattr__(self, key, getattr(WIRES[self.material], key))
+                object.__setattr__(self, key, getattr(WIRES_BY_NAME[self.material], key))
         return self
 
     def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> Wound:
@@ -84,9 +84,11 @@ class WireLimits(Model):
         if wire is None or (own and "material" not in self.model_fields_set):
             return
         try:
-            WIRES[self.material].check_diameter(wire)
+            WIRES_BY_NAME[self.material].check_diameter(wire)
         except WireOutOfRange as error:
-            other = ", ".join(one.name for one in WIRES.values() if one.thinnest <= wire <= one.thickest < float("inf"))
+            other = ", ".join(
+                one.name for one in WIRES_BY_NAME.values() if one.thinnest <= wire <= one.thickest < float("inf")
+            )
             others = f"'material' {other}, or " if other else ""
             raise ValueError(f"{error}; state {others}the wire's own moduli") from None
 
@@ -114,7 +116,7 @@ class SpringWire(WireLimits):
 
     def check_rate(self, kind: Kind, stated: float | None) -> None:
         """Raise if a stated rate [N/m or N m/rad] is not that of the wire."""
-        if stated is not None and abs(stated / self.to_wound(kind).rate - 1.0) > AGREE:
+        if stated is not None and abs(stated / self.to_wound(kind).rate - 1.0) > RATE_RTOL:
             raise ValueError(_disagree(self.to_wound(kind), stated))
 
 
@@ -122,9 +124,9 @@ def _disagree(wound: Wound, stated: float) -> str:
     """Return what is wrong with a rate that is not that of wire, coil and turns."""
     alike = [
         one.name
-        for one in WIRES.values()
+        for one in WIRES_BY_NAME.values()
         if abs(stated / replace(wound, shear_modulus=one.shear_modulus, youngs_modulus=one.youngs_modulus).rate - 1.0)
-        <= AGREE
+        <= RATE_RTOL
     ]
     other = f" (that of {', '.join(alike)} agrees)" if alike else ""
     return (
@@ -143,7 +145,7 @@ def check_initial_tension(wound: Wound | None, tension: float) -> None:
     if wound is None or not tension:
         return
     low, high = (format_short(one, "force") for one in wound.usual_initial_tension)
-    if tension > TIGHTEST * wound.usual_initial_tension[1]:
+    if tension > MAX_TENSION_RATIO * wound.usual_initial_tension[1]:
         stated = format_short(tension, "force")
         raise ValueError(f"'initial_tension' of {stated} cannot be wound: such a spring has about {low} to {high}")
 
@@ -242,7 +244,7 @@ class CatalogueSpring(WireLimits, SpringSupport):
             raise ValueError(
                 "'free_length' of a compression spring must be larger than its 'body_length' with the turns closed"
             )
-        if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
+        if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > RATE_RTOL:
             raise ValueError(_disagree(self.wound, stated))
         return self
 
@@ -259,12 +261,12 @@ class CatalogueSpring(WireLimits, SpringSupport):
             reported = format_short(wound.outer_diameter, "length")
             raise ValueError(f"'outer_diameter' must be 'coil', the mean diameter, and one wire: {reported}")
         least = wound.turns * wound.wire
-        if self.body_length is not None and self.body_length < least * (1 - AGREE):
+        if self.body_length is not None and self.body_length < least * (1 - RATE_RTOL):
             raise ValueError(f"'body_length' is less than the turns on each other: {format_short(least, 'length')}")
-        room = None if self.free_length is None else self.free_length - (self.body_length or least * (1 - AGREE))
+        room = None if self.free_length is None else self.free_length - (self.body_length or least * (1 - RATE_RTOL))
         if self.kind == "compression" and self.max_elongation and room and self.max_elongation > room * (1 + 1e-9):
             raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
-        if self.kind == "extension" and self.free_length is not None and self.free_length < least * (1 - AGREE):
+        if self.kind == "extension" and self.free_length is not None and self.free_length < least * (1 - RATE_RTOL):
             raise ValueError(f"'free_length' is less than the turns on each other: {format_short(least, 'length')}")
 
     @classmethod
@@ -344,7 +346,7 @@ def _resolve_file(value: Any, handler: Any, info: ValidationInfo) -> Any:
     if not isinstance(found, str):
         check_names(found)
         return found
-    if found == GENERIC:
+    if found == GENERIC_SERIES:
         return found
     folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
     return DataSource(found, folder)
@@ -355,7 +357,7 @@ def wire_of(offer: Offer) -> SpringWire | None:
     wound = offer.wound
     if wound is None:
         return None
-    known = WIRES[wound.material]
+    known = WIRES_BY_NAME[wound.material]
     about = {
         "wire": wound.wire,
         "coil": wound.coil,
@@ -403,8 +405,8 @@ def offers(catalogue: tuple[CatalogueSpring, ...] | str, *kinds: Kind) -> tuple[
     return tuple(item.offer for item in catalogue if item.kind in kinds)
 
 
-_NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_COMMA = re.compile(r"([+-]?[0-9]*),([0-9]+)")
+_NUMBER_PATTERN = re.compile(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+_COMMA_PATTERN = re.compile(r"([+-]?[0-9]*),([0-9]+)")
 
 
 def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
@@ -474,7 +476,7 @@ def _cell(name: str, cell: str, unit: str | None, separator: str) -> object:
     if name == "counts":
         return tuple(int(one) if one.isdigit() else one for one in cell.split())
     if separator != "," and name not in ("name", "kind"):
-        cell = _COMMA.sub(r"\1.\2", cell) if _COMMA.fullmatch(cell.split(" ")[0]) else cell
-    if name in ("turns", "life") and _NUMBER.fullmatch(cell):
+        cell = _COMMA_PATTERN.sub(r"\1.\2", cell) if _COMMA_PATTERN.fullmatch(cell.split(" ")[0]) else cell
+    if name in ("turns", "life") and _NUMBER_PATTERN.fullmatch(cell):
         return float(cell)
     return cell if unit is None else f"{cell} {unit}"

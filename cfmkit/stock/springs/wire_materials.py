@@ -95,9 +95,9 @@ class WireMaterial:
 
         Examples
         --------
-        >>> round(WIRES["music-wire"].tensile_strength(2e-3) / 1e6)
+        >>> round(WIRES_BY_NAME["music-wire"].tensile_strength(2e-3) / 1e6)
         2000
-        >>> WIRES["music-wire"].tensile_strength(7.25e-3)
+        >>> WIRES_BY_NAME["music-wire"].tensile_strength(7.25e-3)
         Traceback (most recent call last):
         ...
         cfmkit.stock.springs.wire_materials.WireOutOfRange: music-wire is listed from 0.1 to 6.5 mm (Shigley, \
@@ -112,7 +112,7 @@ Table 10-4), and the wire is 7.25 mm
 
 _EN_10270_1 = "EN 10270-1 [G]: 206 and 81.5 GPa for all diameters"
 
-WIRES: Mapping[str, WireMaterial] = MappingProxyType(
+WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
     {
         one.name: one
         for one in (
@@ -166,5 +166,5 @@ WIRES: Mapping[str, WireMaterial] = MappingProxyType(
 )  # fmt: skip
 """Every class by name."""
 
-MUSIC_WIRE = WIRES["music-wire"]
+MUSIC_WIRE = WIRES_BY_NAME["music-wire"]
 """What a spring is wound of where nothing else is stated."""

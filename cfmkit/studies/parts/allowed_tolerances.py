@@ -39,13 +39,13 @@ MAX_SOLUTIONS, SAME_FACTOR, LEAST_FACTOR, N_ROUGH = 4, 1.3, 1e-6, 500
 """How often limits are solved, what is taken for the same tolerance, the least part of a stated one, and the parts that
 decide where to solve again."""
 
-WIDEST = 20.0
+MAX_TOLERANCE_FACTOR = 20.0
 """A tolerance is not made wider than so many times what is stated: first order does not reach farther."""
 
-ROUNDS = 26
+N_BISECTIONS = 26
 """Bisections: to a millionth of what is stated."""
 
-CLOSE = 1e-3
+MIN_TOLERANCE_RATIO = 1e-3
 """Of the widest tolerance the narrowest of an allocation has at least so much: no cost is beyond all others."""
 
 
@@ -147,9 +147,13 @@ def factors_that_keep(
     alone = np.array([_largest(one(k), wanted) for k in range(len(ones))])
     shape = _shape(rows, np.array([moved.std(axis=0) for moved in stated]).T, costs)
     together = _largest(lambda f: share(f * ones), wanted)
-    allocated = _largest(lambda f: share(np.minimum(f * shape, WIDEST)), wanted)
+    allocated = _largest(lambda f: share(np.minimum(f * shape, MAX_TOLERANCE_FACTOR)), wanted)
     return ToleranceFactors(
-        alone, together * ones, np.minimum(allocated * shape, WIDEST), good(all_moved), good(0.0 * all_moved)
+        alone,
+        together * ones,
+        np.minimum(allocated * shape, MAX_TOLERANCE_FACTOR),
+        good(all_moved),
+        good(0.0 * all_moved),
     )
 
 
@@ -164,7 +168,7 @@ def allowed_tolerances(
         known = along = tuple(one.and_at(before) for one, before in zip(seen, known, strict=True))
         answer = factors_that_keep(rows, along, errors[:N_ROUGH], costs, wanted)
         ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
-        ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else WIDEST)
+        ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else MAX_TOLERANCE_FACTOR)
         if (np.abs(np.log(ends / factors)) < np.log(SAME_FACTOR)).all():
             break
         factors = ends
@@ -175,10 +179,10 @@ def _largest(share: Callable[[float], float], wanted: float) -> float:
     """Return the largest factor with which a yield is kept; NaN where none does."""
     if share(0.0) < wanted:
         return float("nan")
-    low, high = 0.0, WIDEST
+    low, high = 0.0, MAX_TOLERANCE_FACTOR
     if share(high) >= wanted:
         return high
-    for _ in range(ROUNDS):
+    for _ in range(N_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if share(middle) >= wanted else (low, middle)
     return low
@@ -194,5 +198,5 @@ def _shape(rows: FloatArray, moved: FloatArray, costs: FloatArray) -> FloatArray
     scaled = np.where(spread[:, None] > 0, (moved / np.maximum(spread, 1e-300)[:, None]) ** 2, 0.0)
     adds = np.maximum(weights @ scaled, 1e-9)
     found: FloatArray = (costs / costs.max() / adds) ** (1.0 / 3.0)
-    found = np.maximum(found, CLOSE * found.max())
+    found = np.maximum(found, MIN_TOLERANCE_RATIO * found.max())
     return np.asarray(found / found.mean())

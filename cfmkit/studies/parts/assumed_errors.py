@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.study_spec import Tolerance
-from cfmkit.stock.materials import MATERIALS
-from cfmkit.stock.processes import PROCESSES, SPRING_RATE, usual
+from cfmkit.stock.materials import MATERIALS_BY_NAME
+from cfmkit.stock.processes import PROCESSES_BY_NAME, SPRING_RATE, usual
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 OF_PLATES = "laser"
 """How links and cams are made that say nothing of a material: as the prototype of Sanchez-Salinas et al. (2022)."""
 
-MODULUS = "mechanism.material.youngs_modulus"
+MODULUS_KEY = "mechanism.material.youngs_modulus"
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Assumed:
 
     process: ProcessAccuracy  # how it is made
     kinds: Mapping[str, str]  # path -> in what it errs, "thickness" or "position"
-    modulus: tuple[float, float] | None  # range of the modulus at `MODULUS` [Pa]; None if no source says it
+    modulus: tuple[float, float] | None  # range of the modulus at `MODULUS_KEY` [Pa]; None if no source says it
     # whether beams have materials of their own whose moduli are found in a range, too: they are taken as stated
     as_stated: bool = False
     # path of a spring's rate -> its nominal value [N/m or N m/rad]: found within `SPRING_RATE` of it
@@ -67,10 +67,10 @@ def accuracy_of(spec: Spec, process: str | None = None) -> ProcessAccuracy:
     """Return what is held by a process, by the one that the specification names, or by the usual one."""
     named = process or getattr(getattr(spec, "design", None), "process", None)
     if named:
-        return PROCESSES[named]
+        return PROCESSES_BY_NAME[named]
     usually = [usual(entry.name, entry.modulus) for group in _materials(spec) for entry in group]
     # one process makes the whole part: that of the material that is made least exactly
-    accuracy = max(usually, key=lambda entry: entry.thickness, default=PROCESSES[OF_PLATES])
+    accuracy = max(usually, key=lambda entry: entry.thickness, default=PROCESSES_BY_NAME[OF_PLATES])
     private = process_of_part(spec)
     return accuracy if private is None else private.accuracy(accuracy)
 
@@ -85,7 +85,7 @@ def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:
     }
     if found.modulus is not None:
         low, high = found.modulus
-        stated[MODULUS] = (f"{low / 1e6:.9g} MPa", f"{high / 1e6:.9g} MPa")
+        stated[MODULUS_KEY] = (f"{low / 1e6:.9g} MPa", f"{high / 1e6:.9g} MPa")
     return stated | {path: Tolerance(uniform=f"{100.0 * SPRING_RATE:g} %") for path in found.rates}
 
 
@@ -101,7 +101,7 @@ def _materials(spec: Spec) -> tuple[tuple[MaterialSpec, ...], tuple[MaterialSpec
 
 def _band(material: MaterialSpec) -> tuple[float, float] | None:
     """Return the range of the modulus of a material [Pa], if it is that of its name."""
-    known = MATERIALS.get(material.name or "")
+    known = MATERIALS_BY_NAME.get(material.name or "")
     return known.scatter.youngs_modulus if known and material.modulus == known.youngs_modulus else None
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-COVERED = 3.0
+COVERED_DEVIATIONS = 3.0
 """Standard deviations on either side that stand for the range of a normal parameter."""
 
 
@@ -45,7 +45,7 @@ class ParameterSpread:
         """The range that it covers: three standard deviations where it has no ends."""
         if self.kind == "uniform":
             return self.low, self.high
-        reach = COVERED * self.deviation
+        reach = COVERED_DEVIATIONS * self.deviation
         return max(self.low, self.nominal - reach), min(self.high, self.nominal + reach)
 
     def tighten(self, factor: float) -> ParameterSpread:
@@ -60,13 +60,13 @@ class ParameterSpread:
         from scipy.special import ndtr, ndtri
 
         below, above = (float(ndtr((end - self.nominal) / self.deviation)) for end in (self.low, self.high))
-        inside = np.clip(below + unit * (above - below), _SMALLEST, 1.0 - _EPSILON)
+        inside = np.clip(below + unit * (above - below), _FLOAT_TINY, 1.0 - _FLOAT_EPSNEG)
         values = self.nominal + self.deviation * ndtri(inside)
         return np.asarray(np.clip(values, self.low, self.high))
 
 
-_SMALLEST = np.finfo(np.float64).tiny
-_EPSILON = float(np.finfo(np.float64).epsneg)
+_FLOAT_TINY = np.finfo(np.float64).tiny
+_FLOAT_EPSNEG = float(np.finfo(np.float64).epsneg)
 
 
 def values_at(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.results import Result
 
-SHARE = 0.95
+NAMED_PARTS_SHARE = 0.95
 """Share of parts whose forces are named."""
 
-DIMENSIONS = 3
+MAX_NAMED_DIMENSIONS = 3
 """How many dimensions are named: more are not measured."""
 
-SIZES = ("length", "angle")
+SIZE_DIMENSIONS = ("length", "angle")
 """What a dimension is measured in."""
 
 
@@ -46,7 +46,9 @@ def expected_forces(result: Result, run: Run) -> str:
     except (CfmError, Unknown):
         return ""
     errors = parts.draw(N_DRAWN) - parts.nominal
-    low, high = np.quantile(near.numbers(errors), ((1.0 - SHARE) / 2.0, (1.0 + SHARE) / 2.0), axis=0)
+    low, high = np.quantile(
+        near.numbers(errors), ((1.0 - NAMED_PARTS_SHARE) / 2.0, (1.0 + NAMED_PARTS_SHARE) / 2.0), axis=0
+    )
     weight = (np.abs(near.by_error) * errors.std(axis=0)).sum(axis=0)
     curve = result.curve
     at = [format_short(place, curve.motion_dimension) for place in places]
@@ -59,7 +61,7 @@ def expected_forces(result: Result, run: Run) -> str:
     verb = "displace to" if curve.motion_dimension == "length" else "turn to"
     return (
         f"{make}, {_to_measure(parts, weight)}, {verb} {_list_names(at)}, and expect {_list_names(expected)}: "
-        f"each range holds for {100 * SHARE:.0f} % of parts {whence} (linear estimate)"
+        f"each range holds for {100 * NAMED_PARTS_SHARE:.0f} % of parts {whence} (linear estimate)"
     )
 
 
@@ -69,8 +71,8 @@ def _to_measure(parts: Parts, weight: FloatArray) -> str:
     Then what else is among as many of all parameters.
     """
     order = [int(k) for k in np.argsort(-weight) if weight[k] > 0]
-    sizes = [k for k in order if parts.parameters[k].dimension in SIZES][:DIMENSIONS]
-    others = [k for k in order[:DIMENSIONS] if parts.parameters[k].dimension not in SIZES]
+    sizes = [k for k in order if parts.parameters[k].dimension in SIZE_DIMENSIONS][:MAX_NAMED_DIMENSIONS]
+    others = [k for k in order[:MAX_NAMED_DIMENSIONS] if parts.parameters[k].dimension not in SIZE_DIMENSIONS]
     reported = [f"measure {_list_names([_dimension(parts, k) for k in sizes])}"] if sizes else []
     if others:
         reported.append(f"determine {_list_names([_name_parameter(parts, k) + ' in the design)' for k in others])}")

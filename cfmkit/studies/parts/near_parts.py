@@ -18,8 +18,8 @@ from cfmkit.metrics import window_of
 from cfmkit.specs.units import format_short
 from cfmkit.stock.processes import SPRING_RATE
 from cfmkit.studies.parts import requirement_rows as rr
-from cfmkit.studies.parts.assumed_errors import MODULUS, assume_errors
-from cfmkit.studies.parts.outcomes import SCALED
+from cfmkit.studies.parts.assumed_errors import MODULUS_KEY, assume_errors
+from cfmkit.studies.parts.outcomes import FORCE_DIMENSIONS
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.parts.share import Share
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 N_DRAWN = 4000
 """Parts that are drawn: the standard error of a share is then 0.8 % at most."""
 
-PROPORTIONAL = 1e-3
+PROPORTIONALITY_RTOL = 1e-3
 """To this share a force goes with the modulus; differences are as good as that."""
 
 FEW_POINTS, SAME_RTOL = 31, 1e-6
@@ -66,11 +66,11 @@ def near_parts(parts: Parts, middle: FloatArray, numbers: Numbers, known: FloatA
     if known is not None and len(known) == len(middle):
         return NearParts(middle, known)
 
-    def moved(k: int, value: float) -> FloatArray:
+    def analyze_shifted(k: int, value: float) -> FloatArray:
         return _finite(numbers, parts.spec.replace({parts.paths[k]: value}, as_made=True))
 
     step = SIGMA_STEP * parts.deviations
-    found = differentiate(moved, np.column_stack([parts.nominal - step, parts.nominal + step]))
+    found = differentiate(analyze_shifted, np.column_stack([parts.nominal - step, parts.nominal + step]))
     assert found is not None  # a part without numbers has ended the estimate
     return NearParts(middle, found if known is None else np.concatenate([known, found]))
 
@@ -159,11 +159,11 @@ def expected_shares(result: Result, parts: Parts, run: Run) -> ExpectedShares:
     near = near_parts(parts, middle, lambda part: _numbers(part, rows, run, known is None), known)
     values = parts.draw(N_DRAWN)
     errors, still, proportional = values - parts.nominal, values, False
-    if MODULUS in parts.paths:
-        k = parts.paths.index(MODULUS)
+    if MODULUS_KEY in parts.paths:
+        k = parts.paths.index(MODULUS_KEY)
         still = parts.remove_errors(values, (k,))
         change = parts.nominal[k] * near.by_error[: rows.efforts, k]
-        proportional = bool(np.allclose(change, middle[: rows.efforts], rtol=PROPORTIONAL, atol=0.0))
+        proportional = bool(np.allclose(change, middle[: rows.efforts], rtol=PROPORTIONALITY_RTOL, atol=0.0))
     made = near.numbers(errors)
 
     def share(numbers: FloatArray) -> Share:
@@ -201,7 +201,7 @@ def _trim_parts(result: Result, rows: RequirementRows, middle: FloatArray, parts
     at = np.flatnonzero((rows.places >= low - slack) & (rows.places <= high + slack))
     level, means = (np.trapezoid(one[..., at], rows.places[at], axis=-1) for one in (middle, parts))
     scaled = np.arange(len(middle)) < rows.efforts
-    scaled[len(middle) - len(rows.metrics) :] = [one.dimension in SCALED for one in rows.metrics]
+    scaled[len(middle) - len(rows.metrics) :] = [one.dimension in FORCE_DIMENSIONS for one in rows.metrics]
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = np.where(means, level / means, np.nan)  # without a force there is nothing to trim: never good
     return np.asarray(np.where(scaled, parts * factor[:, None], parts))

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.parts import Parts
     from cfmkit.studies.point_evaluation import Metric
 
-SCALED = ("force", "torque", "energy")
+FORCE_DIMENSIONS = ("force", "torque", "energy")
 """Dimensions of metrics that go with the force."""
 
 
@@ -144,7 +144,7 @@ def _judge_trimmed(
             column += 2
             if nominal.target:
                 values = np.abs(factor[:, None] * ends / nominal.target - 1.0).max(axis=1)
-        elif metric.dimension in SCALED:
+        elif metric.dimension in FORCE_DIMENSIONS:
             values = factor * values
         else:
             continue

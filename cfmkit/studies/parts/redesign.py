@@ -56,27 +56,27 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 
-ESTIMATED = 4000
+N_ESTIMATED_PARTS = 4000
 """Parts whose yield is by linear estimate: one standard deviation of the estimate is 0.5 % at 90 %."""
 
 SEARCH_SEED = 7919
 """Added to the seed: the parts that a search looks at are not those that it is judged by."""
 
-CHECKED, ROUNDS, MOST_ASKED = 400, 4, 0.9975
+N_CHECKED_PARTS, MAX_CHECK_ROUNDS, MOST_ASKED = 400, 4, 0.9975
 """Parts that are solved to see whether the estimate holds, how often more is then requested, and for how much."""
 
 OTHER_SPRINGS = 4
 """Choices of bought springs that are tried where the best one misses the yield."""
 
-LOWER = 4
+N_LOWER_YIELDS = 4
 """How often less is requested where a yield is not reached: the largest is then known to a sixteenth of what lacks."""
 
-DRAWN = 48
+N_DRAWN_PARTS = 48
 """Parts that `design.robust` solves at each step: of Lan's shape 96 % are good after it, after 24 of them 93 %."""
 
 NOTHING_FREE = "this design has no values that may change ('design.free')"
 
-DIGITS = 6
+VALUE_DECIMALS = 6
 """Decimals of a value that is written, as a share of its range."""
 
 
@@ -132,13 +132,13 @@ class PartNumbers:
         return PartSlopes(by_x, by_error) if by else None
 
     def count_good_parts(self, x: FloatArray) -> int:
-        """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
+        """Return how many of `N_CHECKED_PARTS` parts keep every row; each is solved, none was seen by the search."""
         return int(self.are_good(x, self._fresh_errors).sum())
 
     @cached_property
     def _fresh_errors(self) -> FloatArray:
         """Errors of the parts that are solved, (n, d)."""
-        return np.asarray(self.parts.draw(CHECKED, self.parts.seed + SEARCH_SEED + 1) - self.parts.nominal)
+        return np.asarray(self.parts.draw(N_CHECKED_PARTS, self.parts.seed + SEARCH_SEED + 1) - self.parts.nominal)
 
     def ends_early(self) -> int:
         """Return how many of those parts have numbers, but not over all of the stated windows."""
@@ -164,7 +164,7 @@ class PartNumbers:
         return RobustProblem(
             self,
             np.array(list(free.values())).reshape(-1, 2),
-            parts.draw(ESTIMATED, parts.seed + SEARCH_SEED) - parts.nominal,
+            parts.draw(N_ESTIMATED_PARTS, parts.seed + SEARCH_SEED) - parts.nominal,
             parts.deviations,
             rows.matrix,
             rows.constant,
@@ -177,7 +177,7 @@ class PartNumbers:
 
     def build_spec(self, found: RobustResult, problem: RobustProblem) -> Spec:
         """Return the design with its values moved, as few digits of them as matter."""
-        steps = 10.0**-DIGITS * problem.reach
+        steps = 10.0**-VALUE_DECIMALS * problem.reach
         x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
         return self.variant(np.array([float(f"{value:.9g}") for value in x]), problem.perfect)
 
@@ -267,7 +267,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
 
 
 def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -> tuple[int, Design]:
-    """Return how many of `CHECKED` parts are good, where some were solved, and the design moved for its yield.
+    """Return how many of `N_CHECKED_PARTS` parts are good, where some were solved, and the design moved for its yield.
 
     `largest`: whether the largest yield is looked for where the requested one is not found.
     """
@@ -290,7 +290,7 @@ def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: b
     try:
         found, good = _with_margins(problem, numbers, numbers.start, largest)
         if block.robust is not None and free:
-            again = optimise_on_samples(problem, found, DRAWN, block.robust == "worst")
+            again = optimise_on_samples(problem, found, N_DRAWN_PARTS, block.robust == "worst")
             better = numbers.count_good_parts(again.x)
             found, good = (again, better) if better >= good else (found, good)
     except NoPart:
@@ -303,16 +303,16 @@ def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: b
 def _with_margins(
     problem: RobustProblem, numbers: PartNumbers, start: FloatArray, largest: bool = True
 ) -> tuple[RobustResult, int]:
-    """Return the design with margins and how many of `CHECKED` parts are good; more is requested until enough are."""
+    """Return the design with margins, and how many of `N_CHECKED_PARTS` are good; it is repeated until enough are."""
     best: tuple[RobustResult, int] | None = None
     asked, x, began = problem.share, start, None
-    for _ in range(ROUNDS):
+    for _ in range(MAX_CHECK_ROUNDS):
         found = with_margins(replace(problem, share=asked), x)
         began = found.began if began is None else began
         good = numbers.count_good_parts(found.x)
         if best is None or good > best[1]:
             best = replace(found, began=began), good
-        short = problem.share - good / CHECKED
+        short = problem.share - good / N_CHECKED_PARTS
         if short <= 0 or not found.reached or asked >= MOST_ASKED or problem.late():
             break
         asked, x = min(MOST_ASKED, max(found.share, asked) + 0.5 * short), found.x
@@ -321,8 +321,8 @@ def _with_margins(
 
 
 def _misses(good: int, problem: RobustProblem) -> bool:
-    """Return whether so many of `CHECKED` parts exclude that the requested share is good, with 95 % confidence."""
-    return Share(good, 0, CHECKED).excludes(problem.share)
+    """Return whether so many of `N_CHECKED_PARTS` parts exclude the requested share, with 95 % confidence."""
+    return Share(good, 0, N_CHECKED_PARTS).excludes(problem.share)
 
 
 def _largest(
@@ -333,8 +333,8 @@ def _largest(
     What makes the worst few parts less bad need not make more parts good: less is requested, between what is known to
     be reached and what is not.
     """
-    low, high = best[1] / CHECKED, problem.share
-    for _ in range(LOWER if len(start) else 0):
+    low, high = best[1] / N_CHECKED_PARTS, problem.share
+    for _ in range(N_LOWER_YIELDS if len(start) else 0):
         asked = 0.5 * (low + high)
         if problem.late():
             break
@@ -342,7 +342,11 @@ def _largest(
         good = numbers.count_good_parts(found.x)
         if good > best[1]:
             best = replace(found, reached=False), good
-        low, high = (max(asked, best[1] / CHECKED), high) if good >= CHECKED * asked else (best[1] / CHECKED, asked)
+        low, high = (
+            (max(asked, best[1] / N_CHECKED_PARTS), high)
+            if good >= N_CHECKED_PARTS * asked
+            else (best[1] / N_CHECKED_PARTS, asked)
+        )
         if low >= high:
             break
     return best
@@ -353,7 +357,7 @@ def _finish_design(design: Design, part: PartNumbers, found: RobustResult, good:
     x, spec, worst = found.x, part.build_spec(found, problem), part.costliest(found, problem)
     if _misses(good, problem):
         return _impossible(design, part, good, worst, problem)
-    solved = f"{good} of {CHECKED} solved parts meet them; largest contributor: {worst}"
+    solved = f"{good} of {N_CHECKED_PARTS} solved parts meet them; largest contributor: {worst}"
     reported = (
         f"{len(x)} values moved in {found.steps} steps: yield about {100 * found.began:.3g} % before, "
         f"{100 * found.share:.3g} % now (linear estimate); {solved}"
@@ -363,7 +367,11 @@ def _finish_design(design: Design, part: PartNumbers, found: RobustResult, good:
     numbers: dict[str, tuple[float | None, str, str]] = {
         "margins_steps": (float(found.steps), "count", "steps towards the requested yield"),
         "margins_first_order": (found.share, "ratio", "yield, linear estimate"),
-        "margins_solved": (good / CHECKED, "ratio", f"share of {CHECKED} parts that were solved at a few poses"),
+        "margins_solved": (
+            good / N_CHECKED_PARTS,
+            "ratio",
+            f"share of {N_CHECKED_PARTS} parts that were solved at a few poses",
+        ),
     }
     places = part.rows.places
     motion = part.parts.spec.motion
@@ -373,18 +381,19 @@ def _finish_design(design: Design, part: PartNumbers, found: RobustResult, good:
 
 def _impossible(design: Design, part: PartNumbers, good: int, worst: str, problem: RobustProblem) -> Design:
     """Return why no design was found: the largest yield, and what stands in its way."""
-    value = 100.0 * good / CHECKED
+    value = 100.0 * good / N_CHECKED_PARTS
     wanted = f"{100 * problem.share:.4g} % of parts are good"
     reported, cure = f"no values in the ranges were found with which {wanted}", "widen the ranges (design.free)"
     if not len(problem.bounds):
         reported, cure = f"{NOTHING_FREE} until {wanted}", "name such values"
     reported += (
-        f": {value:.3g} % at most, of {CHECKED} that were solved; largest contributor: {worst}: "
+        f": {value:.3g} % at most, of {N_CHECKED_PARTS} that were solved; largest contributor: {worst}: "
         f"make its tolerance tighter, {cure} or require less"
     )
     if short := part.ends_early():
         reported += (
-            f". {short} of {CHECKED} parts end before the windows of the requirements do: state windows as shares of "
+            f". {short} of {N_CHECKED_PARTS} parts end before the windows of the requirements do: state "
+            f"windows as shares of "
             "the travel, such as [1 %, 100 %], which then follow the travel of each part"
         )
     if problem.late():

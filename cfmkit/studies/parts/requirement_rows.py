@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE, Sampled, function_named
+from cfmkit.families.base import ENVELOPE_METRICS, Sampled, function_named
 from cfmkit.families.rows import Variants
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
@@ -36,13 +36,13 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric
 
-POSES = 15
+N_WINDOW_POSES = 15
 """Chebyshev-Lobatto poses in a window; between them the force of a mechanism that is worth making is smooth."""
 
-CLEARLY = 0.01
+CONTRADICTION_SHARE = 0.01
 """By so much of its terms a row is below zero where it contradicts the analysis, and not only by rounding."""
 
-NARROW = 0.02
+NARROW_WINDOW_SHARE = 0.02
 """A window that is a smaller share of the whole span has its ends only."""
 
 
@@ -88,7 +88,7 @@ class _RowsOfMargins:
     def add(self, one: Requirement, number: int) -> None:
         """Add the rows of a requirement."""
         name, branch = split_name(one.metric)
-        if name in ENVELOPE:  # tolerances move the box by next to nothing, and it takes a drawing of each part
+        if name in ENVELOPE_METRICS:  # tolerances move the box by next to nothing, and it takes a drawing of each part
             return
         (metric,) = metrics_of(self.nominal.spec, [one.metric], self.nominal.curve)
         limits = Bounds.from_requirement(one, metric.dimension)
@@ -119,7 +119,7 @@ class _RowsOfMargins:
         values = np.concatenate([*self.first.effort.values(), *self.first.stress])
         for row, constant, _ in rows:
             terms = [constant, *(weight * values[column] for column, weight in row.items())]
-            if sum(terms) < -CLEARLY * sum(map(abs, terms)):
+            if sum(terms) < -CONTRADICTION_SHARE * sum(map(abs, terms)):
                 return all(outcome.ok for outcome in check((one,), self.nominal))
         return False
 
@@ -272,7 +272,9 @@ def places_of(nominal: Result) -> FloatArray:
     spans = [_window(nominal, one.over) for one in nominal.spec.part_requirements]
     whole = max(high for _, high in spans) - min(low for low, _ in spans)
     for low, high in dict.fromkeys(spans):
-        share = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, POSES if high - low > NARROW * whole else 2)))
+        share = 0.5 * (
+            1.0 - np.cos(np.linspace(0.0, np.pi, N_WINDOW_POSES if high - low > NARROW_WINDOW_SHARE * whole else 2))
+        )
         wanted.append(low + (high - low) * share)
         wanted[-1][-1] = high
     places = np.unique(np.concatenate(wanted))

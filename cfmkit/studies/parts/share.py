@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 """Confidence of every interval."""
 
 Interval = tuple[float, float]
@@ -63,7 +63,7 @@ class Share:
             name: [_finite_or_none(end) for end in getattr(self, name)] for name in ("wilson", "clopper_pearson")
         }
         counts = {"good": self.good, "failed": self.failed, "parts": self.count}
-        return {"value": _finite_or_none(self.value), **intervals, "level": LEVEL, **counts}
+        return {"value": _finite_or_none(self.value), **intervals, "level": CONFIDENCE_LEVEL, **counts}
 
 
 def _finite_or_none(value: float) -> float | None:
@@ -75,7 +75,7 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
-def normal_quantile(level: float = LEVEL) -> float:
+def normal_quantile(level: float = CONFIDENCE_LEVEL) -> float:
     """Return how many standard deviations a two-sided interval reaches.
 
     Examples
@@ -86,7 +86,7 @@ def normal_quantile(level: float = LEVEL) -> float:
     return NormalDist().inv_cdf(0.5 + level / 2.0)
 
 
-def wilson(successes: int, count: int, level: float = LEVEL) -> Interval:
+def wilson(successes: int, count: int, level: float = CONFIDENCE_LEVEL) -> Interval:
     """Return the score interval of a probability [W].
 
     Examples
@@ -105,7 +105,7 @@ def wilson(successes: int, count: int, level: float = LEVEL) -> Interval:
     return low, 1.0 if successes == count else (centre + reach) / scale
 
 
-def clopper_pearson(successes: int, count: int, level: float = LEVEL) -> Interval:
+def clopper_pearson(successes: int, count: int, level: float = CONFIDENCE_LEVEL) -> Interval:
     """Return the exact interval of a probability: it covers the truth at least as often as stated [CP].
 
     Examples
@@ -122,7 +122,7 @@ def clopper_pearson(successes: int, count: int, level: float = LEVEL) -> Interva
     return low, high
 
 
-def paired_difference(gained: int, lost: int, count: int, level: float = LEVEL) -> Interval:
+def paired_difference(gained: int, lost: int, count: int, level: float = CONFIDENCE_LEVEL) -> Interval:
     """Return the interval of a difference of two probabilities seen on the same samples [BP, eq. 5].
 
     `gained`, `lost`: samples that only the second has, and that only the first has.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Place = tuple[str | int, ...]
 
-EVERY = "*"
+ALL_ITEMS = "*"
 """In place of an index: all items of a list."""
 
 
@@ -94,7 +94,7 @@ def _group_faults(block: Sensitivity, paths: Sequence[str]) -> Iterator[tuple[Pl
 
 def _members(name: str, paths: Sequence[str]) -> tuple[int, ...]:
     """Return the numbers of the parameters that a name stands for."""
-    pattern = re.escape(name).replace(re.escape(EVERY), "[0-9]+")
+    pattern = re.escape(name).replace(re.escape(ALL_ITEMS), "[0-9]+")
     return tuple(k for k, path in enumerate(paths) if re.fullmatch(pattern, path))
 
 
@@ -121,7 +121,7 @@ def together(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[int, ...],
     """Return the parameters in groups that are tightened together: correlated ones, and those of one list."""
     parts = {k: {k} for k in range(len(paths))}
     joint = [members for members, _ in groups(block, paths)]
-    joint += [_members(name, paths) for name in block.parameters if EVERY in name.split(".")]
+    joint += [_members(name, paths) for name in block.parameters if ALL_ITEMS in name.split(".")]
     for members in joint:
         union = set().union(*(parts[k] for k in members))
         for k in union:
@@ -135,7 +135,7 @@ def _expand(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[
 
 def _items(spec: Spec, path: str) -> list[str]:
     """Return the paths that one with a star stands for."""
-    before, star, after = path.partition(f".{EVERY}")
+    before, star, after = path.partition(f".{ALL_ITEMS}")
     if not star:
         return [path]
     try:
@@ -163,7 +163,7 @@ def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
     except KeyError:
         value = None
     if isinstance(value, tuple):
-        raise CannotVary(f"{found.path!r} is a list here; write {found.path}.{EVERY} for all its items")
+        raise CannotVary(f"{found.path!r} is a list here; write {found.path}.{ALL_ITEMS} for all its items")
     if value is None:
         raise CannotVary(f"{found.path!r} has no value in this specification; give it one")
     if found.kind == "number":

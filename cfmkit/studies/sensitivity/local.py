@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.families import family
 from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.sensitivity.method import Method
-from cfmkit.studies.sensitivity.oat import SLOPE
+from cfmkit.studies.sensitivity.oat import SLOPE_INDEX
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 from cfmkit.studies.sensitivity.result_types import to_stated_value as reported
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-LEVELS = 7
+N_STEP_LEVELS = 7
 """How often a step is halved, and one."""
 
 FIRST_STEP = 0.5
@@ -49,12 +49,12 @@ class Slope:
     error: float
 
 
-UNKNOWN = Slope(float("nan"), float("nan"))
+UNKNOWN_SLOPE = Slope(float("nan"), float("nan"))
 
 
 def steps() -> FloatArray:
     """Return the steps, largest first, in half widths of a range."""
-    return np.asarray(FIRST_STEP * 0.5 ** np.arange(LEVELS), dtype=np.float64)
+    return np.asarray(FIRST_STEP * 0.5 ** np.arange(N_STEP_LEVELS), dtype=np.float64)
 
 
 def sample(nominal: FloatArray, half_widths: FloatArray) -> FloatArray:
@@ -66,7 +66,7 @@ def sample(nominal: FloatArray, half_widths: FloatArray) -> FloatArray:
         Values of the parameters, and the scale of their steps.
     """
     count = len(nominal)
-    points = np.broadcast_to(nominal, (count, 2, LEVELS, count)).copy()
+    points = np.broadcast_to(nominal, (count, 2, N_STEP_LEVELS, count)).copy()
     for k in range(count):
         points[k, 0, :, k] += half_widths[k] * steps()
         points[k, 1, :, k] -= half_widths[k] * steps()
@@ -95,12 +95,12 @@ def slope(up: FloatArray, down: FloatArray, at_nominal: float, half_width: float
         there = ~np.isnan(side)
         if there.sum() >= 2 and np.isfinite(at_nominal):
             return _extrapolate((sign * (side - at_nominal) / size)[there], noise[there], 2.0)
-    return UNKNOWN
+    return UNKNOWN_SLOPE
 
 
 def _extrapolate(differences: FloatArray, noise: FloatArray, factor: float) -> Slope:
     """Return Ridders' value: `factor` is by how much halving the step reduces the leading error."""
-    best = UNKNOWN
+    best = UNKNOWN_SLOPE
     row = list(differences[:1])
     for level in range(1, len(differences)):
         before, row = row, [float(differences[level])]
@@ -125,9 +125,9 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     count = len(half)
     exact = _exact(setup)
     width = len(setup.study.metrics) + len(setup.study.spec.part_requirements)
-    outputs = np.full((count, 2, LEVELS, width), np.nan)
+    outputs = np.full((count, 2, N_STEP_LEVELS, width), np.nan)
     if not _all_known(setup, exact):
-        sides = [side for side in ("up", "down") for _ in range(LEVELS)]
+        sides = [side for side in ("up", "down") for _ in range(N_STEP_LEVELS)]
         roles = [[f"{path} {side}" for side in sides] for path in setup.paths]
         outputs = evaluator.outputs(points.reshape(count, -1, count), roles).reshape(outputs.shape)
     found: list[IndexLine] = []
@@ -162,16 +162,18 @@ def _gradient_lines(metric: Metric, one: Parameter, slope: Slope, at_nominal: fl
     scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
     unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
     value, low, high = (reported(end * scale, "ratio") for end in _neighbours(slope.value, slope.error))
-    yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, LEVELS)
+    yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, N_STEP_LEVELS)
     relative = normalise(1.0, one.spread.nominal, at_nominal)
     value, low, high = (
         reported(end, "ratio") for end in _neighbours(slope.value * relative, slope.error * abs(relative))
     )
-    yield IndexLine(metric.label, one.path, SLOPE, value, low, high, "1", LEVELS)
+    yield IndexLine(metric.label, one.path, SLOPE_INDEX, value, low, high, "1", N_STEP_LEVELS)
 
 
 def _neighbours(value: float, reach: float) -> tuple[float, float, float]:
     return value, value - reach, value + reach
 
 
-METHOD = Method(run, lambda _, parameters, __: 2 * LEVELS * parameters, (SLOPE, "gradient"), {"": "draw_bars"})
+METHOD = Method(
+    run, lambda _, parameters, __: 2 * N_STEP_LEVELS * parameters, (SLOPE_INDEX, "gradient"), {"": "draw_bars"}
+)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.studies.parts.distributions import values_at
-from cfmkit.studies.parts.share import LEVEL, paired_difference
+from cfmkit.studies.parts.share import CONFIDENCE_LEVEL, paired_difference
 from cfmkit.studies.sensitivity.indices import RESAMPLES, Analysis, Index, varies_not
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.parts.distributions import ParameterSpread
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
-TIGHTER = 0.5
+TIGHTENING_FACTOR = 0.5
 """By which factor a tolerance is tightened."""
 
 Groups = tuple[tuple[int, ...], ...]
@@ -45,7 +45,7 @@ def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups)
         Tolerances that are tightened together.
     """
     drawn = values_at(spreads, unit)
-    tight = values_at([one.tighten(TIGHTER) for one in spreads], unit)
+    tight = values_at([one.tighten(TIGHTENING_FACTOR) for one in spreads], unit)
     blocks = [drawn]
     for group in groups:
         changed = drawn.copy()
@@ -91,7 +91,7 @@ def variance_drops(outputs: FloatArray, seed: int) -> Analysis:
         return (Index(VARIANCE_DROP, gap, gap, gap),)
     count, generator = len(outputs), np.random.default_rng([seed, 2])
     again = np.array([_drops(outputs[generator.integers(count, size=count)]) for _ in range(RESAMPLES)])
-    tail = 50.0 * (1.0 - LEVEL)
+    tail = 50.0 * (1.0 - CONFIDENCE_LEVEL)
     low, high = np.nanpercentile(again, (tail, 100.0 - tail), axis=0)
     return (Index(VARIANCE_DROP, _drops(outputs), low, high),)
 

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-MU_STAR, MU, SIGMA = "mu_star", "mu", "sigma"
-NAMES = (MU_STAR, MU, SIGMA)
-LEVELS = 4
+MU_STAR, MU_INDEX, SIGMA_INDEX = "mu_star", "mu", "sigma"
+INDEX_NAMES = (MU_STAR, MU_INDEX, SIGMA_INDEX)
+N_GRID_LEVELS = 4
 """Levels of the grid in each direction; an effect is that of a step over two thirds of the range."""
 
 
@@ -49,7 +49,7 @@ def sample(start: int, count: int, parameters: int, seed: int) -> FloatArray:
     from SALib.sample import morris
 
     own = np.random.default_rng([seed, start])
-    points = morris.sample(problem(parameters), count, num_levels=LEVELS, seed=own)
+    points = morris.sample(problem(parameters), count, num_levels=N_GRID_LEVELS, seed=own)
     return np.asarray(points).reshape(count, parameters + 1, parameters)
 
 
@@ -73,16 +73,16 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
         points.reshape(-1, count),
         outputs.ravel(),
         num_resamples=RESAMPLES,
-        num_levels=LEVELS,
+        num_levels=N_GRID_LEVELS,
         seed=np.random.default_rng([seed, 1]),
     )
     reach = np.asarray(found["mu_star_conf"], dtype=np.float64)
     gap = np.full(count, np.nan)
-    size, mean, scatter = (np.asarray(found[name], dtype=np.float64) for name in NAMES)
+    size, mean, scatter = (np.asarray(found[name], dtype=np.float64) for name in INDEX_NAMES)
     return (
         Index(MU_STAR, size, np.maximum(size - reach, 0.0), size + reach),
-        Index(MU, mean, gap, gap),
-        Index(SIGMA, scatter, gap, gap),
+        Index(MU_INDEX, mean, gap, gap),
+        Index(SIGMA_INDEX, scatter, gap, gap),
     )
 
 
@@ -96,10 +96,10 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     roles = [f"step {k}" for k in range(count + 1)]
     outputs = evaluator.outputs(points, roles)
     low, high = setup.ends.T
-    grid = np.rint((points - low) / (high - low) * (LEVELS - 1)) / (LEVELS - 1)
+    grid = np.rint((points - low) / (high - low) * (N_GRID_LEVELS - 1)) / (N_GRID_LEVELS - 1)
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
-        analysis = analyze_complete(outputs[..., m], lambda one: analyze(grid, one, seed), NAMES, count)
+        analysis = analyze_complete(outputs[..., m], lambda one: analyze(grid, one, seed), INDEX_NAMES, count)
         found += lines_of(metric, setup.paths, analysis, len(grid))
     return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 

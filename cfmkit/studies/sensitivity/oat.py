@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"
+LOW_END_INDEX, HIGH_END_INDEX, SWING_INDEX, SLOPE_INDEX = "at_low_end", "at_high_end", "swing", "normalised_slope"
 
 
 def sample(nominal: FloatArray, ends: FloatArray, count: int) -> FloatArray:
@@ -59,10 +59,10 @@ def analyze(nominal: FloatArray, ends: FloatArray, outputs: FloatArray, at_nomin
     swing = outputs.max(axis=1) - outputs.min(axis=1)
     gap = np.full(len(low), np.nan)
     return (
-        Index(LOW, low, gap, gap),
-        Index(HIGH, high, gap, gap),
-        Index(SWING, swing, swing, swing),
-        Index(SLOPE, _slope(nominal, ends, high - low, at_nominal), gap, gap),
+        Index(LOW_END_INDEX, low, gap, gap),
+        Index(HIGH_END_INDEX, high, gap, gap),
+        Index(SWING_INDEX, swing, swing, swing),
+        Index(SLOPE_INDEX, _slope(nominal, ends, high - low, at_nominal), gap, gap),
     )
 
 
@@ -86,4 +86,4 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 
 
-METHOD = Method(run, lambda samples, parameters, _: samples * parameters, (SWING, SLOPE), {"": "draw_oat"})
+METHOD = Method(run, lambda samples, parameters, _: samples * parameters, (SWING_INDEX, SLOPE_INDEX), {"": "draw_oat"})

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.setup import Setup
 
-YIELD = "share of parts that meet every requirement, of those drawn from the tolerances"
+YIELD_DEFINITION = "share of parts that meet every requirement, of those drawn from the tolerances"
 
 
 def outputs(found: Findings) -> Iterator[tuple[str, Data]]:
@@ -143,7 +143,7 @@ def as_json(found: Findings) -> dict[str, Any]:
     setup = found.setup
     code = exit_code(found)
     return {
-        "status": _STATUS.get(code, "complete"),
+        "status": _STATUS_BY_CODE.get(code, "complete"),
         "message": message(found),
         "method": setup.method,
         "metrics": metrics_json(_metrics(found)),
@@ -157,7 +157,7 @@ def as_json(found: Findings) -> dict[str, Any]:
     }
 
 
-_STATUS = {
+_STATUS_BY_CODE = {
     ExitCode.INTERRUPTED: "interrupted",
     **dict.fromkeys((ExitCode.BUG, ExitCode.INVALID, ExitCode.NO_SOLUTION), "no_result"),
     ExitCode.PARTIAL: "partial",
@@ -172,7 +172,9 @@ def _metrics(found: Findings) -> dict[str, Quantity]:
         for one, value in zip(study.metrics, values, strict=True)
     }
     if found.all_met is not None:
-        noted["yield"] = Quantity(_finite_or_none(found.all_met.value), "ratio", YIELD, "no parts were drawn")
+        noted["yield"] = Quantity(
+            _finite_or_none(found.all_met.value), "ratio", YIELD_DEFINITION, "no parts were drawn"
+        )
     return noted
 
 

@@ -58,7 +58,7 @@ class Findings:
     @property
     def unstated(self) -> int:
         """Number of indices that need a value that is missing."""
-        return sum(line.value is None for line in self.lines if line.index not in OPTIONAL)
+        return sum(line.value is None for line in self.lines if line.index not in OPTIONAL_INDICES)
 
     @cached_property
     def constant(self) -> tuple[str, ...]:
@@ -72,11 +72,11 @@ class Findings:
     @property
     def lacking(self) -> int:
         """Number of indices that are not stated because samples have no value, not because nothing varies."""
-        gone = (line for line in self.lines if line.value is None and line.index not in OPTIONAL)
+        gone = (line for line in self.lines if line.value is None and line.index not in OPTIONAL_INDICES)
         return sum(line.metric not in self.constant for line in gone)
 
 
-OPTIONAL = ("normalised_slope",)
+OPTIONAL_INDICES = ("normalised_slope",)
 """Indices that may be missing though all samples are there: nothing is relative to zero."""
 
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.method import Method
 
-NOTHING = (
+NOTHING_TO_VARY = (
     "nothing to vary: add a block 'sensitivity: {parameters: {...}}' to the spec, "
     "or give --vary '{path}=normal:0.05 mm'"
 )
@@ -133,7 +133,7 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     """
     block = spec.sensitivity
     if block is None:
-        raise UsageError(NOTHING.replace("{path}", length_to_vary(spec)[0]))
+        raise UsageError(NOTHING_TO_VARY.replace("{path}", length_to_vary(spec)[0]))
     chosen = seed if seed is not None else block.seed or 0
     samples = block.samples or METHOD_NAMES[block.method].default_samples
     parts = Parts.of_block(spec, block, samples, chosen)

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-FIRST, TOTAL = "first_order", "total_order"
-NAMES = (FIRST, TOTAL)
-FEWEST = 16
+FIRST_ORDER_INDEX, TOTAL_ORDER_INDEX = "first_order", "total_order"
+INDEX_NAMES = (FIRST_ORDER_INDEX, TOTAL_ORDER_INDEX)
+MIN_BLOCKS = 16
 """Convergence is shown from so many blocks on."""
 
 
@@ -76,14 +76,16 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
     """
     count = outputs.shape[1] - 2
     if varies_not(outputs):
-        return unstated_indices(NAMES, count)
+        return unstated_indices(INDEX_NAMES, count)
     from SALib.analyze import sobol
 
     # SALib takes a seed of zero for none.
     found = sobol.analyze(
         problem(count), outputs.ravel(), calc_second_order=False, num_resamples=RESAMPLES, seed=seed + 1
     )
-    return tuple(_index(name, found[key], found[f"{key}_conf"]) for name, key in zip(NAMES, ("S1", "ST"), strict=True))
+    return tuple(
+        _index(name, found[key], found[f"{key}_conf"]) for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)
+    )
 
 
 def _index(name: str, value: Any, reach: Any) -> Index:
@@ -100,7 +102,7 @@ def stages(count: int) -> list[int]:
     [16, 32, 64, 128, 256]
     """
     found = [count]
-    while found[0] // 2 >= FEWEST:
+    while found[0] // 2 >= MIN_BLOCKS:
         found.insert(0, found[0] // 2)
     return found
 
@@ -124,7 +126,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     for m, metric in enumerate(setup.study.metrics):
         for size in stages(len(outputs)):
             known = outputs[:size, ..., m]
-            analysis = analyze_complete(known, lambda one: analyze(one, seed), NAMES, count)
+            analysis = analyze_complete(known, lambda one: analyze(one, seed), INDEX_NAMES, count)
             lines = list(lines_of(metric, setup.paths, analysis, size))
             on_the_way += lines
         found += lines

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
-from cfmkit.plots.style import BAND, GREY, NORMAL, SMALL, apply_style, axes_mm, new_figure
+from cfmkit.plots.style import BAND_GREEN, NORMAL_FONT, SMALL_FONT, TEXT_GREY, apply_style, axes_mm, new_figure
 from cfmkit.studies.suggest.proposal_making_and_judging import by_own_model
 
 if TYPE_CHECKING:
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
-COLUMNS = 3
+N_COLUMNS = 3
 
-MOST = 24
+MAX_DRAWN_PROPOSALS = 24
 """Proposals that are drawn: four families give three each and often some more; beyond it drawings get too small."""
 
 
-LINE = 3.4
+LINE_SPACING = 3.4
 """Between lines of small text [mm]: 7 pt with a third of it between them."""
 
-LETTER = 1.4
+LETTER_WIDTH = 1.4
 """Room of one letter of small text [mm]: names of proposals take 1.33 on average (DejaVu Sans, 7 pt)."""
 
 
-def named(number: int, proposal: Proposal) -> str:
+def label_proposal(number: int, proposal: Proposal) -> str:
     """Return what a proposal is called in pictures, and whether something of it was not judged."""
     return f"{number} {proposal.family}, {proposal.variant}" + (" (not judged in full)" if proposal.open else "")
 
@@ -45,32 +45,37 @@ def to_one_scale(proposals: Sequence[Proposal], request: Request, links: Sequenc
     Parameters
     ----------
     proposals : sequence of Proposal
-        The first `MOST` are drawn.
+        The first `MAX_DRAWN_PROPOSALS` are drawn.
     request : Request
         Its envelope is dashed.
     links : sequence of str
         Where each drawing leads on a page; none in a picture.
     """
-    drawn = [_drawn(one) for one in proposals[:MOST]]
+    drawn = [_find_drawing(one) for one in proposals[:MAX_DRAWN_PROPOSALS]]
     sizes = [_envelope_in_drawing(space, request) for _, space in drawn]
     wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))
-    rows = -(-len(drawn) // COLUMNS)
-    columns = min(COLUMNS, len(drawn))
-    names = [_within(150.0 / columns - 2.0, named(number, one)) for number, one in enumerate(proposals[:MOST], 1)]
-    above = 3.5 + LINE * max(len(text.split("\n")) for text in names)
+    rows = -(-len(drawn) // N_COLUMNS)
+    columns = min(N_COLUMNS, len(drawn))
+    names = [
+        _wrap_text(150.0 / columns - 2.0, label_proposal(number, one))
+        for number, one in enumerate(proposals[:MAX_DRAWN_PROPOSALS], 1)
+    ]
+    above = 3.5 + LINE_SPACING * max(len(text.split("\n")) for text in names)
     scale = min(150.0 / (columns * wide), 190.0 / (rows * high), 90.0 / max(wide, high))
     cell = wide * scale, high * scale
     figure = new_figure(160.0, rows * (cell[1] + above) + 14.0)
     total = figure.get_figheight() * 25.4
     for number, ((moving, space), size) in enumerate(zip(drawn, sizes, strict=True)):
-        row, column = divmod(number, COLUMNS)
+        row, column = divmod(number, N_COLUMNS)
         place = 5.0 + column * (150.0 / columns)
         below = total - 8.0 - (row + 1) * (cell[1] + above)
         ax = axes_mm(figure, (place + 0.5 * (150.0 / columns - cell[0]), below, *cell))
         (moving.draw_as_made or moving.draw)(ax, 0)
         _frame(ax, space, size, (wide, high))
         # from the column's edge on, where a name has the room that it is broken for
-        name = figure.text(place / 160.0, (below + cell[1] + 0.5) / total, names[number], fontsize=SMALL, va="bottom")
+        name = figure.text(
+            place / 160.0, (below + cell[1] + 0.5) / total, names[number], fontsize=SMALL_FONT, va="bottom"
+        )
         if links:
             name.set_url(links[number])
             _cover(ax, links[number])
@@ -78,9 +83,9 @@ def to_one_scale(proposals: Sequence[Proposal], request: Request, links: Sequenc
         0.02,
         1.0 - 5.0 / total,
         "Proposals in the envelope, same scale" + _left_out(proposals),
-        fontsize=NORMAL,
+        fontsize=NORMAL_FONT,
     )
-    figure.text(0.02, 1.5 / total, _scale_reported(request), fontsize=SMALL, color=GREY)
+    figure.text(0.02, 1.5 / total, _scale_reported(request), fontsize=SMALL_FONT, color=TEXT_GREY)
     return figure
 
 
@@ -93,13 +98,13 @@ def _cover(ax: Axes, link: str) -> None:
 
 def _left_out(proposals: Sequence[Proposal]) -> str:
     """Return how many proposals a picture leaves to the table; nothing if it shows all."""
-    more = len(proposals) - MOST
-    return f" (the first {MOST}; {more} more in the table)" if more > 0 else ""
+    more = len(proposals) - MAX_DRAWN_PROPOSALS
+    return f" (the first {MAX_DRAWN_PROPOSALS}; {more} more in the table)" if more > 0 else ""
 
 
-def _within(width: float, text: str) -> str:
+def _wrap_text(width: float, text: str) -> str:
     """Return small text on as many lines as a width [mm] asks for."""
-    return textwrap.fill(text, int(width / LETTER))
+    return textwrap.fill(text, int(width / LETTER_WIDTH))
 
 
 def _scale_reported(request: Request) -> str:
@@ -107,7 +112,7 @@ def _scale_reported(request: Request) -> str:
     return f"Dashed: envelope, {sides} mm" + (" across and along the travel" if request.kind == "force" else "")
 
 
-def _drawn(proposal: Proposal) -> Any:
+def _find_drawing(proposal: Proposal) -> Any:
     """Return what draws a proposal, and its own envelope."""
     record = family(proposal.family)
     result = record.analyze(by_own_model(proposal), Run())
@@ -132,11 +137,17 @@ def _frame(ax: Axes, space: Any, size: tuple[float, float], view: tuple[float, f
     own = (space.along, space.across) if space.sideways else (space.across, space.along)
     middle = [1e3 * (corner + 0.5 * side) for corner, side in zip(space.corner, own, strict=True)]
     corner = [at - 500.0 * side for at, side in zip(middle, size, strict=True)]
-    look: dict[str, Any] = {"fill": False, "edgecolor": BAND, "linewidth": 0.8, "linestyle": (0, (5, 2)), "zorder": 6}
+    look: dict[str, Any] = {
+        "fill": False,
+        "edgecolor": BAND_GREEN,
+        "linewidth": 0.8,
+        "linestyle": (0, (5, 2)),
+        "zorder": 6,
+    }
     ax.add_patch(Rectangle((corner[0], corner[1]), 1e3 * size[0], 1e3 * size[1], **look))
     ax.set_xlim(middle[0] - 500.0 * view[0], middle[0] + 500.0 * view[0])
     ax.set_ylim(middle[1] - 500.0 * view[1], middle[1] + 500.0 * view[1])
     ax.set_axis_off()
 
 
-__all__ = ["named", "to_one_scale"]
+__all__ = ["label_proposal", "to_one_scale"]

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
 
-SLACK = 1e-9
+LENGTH_RTOL = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
 
 
-TOPICS = {
+METRIC_TOPICS = {
     "ripple": "ripple", "safety": "stress", "life": "life", "hysteresis": "hysteresis", "adjusted": "adjustment",
     "link_turn": "stiffness",
 }  # fmt: skip
 """Parts of names of metrics, and what a requirement on them is about; all others are about the force."""
 
-DISQUALIFYING = {
+DISQUALIFYING_FINDINGS = {
     "stress": ("overstressed", "surface_stress_exceeded", "bearing_overloaded"),
     "springs": (
         "spring_overstretched", "spring_buckles", "spring_binds_on_pin", "spring_slack", "spring_closed",
@@ -46,12 +46,12 @@ def topic_of(metric: str) -> str:
     >>> topic_of("force_ripple"), topic_of("link_safety_factor"), topic_of("force_mean")
     ('ripple', 'stress', 'force')
     """
-    return next((topic for part, topic in TOPICS.items() if part in metric), "force")
+    return next((topic for part, topic in METRIC_TOPICS.items() if part in metric), "force")
 
 
 def disqualifying(result: Result) -> Iterator[tuple[str, str]]:
     """Yield topic and sentence of every warning with which a mechanism is no proposal."""
-    for topic, names in DISQUALIFYING.items():
+    for topic, names in DISQUALIFYING_FINDINGS.items():
         yield from ((topic, f"{one.name}: {one.message}") for one in result.warnings if one.name in names)
 
 
@@ -65,7 +65,7 @@ def largest_force(request: Request, result: Result) -> float:
 def raised_out(request: Request, force: float, share: float) -> list[str]:
     """Return whether the stiffening of wide beams takes a force out of its band, in a sentence if it does."""
     most = (1.0 + share) * force
-    if most <= request.high * (1.0 + SLACK):
+    if most <= request.high * (1.0 + LENGTH_RTOL):
         return []
     texts = [format_short(value, request.kind) for value in (force, most, request.high)]
     return [f"wide_beam: the {request.kind} is between {texts[0]} and {texts[1]}, allowed <= {texts[2]}"]
@@ -81,12 +81,12 @@ def sides_outside(request: Request, space: BoundingBox | None) -> Iterator[str]:
     if request.kind == "torque":
         sides, given = sorted(sides), sorted(given)
     for name, need, have in zip(("across the travel", "along the travel"), sides, given, strict=True):
-        if need > have * (1.0 + SLACK):
+        if need > have * (1.0 + LENGTH_RTOL):
             needed, given_side = _apart(need, have)
             yield f"needs {needed} {name}: {given_side} given"
     if request.depth is not None and space.depth is None:
         yield f"its depth is not known: {space.assumed}"
-    elif request.depth is not None and space.depth is not None and space.depth > request.depth * (1.0 + SLACK):
+    elif request.depth is not None and space.depth is not None and space.depth > request.depth * (1.0 + LENGTH_RTOL):
         needed, given_depth = _apart(space.depth, request.depth)
         yield f"needs a depth of {needed}: {given_depth} given"
 
@@ -110,7 +110,7 @@ def too_short(request: Request, result: Result) -> Iterator[str]:
     """Yield whether the window that was judged is shorter than the travel that is required."""
     window: Any = result.spec.get_value("analysis.window")
     length = 0.0 if window is None else float(window[1]) - float(window[0])
-    if length < request.travel * (1.0 - SLACK):
+    if length < request.travel * (1.0 - LENGTH_RTOL):
         dimension = "length" if request.kind == "force" else "angle"
         reported = format_short(length, dimension), format_short(request.travel, dimension)
         yield f"is constant over {reported[0]}; {reported[1]} required"

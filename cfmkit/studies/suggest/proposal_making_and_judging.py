@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.run_many_starts import NEVER, Clock
+from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import ENVELOPE, add_size, function_named
+from cfmkit.families.base import ENVELOPE_METRICS, add_size, function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.stock.processes import PROCESSES
+from cfmkit.stock.processes import PROCESSES_BY_NAME
 from cfmkit.studies.suggest.misses_in_words import (
     disqualifying,
     largest_force,
@@ -32,7 +32,7 @@ from cfmkit.studies.suggest.misses_in_words import (
     topic_of,
 )
 from cfmkit.studies.suggest.redesign_of_proposal import block_for_redesign
-from cfmkit.studies.suggest.requirements_of_request import LIVES, list_requirements, list_unjudged, windows_of
+from cfmkit.studies.suggest.requirements_of_request import LIFE_METRICS, list_requirements, list_unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
     MovedForYield,
@@ -49,19 +49,19 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
-LONGEST = 15.0
+MAX_SEARCH_SECONDS = 15.0
 """Seconds that one design may search."""
 
 OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
-ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
+ENDED_EARLY = f"its design was not finished after {MAX_SEARCH_SECONDS:g} s"
 
-TRIES = 3
+MAX_YIELD_TRIES = 3
 """How often a higher yield is required than drawn parts had."""
 
 MOST_ASKED = 0.9975
 """For a larger share the drawn parts of the search are too few."""
 
-CORRECTIONS = 2
+MAX_CORRECTIONS = 2
 """How often a part is corrected by its finest model: what is still missed then is missed."""
 
 
@@ -210,29 +210,29 @@ def finest_of(name: str, spec: Spec) -> str:
     own = spec.fidelity if spec.fidelity in models else models[0]
     for finer in reversed(models[models.index(own) + 1 :]):
         try:
-            spec.replace({FIDELITY: finer})
+            spec.replace({FIDELITY_KEY: finer})
         except CfmError:  # what that model needs is not there: other parts, a motion in time
             continue
         return finer
     return own
 
 
-FIDELITY = "analysis.fidelity"
+FIDELITY_KEY = "analysis.fidelity"
 
 
 def by_own_model(proposal: Proposal) -> Spec:
     """Return a proposal's specification with the model of its design: faster, and enough for pictures."""
     spec = proposal.spec
-    return spec if proposal.own in ("", proposal.model) else spec.replace({FIDELITY: proposal.own})
+    return spec if proposal.own in ("", proposal.model) else spec.replace({FIDELITY_KEY: proposal.own})
 
 
 def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     """Return a proposal corrected and judged by the finest model of its family; the last of those that miss least."""
     spec, best, correct = near.spec, None, job.candidate.correct
-    for _ in range(CORRECTIONS if correct else 1):
+    for _ in range(MAX_CORRECTIONS if correct else 1):
         if clock.late():
             break
-        made = function_named(correct)(spec, job.request) if correct else spec.replace({FIDELITY: near.pending})
+        made = function_named(correct)(spec, job.request) if correct else spec.replace({FIDELITY_KEY: near.pending})
         if clock.late():
             break
         found = judge_proposal(job.family, near.variant, made, job.request, job.seed, clock, near)
@@ -279,7 +279,7 @@ def redesign_for_yield(
     clock = Clock.from_budgets(run.time_budget)
     wanted = asked = float(request.good_parts or 0.0)
     best, spec, last, obstacle = near, near.spec, None, ""
-    for _ in range(TRIES):
+    for _ in range(MAX_YIELD_TRIES):
         run = replace(run, time_budget=clock.get_time_left())
         moved = None if clock.late() else moved_for_yield(candidate, spec, request, asked, run)
         if moved is None:
@@ -315,7 +315,7 @@ def _explain_margins(moved: MovedForYield | None, obstacle: str) -> str:
 def _seconds(clock: Clock) -> float:
     """Return how long one design may search [s]."""
     left = clock.get_time_left()
-    return LONGEST if left is None else min(LONGEST, max(left, 0.1))
+    return MAX_SEARCH_SECONDS if left is None else min(MAX_SEARCH_SECONDS, max(left, 0.1))
 
 
 def judge_proposal(
@@ -324,7 +324,7 @@ def judge_proposal(
     spec: Spec,
     request: Request,
     seed: int = 0,
-    clock: Clock = NEVER,
+    clock: Clock = UNLIMITED_CLOCK,
     near: Proposal | None = None,
 ) -> Proposal:
     """Return a specification as a proposal: it is written with the request as its requirements, read, analysed, judged.
@@ -364,8 +364,9 @@ def judge_proposal(
     text = dump(with_made_parts(required, request, seed))
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
+    missed = [one for one in outcomes if not one.ok]
     misses = [
-        *((topic_of(one.metric), one.sentence) for one in outcomes if not one.ok and one.metric not in ENVELOPE),
+        *((topic_of(one.metric), one.sentence) for one in missed if one.metric not in ENVELOPE_METRICS),
         *(("size", text) for text in sides_outside(request, space)),
         *(("stress", text) for text in (space.faults if space else ())),
         *(("travel", text) for text in too_short(request, result)),
@@ -376,7 +377,7 @@ def judge_proposal(
     numbers, movable = numbers_of(result, space, request), False
     warnings = {one.name: f"{one.name}: {one.short}" if one.short else one.name for one in result.warnings}
     if "wide_beam" in warnings and not misses:
-        coarser = written if near is None else written.replace({FIDELITY: near.model})
+        coarser = written if near is None else written.replace({FIDELITY_KEY: near.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
         warnings["wide_beam"] = f"wide_beam {100.0 * raised:+.2g} %"
         # what its finest model is still to correct may come down to the lower end of the band
@@ -421,7 +422,7 @@ def add_process_and_materials(spec: Spec, request: Request) -> Spec:
                 spec = spec.replace({f"{path}.material": dict(stated)})
     if request.process is None:
         return spec
-    radius = PROCESSES[request.process].least_radius
+    radius = PROCESSES_BY_NAME[request.process].least_radius
     fillet = getattr(spec.get_value("mechanism"), "fillet", 0.0)
     changes: tuple[dict[str, Any], ...] = (
         {"mechanism.part.process": request.process, "mechanism.part.fillet": max(radius, fillet)},
@@ -472,7 +473,7 @@ def _least_factor(found: Mapping[str, Any]) -> float | None:
 
 def _life(found: Mapping[str, Any]) -> float | None:
     """Return the life of what lasts shortest; None if that of the material, or of a bought spring, is not known."""
-    lives = [found[name].value for name in LIVES if name in found]
+    lives = [found[name].value for name in LIFE_METRICS if name in found]
     known = [life for life in lives if life is not None]
     if len(known) < len(lives) or ("wire_stress_max" in found and "spring_life" not in found):
         return None

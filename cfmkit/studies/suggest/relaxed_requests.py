@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     Relaxed = tuple[Request, str]
     Relaxation = Callable[[Request, float], Relaxed | None]
 
-STEPS = (1.0, 1.15, 1.5, 2.5, 6.0, 20.0)
+RELAXATION_FACTORS = (1.0, 1.15, 1.5, 2.5, 6.0, 20.0)
 """Factors at which a request is relaxed for a family; one that is farther off is not near."""
 
-HALVINGS = 3
+N_HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
 
-FURTHER = (1.03, 1.15, 1.5, 2.2)
+FURTHER_FACTORS = (1.03, 1.15, 1.5, 2.2)
 """Beyond the first candidates: laws leave out pads, margins, and what stretches."""
 
-LARGEST = 0.5
+MAX_RIPPLE = 0.5
 """Ripple and hysteresis above which nobody would speak of a constant force."""
 
-NAMED = 2
+MAX_NAMED_KEYS = 2
 """Keys that are named, those first that have to be relaxed least."""
 
 
@@ -56,7 +56,7 @@ def edges(request: Request, names: Sequence[str], seed: int, clock: Clock) -> It
     relaxations = _relaxations(request)
     left = [(name, key) for name in names for key in relaxations]
     below = 1.0
-    for factor in STEPS:
+    for factor in RELAXATION_FACTORS:
         for name, key in tuple(left):
             if clock.late():
                 return
@@ -75,7 +75,7 @@ def _offers(request: Request, name: str, relaxation: Relaxation, factor: float, 
 def _bisect(request: Request, name: str, relaxation: Relaxation, ends: tuple[float, float], seed: int) -> float:
     """Return nearly the smallest factor between two with which a family has candidates; with the second it has some."""
     below, factor = ends
-    for _ in range(HALVINGS if factor > below else 0):
+    for _ in range(N_HALVINGS if factor > below else 0):
         middle = (below * factor) ** 0.5
         has_some = _offers(request, name, relaxation, middle, seed)
         below, factor = (below, middle) if has_some else (middle, factor)
@@ -86,7 +86,7 @@ def confirm(request: Request, seed: int, clock: Clock, edge: Edge) -> str | None
     """Return the value of a key with which a family's first candidate is good; None if none is."""
     relaxation = _relaxations(request)[edge.key]
     tried: set[str] = set()
-    for more in FURTHER:
+    for more in FURTHER_FACTORS:
         relaxed = relaxation(request, edge.factor * more)
         if relaxed is None:
             return None
@@ -183,7 +183,7 @@ def _shorter(request: Request, factor: float) -> Relaxed:
 
 def _relax_ripple(request: Request, factor: float) -> Relaxed | None:
     text = percent(factor * request.ripple)
-    return (replace(request, ripple=share), text) if (share := read_quantity(text, "ratio")) < LARGEST else None
+    return (replace(request, ripple=share), text) if (share := read_quantity(text, "ratio")) < MAX_RIPPLE else None
 
 
 def _less_safe(request: Request, factor: float) -> Relaxed | None:
@@ -193,7 +193,7 @@ def _less_safe(request: Request, factor: float) -> Relaxed | None:
 
 def _lossy(request: Request, factor: float) -> Relaxed | None:
     text = percent(factor * (request.hysteresis or 0.0))
-    return (replace(request, hysteresis=share), text) if (share := read_quantity(text, "ratio")) < LARGEST else None
+    return (replace(request, hysteresis=share), text) if (share := read_quantity(text, "ratio")) < MAX_RIPPLE else None
 
 
 def _less_adjustable(request: Request, factor: float) -> Relaxed | None:

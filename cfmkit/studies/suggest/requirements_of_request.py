@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.families.base import ENVELOPE
+from cfmkit.families.base import ENVELOPE_METRICS
 from cfmkit.metrics import evaluate
 from cfmkit.specs.units import format_short
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Spec
 
-ADJUSTED = 0.025
+ADJUSTMENT_TOL = 0.025
 """How far the mean may be from an end of the adjustment: as far as from a force that is required as a number."""
 
 STRAIGHT_LINKS = "1 %"
 """Largest elastic turn of a link over that of its spring: models of links take them for rigid."""
 
-LIVES = ("fatigue_life", "spring_life")
+LIFE_METRICS = ("fatigue_life", "spring_life")
 """Metrics that say how many cycles the material, and bought springs, last."""
 
 
@@ -135,7 +135,7 @@ def _of_box(request: Request, space: BoundingBox | None) -> Iterator[dict[str, A
     if request.kind == "torque":  # what turns may lie either way in the plane
         given = (max(given), min(given)) if width >= height else (min(given), max(given))
     sides = [*given, *((request.depth,) if request.depth is not None and depth is not None else ())]
-    for name, most in zip(ENVELOPE, sides, strict=False):
+    for name, most in zip(ENVELOPE_METRICS, sides, strict=False):
         yield {"metric": name, "max": format_short(most, "length", 12)}
 
 
@@ -192,6 +192,6 @@ def _of_adjustment(request: Request, found: Mapping[str, Quantity]) -> Iterator[
     if request.adjustable is None or "adjusted_force_min" not in found:
         return
     low, high = request.adjustable
-    yield {"metric": "adjusted_force_min", "max": format_short(low * (1.0 + ADJUSTED), "force", 12)}
-    yield {"metric": "adjusted_force_max", "min": format_short(high * (1.0 - ADJUSTED), "force", 12)}
+    yield {"metric": "adjusted_force_min", "max": format_short(low * (1.0 + ADJUSTMENT_TOL), "force", 12)}
+    yield {"metric": "adjusted_force_max", "min": format_short(high * (1.0 - ADJUSTMENT_TOL), "force", 12)}
     yield {"metric": "adjusted_ripple_max", "max": _share(request.ripple)}

@@ -36,7 +36,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     ProposalJob,
     make_proposal,
 )
-from cfmkit.studies.suggest.relaxed_requests import NAMED, confirm, edges
+from cfmkit.studies.suggest.relaxed_requests import MAX_NAMED_KEYS, confirm, edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -46,20 +46,20 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Candidate, Request
     from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
-ENOUGH, ENOUGH_WITH_PARTS = 3, 2
+ENOUGH_PROPOSALS, ENOUGH_WITH_PARTS = 3, 2
 """Proposals of a family after which no more of its candidates are made; fewer where parts of each are drawn."""
 
-ROUNDS = (3, 4, 6, 12)
+ROUND_SIZES = (3, 4, 6, 12)
 """Candidates of a family in each round, the last again and again: every round waits for the one before it."""
 
-ASKING, LAST = 0.5, 0.05
+ASKING_SHARE, LAST_SHARE = 0.5, 0.05
 """Shares of the time budget in which families answer, and which are left where nothing is found."""
 
 RESERVE_FOR_FILLETS = 0.8
 """Share of the strength that beams may use first: fillets of solids had 1.05 to 1.35 times the stress of their
 beams."""
 
-UNANSWERED = "the time budget ended before it had answered"
+UNANSWERED_MESSAGE = "the time budget ended before it had answered"
 
 RESERVE = 14.0
 """Seconds that figures of a dozen proposals take on two cores."""
@@ -84,9 +84,9 @@ class _Times:
         if budget is None:
             return cls()
         now = time.time()
-        left = max(LAST * budget, min(reserve, RESERVE_OF_FEW))
+        left = max(LAST_SHARE * budget, min(reserve, RESERVE_OF_FEW))
         ends = (max(budget - kept, 0.5 * budget) for kept in (reserve, left))
-        return cls(now + ASKING * budget, *(now + end for end in ends))
+        return cls(now + ASKING_SHARE * budget, *(now + end for end in ends))
 
 
 @dataclass(frozen=True)
@@ -148,8 +148,10 @@ def suggest(
     answers, unasked = _answers(request, run, times.asking, bugs)
     queues = {one.family: list(one.offer.candidates) for one in answers}
     making = _Making(run, times, sum(map(len, queues.values())), bugs)
-    turn, cut, enough = 0, unasked, ENOUGH if request.good_parts is None else ENOUGH_WITH_PARTS
-    while not making.late() and (batch := list(_next(queues, making.done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
+    turn, cut, enough = 0, unasked, ENOUGH_PROPOSALS if request.good_parts is None else ENOUGH_WITH_PARTS
+    while not making.late() and (
+        batch := list(_next(queues, making.done, ROUND_SIZES[min(turn, len(ROUND_SIZES) - 1)], enough))
+    ):
         turn += 1
         jobs = [ProposalJob(name, candidate, request, run.seed, times.without) for name, candidate in batch]
         rest = (making.with_margins, making.select_for_finest)
@@ -181,13 +183,13 @@ def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Execut
     """
     executor = give_up_at(run.executor, deadline)
 
-    def watched(work: Work, jobs: Iterator[Any], stopping: Stopping) -> Iterator[tuple[Any, Any]]:
+    def collect_bugs(work: Work, jobs: Iterator[Any], stopping: Stopping) -> Iterator[tuple[Any, Any]]:
         for job, outcome in executor(partial(surviving, work), jobs, stopping):
             if isinstance(outcome, Lost) and outcome.bug:
                 bugs.append(outcome.bug)
             yield job, outcome
 
-    return watched
+    return collect_bugs
 
 
 class _Making:
@@ -289,7 +291,7 @@ def _with_nearest(
         executor = surviving_until(run, deadline, bugs)
         work = partial(confirm, request, run.seed, clock)
         try:
-            for edge, outcome in executor(work, waiting, lambda: clock.late() or len(keys) >= NAMED):
+            for edge, outcome in executor(work, waiting, lambda: clock.late() or len(keys) >= MAX_NAMED_KEYS):
                 if isinstance(outcome, str):
                     keys.add(edge.key)
                     named.setdefault(edge.family, {}).setdefault(edge.key, outcome)
@@ -321,11 +323,11 @@ def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]
     found = dict(executor(partial(_ask_family, request, plain), iter(asked), lambda: False))
     answers, late = [], False
     for name in asked:
-        outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED)
+        outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED_MESSAGE)
         if not isinstance(outcome, FamilyOffer):
             timed_out = outcome.status is Status.TIMEOUT
             late |= timed_out
-            outcome = FamilyOffer(reason=UNANSWERED if timed_out else outcome.message)
+            outcome = FamilyOffer(reason=UNANSWERED_MESSAGE if timed_out else outcome.message)
         answers.append(Answered(name, outcome))
     return [one for one in answers if one.offer.candidates or one.offer.reason], late
 
@@ -340,7 +342,7 @@ def _ask_family(request: Request, run: Run, name: str) -> FamilyOffer:
     return offer_of(record, request, run)
 
 
-OTHER = {"catalogue": "custom", "custom": "catalogue"}
+OTHER_SPRINGS = {"catalogue": "custom", "custom": "catalogue"}
 """The springs that are not allowed where only the first ones are."""
 
 
@@ -360,7 +362,7 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
             if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
                 continue
             found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
-    reason = f"it needs {OTHER[request.springs]} springs" if offer.candidates and request.springs else ""
+    reason = f"it needs {OTHER_SPRINGS[request.springs]} springs" if offer.candidates and request.springs else ""
     likely_first = tuple(sorted(found.values(), key=lambda candidate: candidate.doubtful))
     return FamilyOffer(likely_first, offer.reason if found else offer.reason or reason)
 
@@ -413,7 +415,7 @@ def _add_size_to_name(one: Proposal) -> Proposal:
     return replace(one, variant=f"{one.variant}, {across:.3g} x {along:.3g} mm")
 
 
-EQUAL = 1e-3
+EQUAL_RTOL = 1e-3
 """Numbers that differ by less than this share are equal: searches leave as much in them, and nobody sees it."""
 
 
@@ -429,7 +431,7 @@ def order_proposals(proposals: Sequence[Proposal], prefer: Sequence[str]) -> lis
         total = 0.0
         for name, weight in weights.items():
             values = measures[name]
-            total += weight * sum(value < (1.0 - EQUAL) * values[index] for value in values)
+            total += weight * sum(value < (1.0 - EQUAL_RTOL) * values[index] for value in values)
         return total
 
     order = sorted(range(len(proposals)), key=lambda index: (score(index), index))

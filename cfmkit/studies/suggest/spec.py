@@ -13,21 +13,21 @@ from cfmkit.families.suggestion_request import Request, Springs
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec, SafetyFactor
-from cfmkit.stock.processes import PROCESSES, ProcessName, why_not_made
+from cfmkit.stock.processes import PROCESSES_BY_NAME, ProcessName, why_not_made
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 
-MEAN = 0.025
+MEAN_TOL = 0.025
 """How far the mean may be from a force that is required as a number; who wants less gives a band."""
 
-RIPPLE = 0.05
+DEFAULT_RIPPLE = 0.05
 """Ripple where none is required."""
 
-SAFETY = 1.5
+DEFAULT_SAFETY = 1.5
 """Safety factor where none is required: usual for parts whose material and loads are known on average."""
 
-USUAL: dict[str, tuple[str, ...]] = {
+USUAL_MATERIALS: dict[str, tuple[str, ...]] = {
     "fdm": ("pla", "petg", "abs"),
     "sls": ("pa12-sls",),
     "laser": ("pom",),
@@ -52,7 +52,7 @@ class SuggestBlock(Model):
     )
     travel: PositiveLength | None = Field(None, description="over which the force is constant")
     angle: Annotated[Angle, Field(gt=0)] | None = Field(None, description="over which the torque is constant")
-    ripple: Share = Field(RIPPLE, description="largest (max - min)/max over the travel, in each direction")
+    ripple: Share = Field(DEFAULT_RIPPLE, description="largest (max - min)/max over the travel, in each direction")
     envelope: tuple[PositiveLength, ...] = Field(
         min_length=2,
         max_length=3,
@@ -70,7 +70,7 @@ class SuggestBlock(Model):
     )
     hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
     springs: Springs | None = Field(None, description="helical springs that it may have; default: either")
-    safety: SafetyFactor = Field(SAFETY, description="least safety factor of stresses, against yield")
+    safety: SafetyFactor = Field(DEFAULT_SAFETY, description="least safety factor of stresses, against yield")
     cycles: Annotated[int, Field(ge=1)] | None = Field(
         None, description="required life in cycles; checked for materials with `fatigue` data"
     )
@@ -127,7 +127,7 @@ class SuggestBlock(Model):
         reasons = [why_not_made(self.process, one.name, one.modulus) for one in self._materials]
         if reported := "; ".join(dict.fromkeys(filter(None, reasons))):
             refuse("SuggestBlock", {("process",): reported})
-        least = PROCESSES[self.process].least_feature
+        least = PROCESSES_BY_NAME[self.process].least_feature
         for number, side in enumerate(self.envelope):
             if side < least * (1.0 - 1e-9):
                 name = ("first side", "second side", "depth")[number]
@@ -166,12 +166,12 @@ class SuggestBlock(Model):
     def ends(self) -> tuple[float, float]:
         """The band in which every force has to lie, or of what the mean may be [N or N m]."""
         value: Any = self.force if self.force is not None else self.torque
-        return value if isinstance(value, tuple) else (value * (1.0 - MEAN), value * (1.0 + MEAN))
+        return value if isinstance(value, tuple) else (value * (1.0 - MEAN_TOL), value * (1.0 + MEAN_TOL))
 
     def request(self) -> Request:
         """Return the same as families know it."""
         value: Any = self.force if self.force is not None else self.torque
-        usual = USUAL[self.process] if self.process else ()
+        usual = USUAL_MATERIALS[self.process] if self.process else ()
         materials = self._materials or tuple(MaterialSpec(name=name) for name in usual)
         blocks = tuple(self._lasting(one) for one in materials)
         low, high = self.ends
@@ -186,7 +186,7 @@ class SuggestBlock(Model):
             "good_parts": self.made_well,
         }
         if self.process:
-            derived["thinnest"] = PROCESSES[self.process].least_feature
+            derived["thinnest"] = PROCESSES_BY_NAME[self.process].least_feature
         # every other key goes on under its own name
         own = {field.name for field in fields(Request)} & type(self).model_fields.keys() - derived.keys()
         return Request(**{name: getattr(self, name) for name in own}, **derived)

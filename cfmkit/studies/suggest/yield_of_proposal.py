@@ -50,7 +50,7 @@ N_DRAWN = 100
 AT_ONCE = 10
 """Parts between two looks at whether too many are bad already, or the time is up."""
 
-STEPS = 15
+MAX_REDESIGN_STEPS = 15
 """Steps of one redesign, which is ended by them and not by a clock: what can be reached is nearly reached in ten."""
 
 OUT_OF_TIME = "the time budget ended before its manufactured parts were evaluated"
@@ -219,7 +219,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, request: Request, asked: f
     numbers = PartNumbers(parts, tuple(free), rows, run)
     problem = numbers.problem(free, asked, Clock.from_budgets(run.time_budget))
     try:
-        found = with_margins(problem, numbers.start, STEPS)
+        found = with_margins(problem, numbers.start, MAX_REDESIGN_STEPS)
     except NoPart:
         return None
     return MovedForYield(

@@ -1,6 +1,6 @@
 """A plate with the anchors' holes and the slider's slot, and the lines of the springs with the slider in the middle."""
 
-from cfmkit.export.contours import TOLERANCE, Contour, Drawing, Line, circle, polygon
+from cfmkit.export.contours import OUTLINE_TOLERANCE, Contour, Drawing, Line, circle, polygon
 from cfmkit_oblique.model import Solution
 from cfmkit_oblique.spec import ObliqueSpec
 
@@ -8,7 +8,7 @@ MARGIN, PIN = 0.25, 0.04
 """Of the plate around the anchors, and radius of holes and half width of the slot, in half spans."""
 
 
-def drawing(spec: ObliqueSpec, tolerance: float = TOLERANCE) -> Drawing:
+def drawing(spec: ObliqueSpec, tolerance: float = OUTLINE_TOLERANCE) -> Drawing:
     """Return the plate and the springs; every edge is exact."""
     solution, part = Solution(spec), spec.mechanism
     span, top, low = part.half_span, solution.height, solution.height - solution.travel

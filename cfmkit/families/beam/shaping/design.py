@@ -16,11 +16,11 @@ from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
 from cfmkit.families.beam.shaping.multistart import Explored, explore, rank
-from cfmkit.families.beam.shaping.report import REISSNER, Judged, judge_design, notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, polish, satisfy_limits, widen
+from cfmkit.families.beam.shaping.report import REISSNER_MODEL, Judged, judge_design, notes_of, search_of, starts_table
+from cfmkit.families.beam.shaping.search import VIOLATION_TOL, Found, StartBudget, polish, satisfy_limits, widen
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, scatter_within_tolerances
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
-from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Task, TaskLimits
+from cfmkit.families.beam.shaping.task import BENDING_ONLY, STRESS_MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Design, Finding, Status
 from cfmkit.specs.units import format_short
@@ -79,7 +79,7 @@ def with_stretch_and_shear(spec: BeamSpec) -> BeamSpec:
     said = {"axial", "shear"} & spec.mechanism.model_fields_set
     if spec.analysis.fidelity is not None or said:
         return spec
-    return spec.replace({"analysis.fidelity": REISSNER})
+    return spec.replace({"analysis.fidelity": REISSNER_MODEL})
 
 
 def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
@@ -142,15 +142,15 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
     stated, force = wanted.limits, wanted.force
     box, deformed = stated.envelope, stated.deformed_envelope
     return TaskLimits(
-        stress=allowable_stress * (1 - MARGIN) if stated.stress and allowable_stress else None,
+        stress=allowable_stress * (1 - STRESS_MARGIN) if stated.stress and allowable_stress else None,
         envelope=None if box is None else (*box.x, *box.y),
         deformed_envelope=None if deformed is None else (*deformed.x, *deformed.y),
         length_ratio=stated.max_length_ratio,
-        slenderness=stated.min_slenderness * (1 + MARGIN) if stated.min_slenderness else None,
+        slenderness=stated.min_slenderness * (1 + STRESS_MARGIN) if stated.min_slenderness else None,
         clearance=stated.clearance,
         opening=stated.joint_opening,
         radius=stated.min_radius,
-        force_min=None if force.min is None else force.min * (1 + MARGIN),
+        force_min=None if force.min is None else force.min * (1 + STRESS_MARGIN),
         force_target=force.target,
         force_tolerance=force.tolerance,
     )
@@ -263,7 +263,7 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
     return tuple(out)
 
 
-MOST = 3
+MAX_NEAR_DESIGNS = 3
 """Designs that are looked at, the ones that miss the limits least."""
 
 AT_BOUND = 1e-4
@@ -282,7 +282,7 @@ class Blocked:
 
 def find_blocking(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
     """Return what blocks, judged from the designs that miss the limits least."""
-    best = sorted(found, key=lambda one: one.violation)[:MOST]
+    best = sorted(found, key=lambda one: one.violation)[:MAX_NEAR_DESIGNS]
     missed = missed_by(task, best[0])
     nearest: dict[str, str] = {}
     for name in missed:
@@ -292,12 +292,12 @@ def find_blocking(task: Task, found: Iterable[Found], plan: StartBudget) -> Bloc
                 return Blocked(missed, {}, one)
         slack = min((one.violation for one in gives if set(missed_by(task, one)) <= {name}), default=None)
         if slack is not None:
-            nearest |= NEAREST[name](task, 1.02 * slack)
+            nearest |= NEAREST_LIMITS[name](task, 1.02 * slack)
     if not nearest:  # none gives way alone: all that are missed together, by the same share
         gives = [_relax_limits(task, one, plan, tuple(missed)) for one in best]
         slack = min((one.violation for one in gives if set(missed_by(task, one)) <= set(missed)), default=None)
         if slack is not None:
-            nearest = {key: value for name in missed for key, value in NEAREST[name](task, 1.02 * slack).items()}
+            nearest = {key: value for name in missed for key, value in NEAREST_LIMITS[name](task, 1.02 * slack).items()}
     return Blocked(missed, nearest, None)
 
 
@@ -315,7 +315,7 @@ def missed_by(task: Task, found: Found) -> dict[str, str]:
     view = program.view(found.x)
     if view is None:
         return {}
-    rows = design_limits.list_missed_limits(program.limits(view), VIOLATION)
+    rows = design_limits.list_missed_limits(program.limits(view), VIOLATION_TOL)
     return {one.name: f"{one.about}: missed by {percent(one.by)}" for one in rows}
 
 
@@ -366,7 +366,7 @@ def _scale_limit(
     return nearest
 
 
-NEAREST: dict[str, Callable[[Task, float], dict[str, str]]] = {
+NEAREST_LIMITS: dict[str, Callable[[Task, float], dict[str, str]]] = {
     "stress": _stress,
     "envelope": _box("envelope"),
     "deformed_envelope": _box("deformed_envelope"),

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.response import View
 
 
-SIDES = {
+SIDE_NAMES = {
     "stress": ("left side", "right side"),
     "left": ("left side, tension", "left side, compression"),
     "right": ("right side, tension", "right side, compression"),
@@ -50,7 +50,7 @@ def rows_of(view: View) -> list[LimitRows]:
     """Return the rows of all limits, with derivatives if the view has them: the engine computes those once."""
     pending = view.kept.get("limits")
     if pending is None:  # else the derivatives are requested where the values were
-        pending = view.kept["limits"] = [rows for make in LIMITS.values() for rows in make(view)]
+        pending = view.kept["limits"] = [rows for make in LIMIT_FUNCTIONS.values() for rows in make(view)]
     if not view.sloped:
         return [LimitRows(one.name, one.values.ravel(), None, one.about) for one in pending]
     return [
@@ -107,13 +107,13 @@ def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float,
         out[near] = (share[:, :, None] * at_three).sum(axis=1)
         return out
 
-    sides = SIDES[what]
+    sides = SIDE_NAMES[what]
 
-    def about() -> list[str]:
+    def describe_places() -> list[str]:
         at = view.poses.at[which]
         return [f"{beam}, {side}, at {1e3 * pose:.4g} mm" for beam in lines for side in sides for pose in at]
 
-    return PendingRows(name, values, slopes, about)
+    return PendingRows(name, values, slopes, describe_places)
 
 
 def _highest(places: list[FloatArray], values: list[FloatArray]) -> tuple[FloatArray, Any, FloatArray]:
@@ -203,7 +203,7 @@ def force(view: View) -> list[PendingRows]:
     return [PendingRows("force", values, slopes, lambda: [about for _, _, about in rows])]
 
 
-LIMITS: dict[str, Callable[[View], list[PendingRows]]] = {
+LIMIT_FUNCTIONS: dict[str, Callable[[View], list[PendingRows]]] = {
     "stress": stress,
     "envelope": envelope,
     "deformed_envelope": deformed_envelope,
@@ -216,10 +216,10 @@ LIMITS: dict[str, Callable[[View], list[PendingRows]]] = {
 """All limits by name."""
 
 
-SHARPNESS = 25.0
+BOUND_SHARPNESS = 25.0
 """Of the smooth bound on distances of 17 by 17 places: at most ln(289)/25, 23 % of those required, below the least."""
 
-_PLACES = 16
+_N_PLACES = 16
 _NO_WEIGHT = 1e-10  # of a pair of places in the smooth bound: its derivative is left out
 
 
@@ -262,7 +262,7 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     dy = np.stack([one.y for one in first])[..., None] - np.stack([one.y for one in second])[:, :, None]
     distance = np.hypot(dx, dy) + 1e-12
     ratio = np.nan_to_num(distance / required[:, None], nan=np.inf)
-    soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), SHARPNESS)
+    soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), BOUND_SHARPNESS)
     share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
     at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
     pull = share.reshape(ratio.shape)[at] / required[p, i, j]
@@ -279,11 +279,11 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
         np.add.at(out, (p, q), by)
         return out
 
-    def about() -> list[str]:
+    def describe_places() -> list[str]:
         names = [" and ".join(dict.fromkeys(pair.beams)) for pair in couples]
         return [f"{both}, at {1e3 * at:.4g} mm" for both in names for at in view.poses.at[shown]]
 
-    return PendingRows("clearance", soft - 1.0, slopes, about)
+    return PendingRows("clearance", soft - 1.0, slopes, describe_places)
 
 
 @dataclass(frozen=True)
@@ -309,7 +309,7 @@ class _Thinned:
 @cache
 def _even(count: int) -> Any:
     """Return the indices of 17 places of so many, as even as they can be."""
-    return np.unique(np.linspace(0, count - 1, _PLACES + 1).round().astype(np.int64))
+    return np.unique(np.linspace(0, count - 1, _N_PLACES + 1).round().astype(np.int64))
 
 
 def _choose_pairs(pair: Pair, way: FloatArray) -> Any:

@@ -16,16 +16,16 @@ import numpy as np
 
 from cfmkit.designing.run_many_starts import Done, OneStart, Stage, from_record, run_stage
 from cfmkit.families.beam.shaping.search import (
-    VIOLATION,
+    VIOLATION_TOL,
     Found,
     StartBudget,
     nearer,
     refine,
-    searched,
+    search_start,
     searched_far,
     widen,
 )
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audit_design
 from cfmkit.families.beam.shaping.variables import Variables
 
 if TYPE_CHECKING:
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
 
 
-_REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little
+_N_REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little
 
-_LEADERS = 3  # of the flattest over a wider window: finishing one takes as long as a start
+_N_LEADERS = 3  # of the flattest over a wider window: finishing one takes as long as a start
 
-_LASTS = {
+_STAGE_DURATIONS = {
     "starts": 9.0,
     "widenings": 5.0,
     "starts over a wider window": 4.0,
@@ -77,21 +77,21 @@ def explore(task: Task, plan: StartBudget, counts: tuple[int, int], identity: st
     """
     starts, wide = counts
     jobs = _Jobs(task, plan, identity, run)
-    begun = jobs.run_stage("starts", partial(searched, task.started, run.seed, plan=plan), range(starts))
+    begun = jobs.run_stage("starts", partial(search_start, task.started, run.seed, plan=plan), range(starts))
     found, missing = _found_in(begun), starts - len(begun.records)
     if task.objective == "range":
         best = dict(list(rank(task, found))[:wide])
         found |= _found_in(jobs.run_stage("widenings", partial(_widen, task.started, best, plan), best))
         distant = partial(searched_far, task.started, run.seed, plan=plan)
         far = _found_in(jobs.run_stage("starts over a wider window", distant, range(starts)))
-        leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_LEADERS])
+        leaders = dict(sorted(_keep_within_limits(far), key=lambda item: item[1].objective)[:_N_LEADERS])
         work = partial(_nearer, task.started, leaders, plan)
         led = _found_in(jobs.run_stage("widenings of the flattest of these", work, leaders))
         found |= {index: one for index, one in led.items() if _better(task, one, found.get(index))}
     if task.orders != task.started.orders:
-        widest = dict(list(rank(task, found))[:_REFINED])
+        widest = dict(list(rank(task, found))[:_N_REFINED])
         found |= _found_in(jobs.run_stage("refinements", partial(_refine, task, widest, plan), widest))
-    audits = {index: audited(Variables(task, one.order), one) for index, one in rank(task, found)}
+    audits = {index: audit_design(Variables(task, one.order), one) for index, one in rank(task, found)}
     return Explored(found, begun.reused, missing, tuple(jobs.lost), audits)
 
 
@@ -113,7 +113,7 @@ class _Jobs:
 
         def tell(records: Mapping[int, dict[str, Any]]) -> None:
             found = [record["found"] for record in records.values() if record["found"]]
-            feasible = sum(one["violation"] <= VIOLATION for one in found)
+            feasible = sum(one["violation"] <= VIOLATION_TOL for one in found)
             text = f"{len(records)} of {len(numbers)} {what}, {feasible} meet all limits"
             self.run.progress(begun + (ended - begun) * len(records) / max(1, len(numbers)), text)
 
@@ -124,7 +124,7 @@ class _Jobs:
 
 def _shares(task: Task) -> dict[str, tuple[float, float]]:
     """Return between which shares of the whole search each stage of a task lies."""
-    lasts = dict(_LASTS)
+    lasts = dict(_STAGE_DURATIONS)
     if task.objective != "range":
         lasts = {"starts": 1.0}
     elif task.orders == task.started.orders:

@@ -16,8 +16,8 @@ from cfmkit.elastica.model.beam import fit
 from cfmkit.families.beam.contacts import force_extremes
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
-from cfmkit.families.beam.shaping.search import PLACES, Found
-from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
+from cfmkit.families.beam.shaping.search import COORDINATE_DECIMALS, Found
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audit_design
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.run_control import Run
 from cfmkit.results import Quantity, Searched, Status
@@ -69,7 +69,7 @@ def judge_design(spec: BeamSpec, task: Task, found: Found, audit: Audit | None =
     window = _confirmed_window(task, result, _window(spec, task, found), _requested_window(spec)[0])
     new = new.replace({"analysis.window": window})
     band = _half_band(task, result, window)
-    audit = audit or audited(Variables(task, found.order), found)
+    audit = audit or audit_design(Variables(task, found.order), found)
     (miss,) = (None,) if task.shape is None else measure_metrics(result, window, "deviation_from_curve")
     return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)), miss)
 
@@ -86,18 +86,18 @@ def _confirmed_window(task: Task, result: Result, window: tuple[float, float], a
     """Return the widest window within another one over which the analysis finds the force in band; `asked` at least."""
     start, end = window
 
-    def kept(micrometres: int) -> bool:
+    def satisfies_band(micrometres: int) -> bool:
         band = _half_band(task, result, (1e-6 * micrometres, end))
         return band is not None and band <= task.half_band
 
     if task.objective != "range" or start >= asked:
         return start, end
     bad, good = round(1e6 * start), int(1e6 * asked)
-    if kept(bad):
+    if satisfies_band(bad):
         return start, end
     while good - bad > 1:
         middle = (bad + good) // 2
-        bad, good = (bad, middle) if kept(middle) else (middle, good)
+        bad, good = (bad, middle) if satisfies_band(middle) else (middle, good)
     return min(good / 1e6, asked), end
 
 
@@ -165,12 +165,12 @@ def _requested_window(spec: BeamSpec) -> tuple[float, float]:
 
 
 def _place(value: float) -> float:
-    return round(float(value), PLACES)
+    return round(float(value), COORDINATE_DECIMALS)
 
 
-REISSNER = "reissner"
+REISSNER_MODEL = "reissner"
 
-DEFINITIONS = {
+SEARCH_DEFINITIONS = {
     "starts": ("count", "random starts that led to a shape"),
     "starts_within_limits": ("count", "starts whose shape meets all limits, as the audit at more poses found"),
     "starts_sound": (
@@ -215,22 +215,25 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
     """Return what only the search knows, each number with the model and the window that it is of."""
     own = design.window
     asked, whole = (task.layers * task.window[0], own[1]), (0.0, own[1])
-    reported = dict.fromkeys(DEFINITIONS, (task.fidelity, whole))
+    reported = dict.fromkeys(SEARCH_DEFINITIONS, (task.fidelity, whole))
     reported |= dict.fromkeys(("starts", "starts_within_limits", "starts_sound", "traces"), (task.fidelity, asked))
     reported |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
-    reported |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
+    reported |= {
+        "audit_half_band_reissner": (REISSNER_MODEL, own),
+        "audit_strict_range_reissner": (REISSNER_MODEL, whole),
+    }
     audit = design.audit
     numbers = (
         _counts(result) | {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)} | _drawn_values(drawn)
     )
-    if task.fidelity != REISSNER and task.contact is None:  # else the metrics say it
+    if task.fidelity != REISSNER_MODEL and task.contact is None:  # else the metrics say it
         numbers |= _reissner(design)
-    return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *reported[name]) for name in numbers}
+    return {name: Searched(Quantity(numbers[name], *SEARCH_DEFINITIONS[name]), *reported[name]) for name in numbers}
 
 
 def _reissner(design: Judged) -> dict[str, float | None]:
     """Return what the analysis says of the design with beams that stretch and shear."""
-    result = analyze(design.spec.replace({"analysis.fidelity": REISSNER}), Run())
+    result = analyze(design.spec.replace({"analysis.fidelity": REISSNER_MODEL}), Run())
     band, share = measure_metrics(result, design.window, "half_band", "strict_range_fraction")
     return {"audit_half_band_reissner": band, "audit_strict_range_reissner": share}
 

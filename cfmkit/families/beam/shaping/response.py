@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-_EACH = 8  # poses of the window for one before it
+_POSES_PER_REUSE = 8  # poses of the window for one before it
 
-_MIDDLE = 0.7  # of the end: a pose under load that stays where it is while the window grows
+_MIDDLE_SHARE = 0.7  # of the end: a pose under load that stays where it is while the window grows
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ def poses_of(task: Task, start: float) -> PosePlan:
     end = task.window[1]
     inside = start + 0.5 * (end - start) * (1 - np.cos(np.linspace(0, np.pi, task.points)))
     inside[-1] = end
-    before = np.linspace(0.0, start, task.points // _EACH + 2)[1:-1] if start > 0 else np.zeros(0)
+    before = np.linspace(0.0, start, task.points // _POSES_PER_REUSE + 2)[1:-1] if start > 0 else np.zeros(0)
     also = np.array(task.compared or (end, end))
-    middle = _MIDDLE * end
+    middle = _MIDDLE_SHARE * end
     at = np.unique(np.concatenate([[0.0], before, inside, also, [middle]]))
     window = np.searchsorted(at, inside)
     mean = np.zeros(len(at))
@@ -63,17 +63,17 @@ def poses_of(task: Task, start: float) -> PosePlan:
     return PosePlan(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
 
 
-_PLACES = 24
+_PLACES_PER_BEAM = 24
 """Along a beam: a parabola through three of so many misses the top of a whole wave by 1e-4, less than the margin."""
 
 # A design that loses stability in the window is no answer; the audit looks at branches.
-CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
+SEARCH_CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
 
 
 @cache
 def _fractions(elements: int) -> FloatArray:
     """Return the places on each element of a beam of so many."""
-    return read_only(np.linspace(0.0, 1.0, -(-_PLACES // elements) + 1))
+    return read_only(np.linspace(0.0, 1.0, -(-_PLACES_PER_BEAM // elements) + 1))
 
 
 class NoAnswer(Exception):
@@ -242,7 +242,7 @@ def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response 
     if has_vanished_beam(network) or has_pad_inside(network):
         return None
     try:
-        path = trace(network, Displacement(task.driven, task.direction, poses), CONTROL)
+        path = trace(network, Displacement(task.driven, task.direction, poses), SEARCH_CONTROL)
     except CfmError:
         return None
     if path.status is not PathStatus.COMPLETE:
@@ -277,7 +277,7 @@ class View:
 MANY_POSES = 241
 """From rest to the end of the window: of a travel of 13.6 mm one every 0.06 mm."""
 
-_BETWEEN = 8  # places of the interpolated force from pose to pose
+_PLACES_PER_POSE = 8  # places of the interpolated force from pose to pose
 _CLOSE_CONTROL = Control(tolerance=1e-7, branch="stop")
 
 
@@ -300,7 +300,7 @@ class CloseView:
         """Displacements and forces between the poses, too."""
         from scipy.interpolate import CubicSpline
 
-        fine = np.linspace(self.at[0], self.at[-1], _BETWEEN * (len(self.at) - 1) + 1)
+        fine = np.linspace(self.at[0], self.at[-1], _PLACES_PER_POSE * (len(self.at) - 1) + 1)
         force = CubicSpline(self.at, self.force)(fine)
         if self.curve is None:
             return fine, force

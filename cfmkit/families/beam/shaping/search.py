@@ -21,9 +21,9 @@ import numpy as np
 from cfmkit.designing.bounds_and_rounding import round_within_bounds as rounded_within
 from cfmkit.designing.objective_and_constraints import worst
 from cfmkit.designing.run_many_starts import Clock
-from cfmkit.families.beam.shaping.limits import LIMITS
+from cfmkit.families.beam.shaping.limits import LIMIT_FUNCTIONS
 from cfmkit.families.beam.shaping.response import looked_at
-from cfmkit.families.beam.shaping.sqp_program import WEIGHT, Flattest, ForceRatio, Shaping, Widest, window_force
+from cfmkit.families.beam.shaping.sqp_program import BAND_WEIGHT, Flattest, ForceRatio, Shaping, Widest, window_force
 from cfmkit.families.beam.shaping.variables import Variables, candidates
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
@@ -35,30 +35,32 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.task import Task
 
 
-VIOLATION = 1e-4
+VIOLATION_TOL = 1e-4
 """A limit missed by less than this share holds."""
 
-PLACES, TURNS = 7, 6
+COORDINATE_DECIMALS, COEFFICIENT_DECIMALS = 7, 6
 """Decimals of designed coordinates [m] and coefficients [rad]."""
 
-_WIDENINGS = 3  # minimisations, each from the last
-_CLOSE = 2e-3  # of the end of the window: a gain that is not worth another one
-_ALMOST = 2e-3  # a limit missed by less is repaired afterwards
-_BACK = 0.1  # of the gain is given up where it cannot be
-_TOLERANCE = 1e-5  # of the objective
-_FLAT = 0.05  # a random network with this half band is flat enough to begin with
-_ENOUGH = 0.5  # of the band of the widest window: flat enough to be taken on to the model of the task
+_MAX_WIDENINGS = 3  # minimisations, each from the last
+_MIN_WINDOW_GAIN = 2e-3  # of the end of the window: a gain that is not worth another one
+_REPAIRABLE_VIOLATION = 2e-3  # a limit missed by less is repaired afterwards
+_GIVEN_UP_SHARE = 0.1  # of the gain is given up where it cannot be
+_OBJECTIVE_TOL = 1e-5  # of the objective
+_START_HALF_BAND = 0.05  # a random network with this half band is flat enough to begin with
+_BAND_SHARE = 0.5  # of the band of the widest window: flat enough to be taken on to the model of the task
 _NEAR_ROWS = 0.5  # of a limit: of rows that hold by more than this no derivatives are needed
-_FAR = 3.0  # times that band: so far from it, what bends only is not taken on
+_MAX_BAND_RATIO = 3.0  # times that band: so far from it, what bends only is not taken on
 _FAR_START = 0.5  # of the start of the requested window: where the window begins that starts are compared over
-_FEW = 9  # poses in that window
-_ROUNDS = 6  # towards the limits
-_HOPELESS = 0.1  # of a limit: what bends only and misses one by so much is not taken on where beams stretch and shear
-_STIFF = 0.2  # one with this is a spring, and not looked at further
-_FINER = (33, 65)  # poses in the window where the first 17 do not show what the force does
-_SAME = 1.01  # a half band at many poses that is within this and the next of that at few
+_N_WINDOW_POSES = 9  # poses in that window
+_MAX_ROUNDS = 6  # towards the limits
+_MAX_VIOLATION = (
+    0.1  # of a limit: what bends only and misses one by so much is not taken on where beams stretch and shear
+)
+_SPRING_HALF_BAND = 0.2  # one with this is a spring, and not looked at further
+_FINER_POSE_COUNTS = (33, 65)  # poses in the window where the first 17 do not show what the force does
+_BAND_RATIO_TOL = 1.01  # a half band at many poses that is within this and the next of that at few
 _NEAR = 1e-4
-_STEEP = 20.0  # what a half band beyond that counts against the violation of the limits
+_BAND_WEIGHT = 20.0  # what a half band beyond that counts against the violation of the limits
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,9 @@ class StartBudget:
         """Return True if the time is up."""
         return self.clock.late()
 
-    def effort(self, steps: int, enough: float = -np.inf, violation: float = VIOLATION) -> Effort:
+    def effort(self, steps: int, enough: float = -np.inf, violation: float = VIOLATION_TOL) -> Effort:
         """Return the effort of one minimisation."""
-        return Effort(steps, _TOLERANCE, violation, self.late, enough)
+        return Effort(steps, _OBJECTIVE_TOL, violation, self.late, enough)
 
 
 @dataclass(frozen=True)
@@ -102,10 +104,10 @@ class Found:
     @property
     def feasible(self) -> bool:
         """Whether all limits hold."""
-        return self.violation <= VIOLATION
+        return self.violation <= VIOLATION_TOL
 
 
-def searched(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
+def search_start(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
     """Return what a start leads to; None if no random network could be followed over the window.
 
     Parameters
@@ -125,9 +127,11 @@ def searched(task: Task, seed: int, index: int, plan: StartBudget) -> Found | No
         return None
     if first is task:
         return polish(task, begun, plan)
-    enough = _ENOUGH * task.half_band if task.objective == "range" else -np.inf
+    enough = _BAND_SHARE * task.half_band if task.objective == "range" else -np.inf
     found = evaluate_in_model(task, flatten(first, begun, plan, enough))
-    if found.violation > _HOPELESS or (task.objective == "range" and found.objective > _FAR * task.half_band):
+    if found.violation > _MAX_VIOLATION or (
+        task.objective == "range" and found.objective > _MAX_BAND_RATIO * task.half_band
+    ):
         return found
     return polish(task, found if found.feasible else satisfy_limits(task, found, found.order, plan), plan)
 
@@ -141,9 +145,9 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     Parameters
     ----------
     task, seed, index, plan : Task, int, int, StartBudget
-        As of `searched`.
+        As of `search_start`.
     """
-    task = replace(task, orders=task.orders[-1:], points=_FEW)
+    task = replace(task, orders=task.orders[-1:], points=_N_WINDOW_POSES)
     first, far = task.first, _FAR_START * task.window[0]
     begun = _begin_network(first, np.random.default_rng([seed, index]), replace(plan, tries=1))
     if begun is None:
@@ -152,7 +156,7 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     if first is task:
         return found
     found = evaluate_in_model(task, found)
-    hopeless = found.violation > _HOPELESS or found.objective > _FAR * task.half_band
+    hopeless = found.violation > _MAX_VIOLATION or found.objective > _MAX_BAND_RATIO * task.half_band
     return found if hopeless else flatten(task, found, plan)
 
 
@@ -220,7 +224,7 @@ def verify(task: Task, found: Found, plan: StartBudget, again: Callable[[Task, F
     """
     if not found.feasible:
         return found
-    for points in (*(more for more in _FINER if more > task.points), None):
+    for points in (*(more for more in _FINER_POSE_COUNTS if more > task.points), None):
         found = round_design(task, found)
         view = looked_at(task, Variables(task, found.order).build(found.x))
         found = replace(found, evaluations=found.evaluations + 1)
@@ -240,8 +244,8 @@ def _shows_all(task: Task, found: Found, view: CloseView | None) -> bool:
     if task.objective == "paper":
         return True
     if task.objective == "range" and found.objective <= task.half_band:
-        return view.widest(task.half_band) <= found.start + _CLOSE * task.window[1]
-    return view.half_band(found.start) <= _SAME * found.objective + _NEAR
+        return view.widest(task.half_band) <= found.start + _MIN_WINDOW_GAIN * task.window[1]
+    return view.half_band(found.start) <= _BAND_RATIO_TOL * found.objective + _NEAR
 
 
 def _as_seen(task: Task, found: Found, view: CloseView | None) -> Found:
@@ -259,7 +263,7 @@ def _as_seen(task: Task, found: Found, view: CloseView | None) -> Found:
     for start in starts:  # the mean force is over another window
         program = Shaping(Variables(task, found.order), start, Flattest())
         violation = found.violation if start == found.start else max(found.violation, worst_of(program, found.x))
-        if violation <= VIOLATION:
+        if violation <= VIOLATION_TOL:
             break
     return replace(found, start=start, objective=view.half_band(start), violation=violation)
 
@@ -273,8 +277,10 @@ def _overstress(task: Task, view: CloseView) -> float:
 def round_design(task: Task, found: Found) -> Found:
     """Return a design with coordinates and coefficients that print short."""
     places, bounds = len(task.coordinates), Variables(task, found.order).bounds
-    coordinates = rounded_within(found.x[:places], bounds[:places], PLACES, task.size)
-    return replace(found, x=np.append(coordinates, rounded_within(found.x[places:], bounds[places:], TURNS)))
+    coordinates = rounded_within(found.x[:places], bounds[:places], COORDINATE_DECIMALS, task.size)
+    return replace(
+        found, x=np.append(coordinates, rounded_within(found.x[places:], bounds[places:], COEFFICIENT_DECIMALS))
+    )
 
 
 def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[Found]:
@@ -292,11 +298,14 @@ def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> li
             view = program.view(x)
             if view is not None:
                 band = _half_band(window_force(view))
-                excess = worst_of(program, x) if band < _STIFF else np.inf
+                excess = worst_of(program, x) if band < _SPRING_HALF_BAND else np.inf
                 found.append(Found(x, order, task.window[0], band, excess, "", 1))
         if len(found) >= plan.tries:
             break
-    return sorted(found, key=lambda one: (one.violation + _STEEP * max(0.0, one.objective - _FLAT), one.objective))
+    return sorted(
+        found,
+        key=lambda one: (one.violation + _BAND_WEIGHT * max(0.0, one.objective - _START_HALF_BAND), one.objective),
+    )
 
 
 def _coarse(task: Task) -> int:
@@ -305,16 +314,21 @@ def _coarse(task: Task) -> int:
 
 
 def satisfy_limits(
-    task: Task, found: Found, order: int, plan: StartBudget, give: tuple[str, ...] = tuple(LIMITS), share: float = 0.5
+    task: Task,
+    found: Found,
+    order: int,
+    plan: StartBudget,
+    give: tuple[str, ...] = tuple(LIMIT_FUNCTIONS),
+    share: float = 0.5,
 ) -> Found:
     """Return a design that misses some limits as little as possible, at a half band that is no larger or small enough.
 
     Given up where a round does not bring what is missed below a share of what it was.
     """
-    cap = max(_FLAT, 1.1 * found.objective)
+    cap = max(_START_HALF_BAND, 1.1 * found.objective)
     variables, x = Variables(task, found.order).change_order(found.x, max(order, found.order))
     program = Shaping(variables, found.start, Flattest(), give, cap, _NEAR_ROWS)
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         z = program.begin(x)
         if z is None:
             return found
@@ -337,7 +351,7 @@ def _minimise_objective(
     z = program.begin(x)
     if z is None:
         return found
-    optimum = minimize(program, z, program.bounds, plan.effort(steps, WEIGHT * enough))
+    optimum = minimize(program, z, program.bounds, plan.effort(steps, BAND_WEIGHT * enough))
     now = found_of(program, optimum, found.evaluations)
     worse = found.feasible and not now.feasible
     return replace(found, evaluations=now.evaluations) if worse else now
@@ -412,16 +426,16 @@ def refine(task: Task, found: Found, plan: StartBudget) -> Found:
 def _widest(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
-    for _ in range(_WIDENINGS):
+    for _ in range(_MAX_WIDENINGS):
         program = Shaping(Variables(task, found.order), found.start, goal, near=_NEAR_ROWS)
         z = program.begin(found.x)
         if z is None or plan.late():
             return found
-        effort = plan.effort(plan.widening, violation=_ALMOST)
+        effort = plan.effort(plan.widening, violation=_REPAIRABLE_VIOLATION)
         wide = found_of(program, minimize(program, z, program.bounds, effort), found.evaluations)
         now = _repair(task, wide, found, plan)
         gain, found = found.start - now.start, now
-        if not gain > _CLOSE * task.window[1]:
+        if not gain > _MIN_WINDOW_GAIN * task.window[1]:
             break
     return found
 
@@ -434,5 +448,5 @@ def _repair(task: Task, wide: Found, good: Found, plan: StartBudget) -> Found:
         if now.feasible and now.objective <= task.half_band:
             return now
         wide = replace(wide, evaluations=now.evaluations)
-        start += _BACK * (good.start - start) + _CLOSE * task.window[1]
+        start += _GIVEN_UP_SHARE * (good.start - start) + _MIN_WINDOW_GAIN * task.window[1]
     return replace(good, evaluations=wide.evaluations)

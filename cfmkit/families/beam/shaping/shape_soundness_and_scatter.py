@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
 
-POSES = 61
-STRICT = 0.05
+N_AUDIT_POSES = 61
+STRICT_BAND = 0.05
 """Of the largest force: the strict range is that of `cfmkit analyze`, (max - min) <= 5 % of max."""
 
-_JOINED = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
+_JOINT_RTOL = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
 
 
 @dataclass(frozen=True)
@@ -69,10 +69,10 @@ class Drawn:
     lost: int  # those that could not
 
 
-def audited(variables: Variables, found: Found) -> Audit:
+def audit_design(variables: Variables, found: Found) -> Audit:
     """Return the judgement of a design."""
     task, network = variables.task, variables.build(found.x)
-    at = np.linspace(0.0, task.window[1], POSES)
+    at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
     path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
     return Audit(
         path.status is PathStatus.COMPLETE,
@@ -97,7 +97,7 @@ def strict_share(at: FloatArray, force: FloatArray) -> float:
     fine = np.linspace(0.0, at[-1], 2001)
     values = CubicSpline(at, force)(fine)[::-1]
     tops, bottoms = np.maximum.accumulate(values), np.minimum.accumulate(values)
-    good = tops - bottoms <= STRICT * tops
+    good = tops - bottoms <= STRICT_BAND * tops
     count = len(good) if good.all() else int(good.argmin())
     return (count - 1) / (len(fine) - 1)
 
@@ -108,7 +108,7 @@ def scatter_within_tolerances(variables: Variables, found: Found, spread: Networ
     places = len(task.coordinates)
     sizes = np.full(variables.count, spread.coefficients)
     sizes[:places] = spread.nodes / task.size
-    at = np.linspace(0.0, task.window[1], POSES)
+    at = np.linspace(0.0, task.window[1], N_AUDIT_POSES)
     noise = rng.standard_normal((spread.samples, variables.count)) * sizes
     drive = Displacement(task.driven, task.direction, at)
     networks = (variables.build(found.x + one) for one in noise)
@@ -148,7 +148,7 @@ def lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
     if joined:
         size = abs(p[-1] - p[0]) + abs(q[-1] - q[0])
         near = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
-        hit &= near > _JOINED * size
+        hit &= near > _JOINT_RTOL * size
     return bool(hit.any())
 
 

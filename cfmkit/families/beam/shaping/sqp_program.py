@@ -102,10 +102,10 @@ class Shaping(DesignProgram):
 
 
 LEAST_MIDDLE = 1e-3
-_FINER = 3
+_REFINEMENT_FACTOR = 3
 """A whole number, so that the points at which the force is solved are among the finer ones."""
 
-WEIGHT = 10.0
+BAND_WEIGHT = 10.0
 """On the half band: a solver that begins with the identity for the Hessian takes too small a slope for none."""
 
 
@@ -158,7 +158,7 @@ def _finer(count: int) -> FloatArray:
     """Return the matrix from values at Chebyshev-Lobatto points to values at three times as many, in order."""
     from numpy.polynomial import chebyshev
 
-    coarse, fine = (-np.cos(np.linspace(0, np.pi, n)) for n in (count, _FINER * (count - 1) + 1))
+    coarse, fine = (-np.cos(np.linspace(0, np.pi, n)) for n in (count, _REFINEMENT_FACTOR * (count - 1) + 1))
     return np.asarray(chebyshev.chebvander(fine, count - 1) @ np.linalg.inv(chebyshev.chebvander(coarse, count - 1)))
 
 
@@ -195,11 +195,11 @@ class Flattest:
         by_own = np.ones((len(rows), 2))
         by_own[:, 0] = np.concatenate([ratio, -ratio]) / level
         if not view.sloped:
-            return Aim(WEIGHT * float(band), None, np.array([0.0, WEIGHT]), rows, None, by_own)
+            return Aim(BAND_WEIGHT * float(band), None, np.array([0.0, BAND_WEIGHT]), rows, None, by_own)
         levelling = _levelling(view) if np.ndim(_levelling(view)) == 0 else np.asarray(_levelling(view))[:, None]
         slope = _finer(len(view.poses.window)) @ (view.response.force_slopes[view.poses.window] * levelling) / unit
         by_x = np.concatenate([-slope, slope])
-        return Aim(WEIGHT * float(band), np.zeros(by_x.shape[1]), np.array([0.0, WEIGHT]), rows, by_x, by_own)
+        return Aim(BAND_WEIGHT * float(band), np.zeros(by_x.shape[1]), np.array([0.0, BAND_WEIGHT]), rows, by_x, by_own)
 
 
 @dataclass(frozen=True)

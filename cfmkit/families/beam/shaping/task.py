@@ -21,10 +21,10 @@ Objective = Literal["ripple", "range", "paper"]
 BENDING_ONLY = "inextensible"
 """The model of beams that bend only, as ``analysis.fidelity`` names it."""
 
-MARGIN = 2e-3
+STRESS_MARGIN = 2e-3
 """The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""
 
-FINE = 3
+MAX_START_ORDER = 3
 """Orders above that are for what was widened: a start in them takes longer and ends in the same families of shapes."""
 
 
@@ -47,7 +47,9 @@ class Coordinate:
 class TaskLimits:
     """Limits that must hold; None: not asked."""
 
-    stress: float | None = None  # largest stress at every pose [Pa]: by the margin `MARGIN` below the allowable one
+    stress: float | None = (
+        None  # largest stress at every pose [Pa]: by the margin `STRESS_MARGIN` below the allowable one
+    )
     envelope: tuple[float, float, float, float] | None = None  # where the centre lines must lie before loading [m]
     deformed_envelope: tuple[float, float, float, float] | None = None  # the same at every pose
     length_ratio: float | None = 1.5  # largest length over distance of the ends [1]
@@ -104,13 +106,13 @@ class Task:
     @property
     def started(self) -> Task:
         """The same in the orders that starts are searched in: where windows are widened, the fine ones come after."""
-        coarse = tuple(order for order in self.orders if order <= FINE)
+        coarse = tuple(order for order in self.orders if order <= MAX_START_ORDER)
         return replace(self, orders=coarse) if coarse and self.objective == "range" else self
 
     @property
     def allowable_stress(self) -> float | None:
         """The stress that the analysis allows [Pa]; None if it is not limited."""
-        return None if self.limits.stress is None else self.limits.stress / (1 - MARGIN)
+        return None if self.limits.stress is None else self.limits.stress / (1 - STRESS_MARGIN)
 
     def force(self, path: Path) -> FloatArray:
         """Return the force that is to be constant, of the drive or of a contact, at all points of a path, (n,) [N]."""

@@ -94,11 +94,11 @@ class Variables:
         return Variables(self.task, order), np.concatenate([x[:places], wider.ravel()])
 
 
-_U, _W = np.polynomial.legendre.leggauss(24)
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
 
-_U, _W = 0.5 * (_U + 1), 0.5 * _W
+_GAUSS_NODES, _GAUSS_WEIGHTS = 0.5 * (_GAUSS_NODES + 1), 0.5 * _GAUSS_WEIGHTS
 
-_TINY = 1e-30
+_COMPLEX_STEP = 1e-30
 """Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
 
@@ -126,8 +126,8 @@ def _of_polynomial(variables: Variables, x: FloatArray, network: Network, name: 
     """Return the length of a beam whose shape varies: chord / |chi| with chi the mean of exp(i eta)."""
     order = variables.order
     first = len(variables.task.coordinates) + order * variables.task.shaped.index(name)
-    powers = _U[:, None] ** np.arange(1, order + 1)
-    turn = np.exp(1j * (powers @ x[first : first + order])) * _W
+    powers = _GAUSS_NODES[:, None] ** np.arange(1, order + 1)
+    turn = np.exp(1j * (powers @ x[first : first + order])) * _GAUSS_WEIGHTS
     chi = turn.sum()
     by_chi = np.zeros(variables.count, dtype=complex)
     by_chi[first : first + order] = 1j * (turn @ powers)
@@ -146,8 +146,8 @@ def _of_any(variables: Variables, network: Network, name: str) -> Length:
     by_reach = _by_reach(variables, name)
     by_length = np.zeros(variables.count)
     for k in np.flatnonzero(by_reach):
-        moved = (reach.real + 1j * _TINY * by_reach[k].real, reach.imag + 1j * _TINY * by_reach[k].imag)
-        by_length[k] = np.imag(fit(beam, moved).length) / _TINY
+        moved = (reach.real + 1j * _COMPLEX_STEP * by_reach[k].real, reach.imag + 1j * _COMPLEX_STEP * by_reach[k].imag)
+        by_length[k] = np.imag(fit(beam, moved).length) / _COMPLEX_STEP
     chord = abs(reach)
     by_chord = np.real(np.conj(reach) * by_reach) / chord
     return Length(length, chord / length, by_length, by_chord / length - chord / length**2 * by_length)
@@ -170,7 +170,7 @@ def _by_reach(variables: Variables, name: str) -> FloatArray:
     return out
 
 
-_MOST = 2000
+_MAX_DRAWS = 2000
 
 _LEAST_CHORD = 0.1  # of the mean distance of joined nodes, if no slenderness is asked
 
@@ -179,7 +179,7 @@ def candidates(variables: Variables, rng: np.random.Generator) -> Iterator[Float
     """Yield vectors of variables, coefficients up to half their limit; at most 2000 places are tried."""
     low, high = variables.bounds.T
     places = len(variables.task.coordinates)
-    for _ in range(_MOST):
+    for _ in range(_MAX_DRAWS):
         x = rng.uniform(low, high)
         x[places:] *= 0.5
         if sound(variables, x):
@@ -203,13 +203,13 @@ def _least_chord(variables: Variables, network: Network) -> float:
     return _LEAST_CHORD * float(np.mean([abs(b - a) for a, b in (_chord(network, name) for name in network.beams)]))
 
 
-_NOTHING = 1e-6  # of the mean distance of joined nodes: shorter beams are none, and their slopes have no value
+_MIN_LENGTH_SHARE = 1e-6  # of the mean distance of joined nodes: shorter beams are none, and their slopes have no value
 
 
 def has_vanished_beam(network: Network) -> bool:
     """Return True if the nodes of a beam coincide but for rounding, as two that are pushed into one corner do."""
     chords = [abs(end - start) for start, end in (_chord(network, name) for name in network.beams)]
-    return min(chords) <= _NOTHING * float(np.mean(chords))
+    return min(chords) <= _MIN_LENGTH_SHARE * float(np.mean(chords))
 
 
 def has_pad_inside(network: Network) -> bool:

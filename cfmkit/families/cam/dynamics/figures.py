@@ -14,7 +14,7 @@ from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, apply_style
+from cfmkit.plots.style import LINE_BLUE, LINE_PURPLE, LINE_VERMILLION, TEXT_GREY, apply_style
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 
-TIME = Scale("time", "time")
-ALIKE = 1e-9
+TIME_SCALE = Scale("time", "time")
+SIDE_RTOL = 1e-9
 """Sides whose values differ by less than this fraction of the largest are drawn as one line."""
 
 
@@ -50,14 +50,17 @@ def motion(result: Result) -> Figure:
     moved: MotionSolution = result.state
     times, force = moved.history.times, moved.history.force
     constant = constant_force(moved.build.right)
-    forces = [Series(force, "in motion", BLUE, prefer=0.3), Series(moved.static, "at rest", GREY, True, prefer=0.1)]
-    ratio = [Series(force / moved.static, "in motion over at rest", BLUE, prefer=0.3)]
+    forces = [
+        Series(force, "in motion", LINE_BLUE, prefer=0.3),
+        Series(moved.static, "at rest", TEXT_GREY, True, prefer=0.1),
+    ]
+    ratio = [Series(force / moved.static, "in motion over at rest", LINE_BLUE, prefer=0.3)]
     found = list(_regions(moved))
     name = "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
     level = Limit(constant, f"{name} = {value_text(constant, 'force')}")
     diagrams = [
-        Diagram(times, TIME, Scale("force", "force"), forces, [level], found),
-        Diagram(times, TIME, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(found)),
+        Diagram(times, TIME_SCALE, Scale("force", "force"), forces, [level], found),
+        Diagram(times, TIME_SCALE, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _drop_names(found)),
     ]
     return diagram_figure(Heading.from_result(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
 
@@ -71,9 +74,10 @@ def motion_force(result: Result) -> Figure:
     points = np.column_stack([over, to_border(moved.static, "force")])
     moving = np.column_stack([over, to_border(moved.history.force, "force")])
     for ax in figure.axes:
-        ax.plot(*points.T, color=GREY, linewidth=1.2, linestyle="--", zorder=2.8, gid="static")
+        ax.plot(*points.T, color=TEXT_GREY, linewidth=1.2, linestyle="--", zorder=2.8, gid="static")
     place_labels(
-        figure.axes[0], [Label("in motion", BLUE, moving, prefer=0.4), Label("at rest", GREY, points, prefer=0.7)]
+        figure.axes[0],
+        [Label("in motion", LINE_BLUE, moving, prefer=0.4), Label("at rest", TEXT_GREY, points, prefer=0.7)],
     )
     return figure
 
@@ -82,17 +86,22 @@ def motion_contact(result: Result) -> Figure:
     """Return the forces of the cam on the rollers, and those in the braces, over time."""
     moved: MotionSolution = result.state
     history, found = moved.history, list(_regions(moved))
-    contact = _sides(history.contact, "on a roller", (BLUE, VERMILLION))
-    roller_end = _sides(history.brace, "brace, at the roller", (PURPLE, VERMILLION))
+    contact = _sides(history.contact, "on a roller", (LINE_BLUE, LINE_VERMILLION))
+    roller_end = _sides(history.brace, "brace, at the roller", (LINE_PURPLE, LINE_VERMILLION))
     slider_end = [
         Series(item.values, item.name, item.color, True, 0.25)
-        for item in _sides(history.pin, "brace, at the slider", (PURPLE, VERMILLION))
+        for item in _sides(history.pin, "brace, at the slider", (LINE_PURPLE, LINE_VERMILLION))
     ]
     limits = [*limits_on(result, "contact_force_max"), *limits_on(result, "contact_force_min")]
     diagrams = [
-        Diagram(history.times, TIME, Scale("contact force", "force"), contact, limits, found),
+        Diagram(history.times, TIME_SCALE, Scale("contact force", "force"), contact, limits, found),
         Diagram(
-            history.times, TIME, Scale("force in a brace", "force"), [*roller_end, *slider_end], (), _drop_names(found)
+            history.times,
+            TIME_SCALE,
+            Scale("force in a brace", "force"),
+            [*roller_end, *slider_end],
+            (),
+            _drop_names(found),
         ),
     ]
     return diagram_figure(Heading.from_result(result, "forces of the cam on the rollers, and in the braces"), diagrams)
@@ -102,18 +111,18 @@ def motion_rollers(result: Result) -> Figure:
     """Return the speed of the slider and of the turning rollers over time."""
     moved: MotionSolution = result.state
     history = moved.history
-    speed = [Series(history.moment.speed, "", BLUE)]
-    spin = _sides(history.spin, "", (BLUE, VERMILLION))
+    speed = [Series(history.moment.speed, "", LINE_BLUE)]
+    spin = _sides(history.spin, "", (LINE_BLUE, LINE_VERMILLION))
     diagrams = [
-        Diagram(history.times, TIME, Scale("speed of the slider", "velocity"), speed),
-        Diagram(history.times, TIME, Scale("speed of a roller", "angular_velocity"), spin),
+        Diagram(history.times, TIME_SCALE, Scale("speed of the slider", "velocity"), speed),
+        Diagram(history.times, TIME_SCALE, Scale("speed of a roller", "angular_velocity"), spin),
     ]
     return diagram_figure(Heading.from_result(result, "speed of the slider, and at which the rollers turn"), diagrams)
 
 
 def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]:
     """Return one line where both sides are alike, else one for each."""
-    if not np.any(np.abs(rows[0] - rows[1]) > ALIKE * np.nanmax(np.abs(rows))):
+    if not np.any(np.abs(rows[0] - rows[1]) > SIDE_RTOL * np.nanmax(np.abs(rows))):
         return [Series(rows[0], name, colors[0])]
     names = [f"{name}, {side}" if name else side for side in ("right", "left")]
     return [

@@ -30,7 +30,7 @@ BRACE_SHARE = (0.1, 3.0)
 """The same for a brace over a slender rod: 3 has all its mass at the ends."""
 
 
-INVERSE = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
+INVERSE_OPTION = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
 
 
 def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
@@ -57,7 +57,7 @@ def runs_on_corner(parts: Build) -> Finding:
         "undercut",
         "on the corner of the cam the contact is not a function of its height, as the nine-coordinate model needs: "
         f"start above {mm(above)} ('analysis.dynamics.slider_position'), or use 'analysis.dynamics.method: inverse'",
-        INVERSE,
+        INVERSE_OPTION,
     )
 
 
@@ -156,7 +156,7 @@ def _friction(moved: MotionSolution) -> Iterator[Finding]:
             "friction_left_out",
             "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
             f"{moved.spec.mechanism.rolling_friction:g} is neglected; 'analysis.dynamics.method: inverse' includes it",
-            INVERSE,
+            INVERSE_OPTION,
         )
 
 
@@ -167,7 +167,7 @@ def _sideways(moved: MotionSolution) -> Iterator[Finding]:
             "friction_left_out",
             "the nine-coordinate model neglects the weight across the slider's travel, which 'mechanism.mounting' "
             "implies; 'analysis.dynamics.method: inverse' includes it",
-            INVERSE,
+            INVERSE_OPTION,
         )
 
 

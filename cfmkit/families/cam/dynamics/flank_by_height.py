@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.path import RollerPath
     from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw
 
-KNOTS = 65
+N_KNOTS = 65
 NEWTON_STEPS = 30
 """Turned flanks of the tests take five from the estimates by 65 knots."""
 
@@ -75,7 +75,7 @@ class FlankLine:
 
     def estimate(self, y: float) -> float:
         """Return a rough path coordinate of the point at height y [m]."""
-        u = np.linspace(*self.ends, KNOTS)
+        u = np.linspace(*self.ends, N_KNOTS)
         return float(np.interp(y, self.place(u)[1], u))
 
     def locate(self, y: Real, guess: Real) -> FlankPoint:

@@ -246,10 +246,10 @@ def multibody_history(
     )
 
 
-BISECTIONS = 60
+N_BISECTIONS = 60
 """They leave 1e-18 of a step in time: less than rounding."""
 
-ROUNDING = 1e-9
+CONTACT_FORCE_RTOL = 1e-9
 """A contact force below zero by this part of the largest is rounding: springs at rest press with nothing."""
 
 
@@ -298,7 +298,7 @@ def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | Non
         return bool(margin[0] > 0)
 
     low, high = float(times[index - 1]), float(times[index])
-    for _ in range(BISECTIONS):
+    for _ in range(N_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     place = float(motion.evaluate(np.array([low])).position[0]) + origin
@@ -321,7 +321,7 @@ def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]
 
 def _slack(name: str, margin: FloatArray, machine: Machine) -> float:
     if name == "lift_off":
-        return ROUNDING * float(np.nanmax(np.abs(margin), initial=0.0))
+        return CONTACT_FORCE_RTOL * float(np.nanmax(np.abs(margin), initial=0.0))
     return 1e-12 * max(machine.springs.rest_length, 1.0)
 
 

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
 
 
-SIZE = 9
-HOLONOMIC, ROLLING, GIVEN = slice(0, 6), slice(6, 8), 8
+N_COORDINATES = 9
+HOLONOMIC_ROWS, ROLLING_ROWS, DRIVE_ROW = slice(0, 6), slice(6, 8), 8
 
 
 class Posture(NamedTuple):
@@ -166,7 +166,7 @@ class Trajectory:
     @property
     def force(self) -> FloatArray:
         """Force on the slider [N]."""
-        return -self.multipliers[:, GIVEN]
+        return -self.multipliers[:, DRIVE_ROW]
 
 
 class NineCoordinates:
@@ -199,18 +199,18 @@ class NineCoordinates:
         postures = self.postures(coordinates, contacts)
         jacobian = self.jacobian(postures, (points,))
         position, speed, push = motion.evaluate(times)
-        driven = np.zeros((points, SIZE))
+        driven = np.zeros((points, N_COORDINATES))
         residual = self.residual(coordinates, postures)
-        driven[:, HOLONOMIC] = -scheme.stabilisation / motion.time * residual[:, HOLONOMIC]
-        driven[:, GIVEN] = speed - scheme.stabilisation / motion.time * (coordinates[:, 0] - position)
+        driven[:, HOLONOMIC_ROWS] = -scheme.stabilisation / motion.time * residual[:, HOLONOMIC_ROWS]
+        driven[:, DRIVE_ROW] = speed - scheme.stabilisation / motion.time * (coordinates[:, 0] - position)
         velocities = _solve(jacobian, driven)
         needed = -self.quadratic(postures, velocities)
-        needed[:, GIVEN] += push
+        needed[:, DRIVE_ROW] += push
         accelerations = _solve(jacobian, needed)
         applied = self.compute_forces(coordinates, velocities, postures)
         inertia = np.einsum("nij,nj->ni", self.mass(coordinates, postures), accelerations)
         multipliers = _solve(np.swapaxes(jacobian, 1, 2), applied - inertia)
-        worst = float(np.abs(residual[:, HOLONOMIC]).max())
+        worst = float(np.abs(residual[:, HOLONOMIC_ROWS]).max())
         return Trajectory(times, coordinates, velocities, accelerations, multipliers, worst, postures)
 
     def postures(self, x: FloatArray, contacts: Any) -> tuple[Posture, Posture]:
@@ -227,10 +227,10 @@ class NineCoordinates:
 
     def jacobian(self, postures: tuple[Posture, Posture], shape: tuple[int, ...] = ()) -> FloatArray:
         """Return D [SS, eq. 27]."""
-        out = np.zeros((*shape, SIZE, SIZE))
+        out = np.zeros((*shape, N_COORDINATES, N_COORDINATES))
         for chain, posture in zip(self.chains, postures, strict=True):
             chain.jacobian(posture, out)
-        out[..., GIVEN, 0] = 1.0
+        out[..., DRIVE_ROW, 0] = 1.0
         return out
 
     def quadratic(self, postures: tuple[Posture, Posture], velocity: FloatArray) -> FloatArray:
@@ -242,7 +242,7 @@ class NineCoordinates:
 
     def mass(self, x: FloatArray, postures: tuple[Posture, Posture]) -> FloatArray:
         """Return the mass matrix m(x)."""
-        out = np.zeros((*x.shape, SIZE))
+        out = np.zeros((*x.shape, N_COORDINATES))
         out[..., 0, 0] = self.machine.slider_mass
         for chain, posture, side in zip(self.chains, postures, self.sides, strict=True):
             brace, roller = chain.columns.start, chain.columns.start + 1
@@ -284,7 +284,7 @@ class NineCoordinates:
         stances = self.machine.stances(ends)
         if any(stance.on_corner.any() for stance in stances):
             raise CornerContact
-        x, contacts = np.zeros(SIZE), np.zeros(2)
+        x, contacts = np.zeros(N_COORDINATES), np.zeros(2)
         x[0] = motion.start
         for index, (chain, stance) in enumerate(zip(self.chains, stances, strict=True)):
             inwards = 1j * stance.tangent[0]
@@ -296,7 +296,9 @@ class NineCoordinates:
         free = [1, 2, 4, 5, 6, 8]
         for _ in range(4):
             postures = self.postures(x, contacts)
-            step = np.linalg.solve(self.jacobian(postures)[HOLONOMIC][:, free], self.residual(x, postures)[HOLONOMIC])
+            step = np.linalg.solve(
+                self.jacobian(postures)[HOLONOMIC_ROWS][:, free], self.residual(x, postures)[HOLONOMIC_ROWS]
+            )
             x[free] -= step
         return x, np.array([posture.flank.parameter for posture in self.postures(x, contacts)])
 
@@ -332,8 +334,8 @@ class NineCoordinates:
             known[:] = [float(posture.flank.parameter) for posture in postures]
             position, speed, _ = motion.evaluate(np.float64(t))
             right = -beta * self.residual(x, postures)
-            right[ROLLING] = 0.0
-            right[GIVEN] = speed - beta * (x[0] - position)
+            right[ROLLING_ROWS] = 0.0
+            right[DRIVE_ROW] = speed - beta * (x[0] - position)
             return _solve(self.jacobian(postures), right), np.array(known)
 
         return rate

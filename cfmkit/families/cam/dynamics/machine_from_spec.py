@@ -9,7 +9,7 @@ from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machi
 from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, cam_start_height, directions
-from cfmkit.families.cam.statics import GRAVITY
+from cfmkit.families.cam.statics import STANDARD_GRAVITY
 from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
@@ -63,9 +63,9 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
         ),
         slider_mass=masses.slider if masses else 0.0,
         springs=AxisSprings.of(mechanism),
-        gravity=GRAVITY * along if spec.gravity else 0.0,
+        gravity=STANDARD_GRAVITY * along if spec.gravity else 0.0,
         friction=mechanism.rolling_friction if stated_motion(spec).closed else 0.0,
-        sideways=GRAVITY * right_share if spec.gravity and stated_motion(spec).closed else 0.0,
+        sideways=STANDARD_GRAVITY * right_share if spec.gravity and stated_motion(spec).closed else 0.0,
     )
 
 
@@ -80,12 +80,12 @@ def parts_of(mechanism: Mechanism, masses: Masses | None, own: LeftMasses | None
     """Return brace and roller of a side; `own` replaces what it states. Defaults: a slender rod, a solid cylinder."""
     length, radius = mechanism.brace_length, mechanism.roller_radius
 
-    def stated(name: str) -> float | None:
+    def get_stated(name: str) -> float | None:
         value: float | None = getattr(own, name, None)
         return getattr(masses, name, None) if value is None else value
 
-    brace, roller = stated("brace") or 0.0, stated("roller") or 0.0
-    rod, cylinder = stated("brace_inertia"), stated("roller_inertia")
+    brace, roller = get_stated("brace") or 0.0, get_stated("roller") or 0.0
+    rod, cylinder = get_stated("brace_inertia"), get_stated("roller_inertia")
     return SideParts(
         brace_length=length,
         brace_mass=brace,

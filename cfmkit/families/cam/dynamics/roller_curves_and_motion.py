@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from cfmkit.arrays import brief
-from cfmkit.numerics.roots import EPS, bracketed_root, invert_increasing
+from cfmkit.numerics.roots import FLOAT_EPS, bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -207,7 +207,7 @@ def pieces_of(track: Track) -> tuple[CurvePiece, ...]:
     return CornerArc(corner, track.radius, (float(np.angle(first)), float(np.angle(last)))), flank
 
 
-KNOTS = 129
+N_KNOTS = 129
 GUIDE_KNOTS = 2049
 NEWTON_STEPS = 5
 """Estimates by 2049 knots need two at most in the tests; a bracketed search takes over where five are not enough."""
@@ -313,7 +313,7 @@ class Side:
     def _rising(self, piece: CurvePiece) -> tuple[float, float] | None:
         """Return between which values of the parameter the slider rises; None if nowhere."""
         low, high = piece.ends
-        knots = low + (high - low) * np.linspace(0.0, 1.0, KNOTS) ** 2
+        knots = low + (high - low) * np.linspace(0.0, 1.0, N_KNOTS) ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             rising = self.rate(self.rotate(piece.evaluate(knots))) > 0
         if not rising.any():
@@ -370,7 +370,7 @@ class Side:
         for _ in range(NEWTON_STEPS):
             places, value = self.evaluate(piece, u)
             error = value - slider
-            if np.abs(error).max() <= 8.0 * EPS * abs(stretch.span[1]):
+            if np.abs(error).max() <= 8.0 * FLOAT_EPS * abs(stretch.span[1]):
                 break
             with np.errstate(divide="ignore", invalid="ignore"):
                 u = np.minimum(np.maximum(u - error / self.rate(places), low), high)

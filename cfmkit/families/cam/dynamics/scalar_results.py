@@ -10,8 +10,8 @@ import numpy as np
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.families.cam.contact_pressure import pressure
 from cfmkit.families.cam.dynamics.inverse import respond, statics
-from cfmkit.families.cam.scalar_results import DEFINITIONS
-from cfmkit.families.cam.statics import GRAVITY
+from cfmkit.families.cam.scalar_results import SCALAR_DEFINITIONS
+from cfmkit.families.cam.statics import STANDARD_GRAVITY
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.solution import MotionSolution
 
-SLOW = 1.0
+SLOW_DURATION = 1.0
 """Duration of the motion that the paper compares with [s]."""
 
 
@@ -29,7 +29,7 @@ def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         numbers = _shared_values(moved) | _own(moved)
     known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in known.items()}
+    return {name: Quantity(value, *SCALAR_DEFINITIONS[name]) for name, value in known.items()}
 
 
 def _shared_values(moved: MotionSolution) -> dict[str, float]:
@@ -56,7 +56,7 @@ def _own(moved: MotionSolution) -> dict[str, float]:
         "roller_speed_max": _largest(np.abs(history.spin)),
         "slider_speed_max": _largest(np.abs(history.moment.speed)),
         "slider_acceleration_max": _largest(np.abs(history.moment.acceleration)),
-        "dead_weight_peak": _largest(np.abs(history.moment.acceleration)) / GRAVITY,
+        "dead_weight_peak": _largest(np.abs(history.moment.acceleration)) / STANDARD_GRAVITY,
         "moving_mass_max": _largest(moving.mass),
         "force_peak_over_static": _largest(ratio) - 1.0,
         "force_dip_under_static": 1.0 + _largest(-ratio),
@@ -85,7 +85,7 @@ def contact_pressure(moved: MotionSolution) -> FloatArray:
 
 def slow_force(moved: MotionSolution) -> FloatArray:
     """Return the force of the same motion within one second, at the same places [N]."""
-    scale = moved.build.motion.time / SLOW
+    scale = moved.build.motion.time / SLOW_DURATION
     position, speed, acceleration = moved.history.moment
     moment = moved.history.moment._replace(speed=speed * scale, acceleration=acceleration * scale**2)
     return respond(moved.build.machine, moment._replace(position=position)).force

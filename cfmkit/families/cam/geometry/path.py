@@ -128,10 +128,10 @@ class _OdeHeight:
 
         self.law = law
 
-        def reached(_y: float, x: FloatArray) -> float:
+        def reach_end(_y: float, x: FloatArray) -> float:
             return float(x[0]) - end
 
-        reached.terminal = True  # type: ignore[attr-defined]
+        reach_end.terminal = True  # type: ignore[attr-defined]
         far, inside = 1e3 * law.brace_length, (law.rest_half_width, law.vertical_at * (1 - 1e-12))
         solution: Any = solve_ivp(
             lambda _y, x: 1.0 / law.slope(np.clip(x, *inside)),  # trial steps may go far outside
@@ -141,7 +141,7 @@ class _OdeHeight:
             rtol=1e-12,
             atol=1e-14,
             dense_output=True,
-            events=reached,
+            events=reach_end,
         )
         self.interpolant, self.knots = solution.sol, (solution.y[0], solution.t)
 

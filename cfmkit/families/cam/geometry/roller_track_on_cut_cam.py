@@ -79,7 +79,7 @@ class TrackStretch:
     at: Callable[[Any], tuple[Any, Any, Any]]  # ``at(parameter) -> (slider position, x, slope of the centre's track)``
 
 
-KNOTS = 65
+N_KNOTS = 65
 
 
 class Pivot(NamedTuple):
@@ -197,7 +197,7 @@ class Track:
         low, high = self.profile.start, self._brace_limit()
         if self._follows_law and self.profile.path.law.always_rises:
             return (low, high), False
-        knots = np.linspace(low, high, KNOTS)
+        knots = np.linspace(low, high, N_KNOTS)
         rising = self._evaluate_flank(knots)[1] > 0
         rising[0] |= not skip or self._evaluate_flank(low)[1] >= -1e-12
         if not rising.any():
@@ -305,11 +305,13 @@ class Track:
         """Return the slider position with the roller's centre at `x` [m], or at the nearer end of the track."""
         for part in self.stretches():
 
-            def past(u: float, part: TrackStretch = part) -> float:
+            def measure_excess(u: float, part: TrackStretch = part) -> float:
                 return float(part.at(u)[1]) - x
 
-            if past(part.low) >= 0 or past(part.high) >= 0:
-                place = part.low if past(part.low) >= 0 else bracketed_root(past, part.low, part.high)
+            if measure_excess(part.low) >= 0 or measure_excess(part.high) >= 0:
+                place = (
+                    part.low if measure_excess(part.low) >= 0 else bracketed_root(measure_excess, part.low, part.high)
+                )
                 return float(part.at(place)[0])
         return self.end
 
@@ -347,7 +349,7 @@ class Track:
         The difference from the ideal profile is smooth and small, so that straight lines do.
         """
         low, high = self.flank_range
-        knots = low + (high - low) * np.linspace(0.0, 1.0, KNOTS)
+        knots = low + (high - low) * np.linspace(0.0, 1.0, N_KNOTS)
         slider = self._evaluate_flank(knots)[0]
         zero = np.minimum(self.start, slider[..., :1])
         root = np.sqrt(np.maximum(slider - zero, 0.0))
@@ -365,7 +367,17 @@ def _join_states(on_corner: NDArray[np.bool_], corner: TrackStates, flank: Track
     return TrackStates(*found)
 
 
-_NUMBERS = ("brace_length", "radius", "shift", "start", "dead_point", "corner_end", "end", "flank_range", "_pivots")
+_NUMBER_FIELDS = (
+    "brace_length",
+    "radius",
+    "shift",
+    "start",
+    "dead_point",
+    "corner_end",
+    "end",
+    "flank_range",
+    "_pivots",
+)
 
 
 class TrackRows(Track):
@@ -380,7 +392,7 @@ class TrackRows(Track):
     def __init__(self, tracks: Sequence[Track]) -> None:
         """Set the numbers of all side by side."""
         first, profiles = tracks[0], [track.profile for track in tracks]
-        numbers = {name: stack([getattr(track, name) for track in tracks]) for name in _NUMBERS}
+        numbers = {name: stack([getattr(track, name) for track in tracks]) for name in _NUMBER_FIELDS}
         alike = {name: getattr(first, name) for name in ("_is_shifted", "_follows_law", "_is_ideal", "turns_back")}
         stretches = zip(
             *([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True

@@ -35,7 +35,7 @@ from cfmkit.numerics.roots import bracketed_root
 Real = TypeVar("Real", float, FloatArray)
 """A number or an array of numbers: what the formulas take they give back. Their parameters are numbers, or columns."""
 
-PLACES = 257
+N_PATH_PLACES = 257
 """Along a path, between which its radius of curvature has one smallest value at most: it has two on a whole path."""
 
 
@@ -147,7 +147,7 @@ class SlopeLaw:
         start = max(start, self.rest_half_width)
         if start == self.rest_half_width and self.always_rises and not self.preload:
             return start, float(self.curvature_radius(start))
-        angles = np.linspace(math.asin(start / self.brace_length), math.asin(end / self.brace_length), PLACES)
+        angles = np.linspace(math.asin(start / self.brace_length), math.asin(end / self.brace_length), N_PATH_PLACES)
         x = np.clip(self.brace_length * np.sin(angles), start, end)
         growth = self._radius_growth(x)
         dips = np.flatnonzero((growth[:-1] < 0) & (growth[1:] > 0))

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NEAR_START = 1e-7
 """Share of the travel next to a start at zero force within which 0/0 is taken from a place beside it."""
 
-BEYOND = 1.05
+PATH_END_FACTOR = 1.05
 """Times the curve's end: so far a path that is cut for friction is integrated."""
 
 NEWTON_STEPS = 6
@@ -135,13 +135,13 @@ class CurveSlopeLaw(SlopeLaw):
         x0, brace = self.rest_half_width, self.brace_length
         last = brace * (1 - 1e-6)
 
-        def turned(x: float, travel: FloatArray) -> float:
+        def reach_vertical(x: float, travel: FloatArray) -> float:
             return float(self._vertical(x, travel[0]))
 
-        def passed(_x: float, travel: FloatArray) -> float:
-            return float(travel[0]) - BEYOND * self.travel_end
+        def pass_travel_end(_x: float, travel: FloatArray) -> float:
+            return float(travel[0]) - PATH_END_FACTOR * self.travel_end
 
-        turned.terminal = passed.terminal = True  # type: ignore[attr-defined]
+        reach_vertical.terminal = pass_travel_end.terminal = True  # type: ignore[attr-defined]
         return solve_ivp(
             lambda x, travel: self._rate(x, travel),
             (x0, last),
@@ -151,7 +151,7 @@ class CurveSlopeLaw(SlopeLaw):
             atol=1e-15,
             max_step=(last - x0) / 64.0,
             dense_output=True,
-            events=(turned, passed),
+            events=(reach_vertical, pass_travel_end),
         )
 
     def _vertical(self, x: Any, travel: Any) -> Any:

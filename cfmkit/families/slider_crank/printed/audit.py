@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip
 
 
-PLACES = 240
+N_AUDIT_PLACES = 240
 
 AT_END = 1e-6, 1e-5  # nanometres and a share: a number so near to an end of its range is held by it
 
-MESHED = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
+STRESS_RTOL = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
 
-HELD = 0.02  # a limit that is so near, as a share of itself, holds the design
+ACTIVE_LIMIT_SHARE = 0.02  # a limit that is so near, as a share of itself, holds the design
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,9 @@ def judge(
     chain = strip_chain(strip, task.material, pins, task.direction)
     end = found.program.stroke(found.descent.z)
     first = max(task.start, 1e-3 * end)
-    travel = np.unique(np.concatenate([np.geomspace(first, end, PLACES // 4), np.linspace(first, end, PLACES)]))
+    travel = np.unique(
+        np.concatenate([np.geomspace(first, end, N_AUDIT_PLACES // 4), np.linspace(first, end, N_AUDIT_PLACES)])
+    )
     pressed = chain.press(travel)
     if pressed.ending is not PressingEnd.COMPLETE:
         return None
@@ -111,7 +113,7 @@ def _last(solution: Solution, ratio: FloatArray, ripple: float | None, stress: f
         place = first_at(solution.travel, np.abs(ratio), ripple * (1.0 + 1e-12))
         ends += [] if place is None else [place]
     if stress is not None:
-        place = first_at(solution.travel, solution.stress, stress * (1.0 - MESHED))
+        place = first_at(solution.travel, solution.stress, stress * (1.0 - STRESS_RTOL))
         ends += [] if place is None else [place]
     return min(ends)
 
@@ -150,12 +152,12 @@ def _find_active_limits(
     if ripple is not None:
         for sign, name in ((1.0, "upper"), (-1.0, "lower")):
             off = np.where(inside, sign * ratio, -np.inf)
-            peaks = [k for k in np.flatnonzero(off > (1.0 - HELD) * ripple).tolist() if _peak(off, k)]
+            peaks = [k for k in np.flatnonzero(off > (1.0 - ACTIVE_LIMIT_SHARE) * ripple).tolist() if _peak(off, k)]
             if peaks:
                 places = ", ".join(mm(float(solution.travel[k])) for k in peaks)
                 reported.append(f"{name} edge of the band at {places}")
     last = np.flatnonzero(inside)[-1]
-    if stress is not None and solution.stress[last] > (1.0 - 0.5 * HELD) * stress:
+    if stress is not None and solution.stress[last] > (1.0 - 0.5 * ACTIVE_LIMIT_SHARE) * stress:
         where = mm(float(solution.place[last]))
         reported.append(f"stress {mpa(stress)} at the end, {where} along the strip")
     return reported

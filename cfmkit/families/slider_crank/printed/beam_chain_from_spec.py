@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
-    STRIP,
+    STRIP_BEAM,
     Elasticity,
     Flexure,
     Strip,
@@ -142,7 +142,7 @@ def strip_chain(strip: Strip, made_of: Elasticity, pins: FloatArray, direction: 
             nearest = int(np.hypot(*(before - pins[1]).T).argmin())
             looked_up[:] = [(path, nearest, pins[1] - before[nearest])]
         _, row, offset = looked_up[0]
-        place: FloatArray = offset + path.shape(STRIP, index)[row]
+        place: FloatArray = offset + path.shape(STRIP_BEAM, index)[row]
         return place
 
     return Chain(strip.corners, pins, build, direction, knee)
@@ -158,7 +158,7 @@ def _unloaded_samples(path: Path) -> FloatArray:
 
     The strip passes a kink on a chord, and a little off the crank pin: motions are those of its own points.
     """
-    line = np.asarray(path.network.beams[STRIP].shape.points)  # type: ignore[union-attr]
+    line = np.asarray(path.network.beams[STRIP_BEAM].shape.points)  # type: ignore[union-attr]
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    place = path.places(STRIP) * marks[-1]
+    place = path.places(STRIP_BEAM) * marks[-1]
     return np.column_stack([np.interp(place, marks, line[:, 0]), np.interp(place, marks, line[:, 1])])

@@ -31,8 +31,8 @@ from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
 from cfmkit.families.slider_crank.printed.spec import StripSpec
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import (
-    LOOSE,
-    SHORTEST,
+    COARSE_RIPPLE,
+    MIN_BAND_LENGTH,
     FoundStrip,
     Ranges,
     infeasible,
@@ -52,19 +52,19 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
+SEARCH_RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
 """What the search keeps of the band (a share of the force), more if that was not enough, and of the stress allowed."""
 
-ENOUGH = 0.99
+MIN_STROKE_SHARE = 0.99
 """Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
 
-POINTS = 61
+MAX_ANALYSIS_POINTS = 61
 """Points, at most, of the analysis that judges a uniform strip: between them the curve is just as exact."""
 
-TOLD = 4
+MAX_NAMED_LIMITS = 4
 """So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""
 
-DIGITS, DECIMALS = 6, 9
+FORM_DECIMALS, LENGTH_DECIMALS = 6, 9
 """Of the numbers of a form, mostly millimetres, and of lengths in metres: both nanometres."""
 
 DEFAULT_THICKNESS = (0.5e-3, 2e-3)
@@ -119,7 +119,7 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     pins, allowed, limits = pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress, _limits(spec)
     identity, clock = identity_of(spec, run.seed), Clock.from_budgets(run.time_budget)
     kept: Design | None = None
-    for reserve in RESERVES:
+    for reserve in SEARCH_RESERVES:
         made_of = replace(task.material, allowable_stress=allowed)
         searched_for = replace(task, ripple=task.ripple - reserve, material=made_of)
         found = search(searched_for, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
@@ -127,7 +127,7 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
             return kept or found
         if not found.descent.feasible:
             return kept or infeasible(found)
-        judged = judge(round_within_bounds(found.values, ranges.form, DIGITS), found, limits, pins)
+        judged = judge(round_within_bounds(found.values, ranges.form, FORM_DECIMALS), found, limits, pins)
         if judged is None:
             refused = _not_pressed(found)
             continue
@@ -138,7 +138,10 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
             refused = _not_kept(reported, judged.window, limits)
             continue
         kept = _make_design(found, judged, reported)
-        if judged.window[1] > ENOUGH * found.program.stroke(found.descent.z) and allowed == made_of.allowable_stress:
+        if (
+            judged.window[1] > MIN_STROKE_SHARE * found.program.stroke(found.descent.z)
+            and allowed == made_of.allowable_stress
+        ):
             break
     return kept or refused
 
@@ -250,9 +253,10 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
     if beam.goal != "rms" and start <= 0:
         raise InputError("'design.travel' must begin after the run-in, above 0: the force begins at zero there")
-    if beam.goal == "stroke" and beam.longest is not None and beam.longest <= start + SHORTEST:
+    if beam.goal == "stroke" and beam.longest is not None and beam.longest <= start + MIN_BAND_LENGTH:
         raise InputError(
-            f"'design.beam.longest' must be more than {mm(SHORTEST)} beyond 'design.beam.start', {mm(float(start))}"
+            f"'design.beam.longest' must be more than {mm(MIN_BAND_LENGTH)} beyond 'design.beam.start', "
+            f"{mm(float(start))}"
         )
     made_of = elasticity(spec.mechanism)
     limit = made_of.allowable_stress if beam.stressed else None
@@ -265,7 +269,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
         wanted.size / spec.mechanism.sets,
         float(start),
         float(stroke),
-        ripple or LOOSE,
+        ripple or COARSE_RIPPLE,
         beam.goal,
         beam.longest or 0.5 * reach,
         None if wanted.curve is None else wanted.curve.scale(1.0 / wanted.size),
@@ -355,7 +359,9 @@ def _design_uniform_strip(
         )
         nearest = {"design.force": reached, "design.beam.width": mm(width)}
         return no_design(finding("target_unreachable", text), nearest)
-    part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
+    part = _part(
+        spec, {"width": round(width, LENGTH_DECIMALS), "thickness": round(thickness, LENGTH_DECIMALS), "shares": None}
+    )
     text = f"thickness {mm(thickness)} from the stress up to {mm(task.stroke)}, width {mm(width)} from the force"
     return _analyse_strip(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
 
@@ -380,7 +386,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
         )
         cure = {"design.force": newton(nearest)} if thickest >= low else {}
         return no_design(finding("target_unreachable", text), cure)
-    part = _part(spec, {"width": width, "thickness": round(thickness, DECIMALS), "shares": None})
+    part = _part(spec, {"width": width, "thickness": round(thickness, LENGTH_DECIMALS), "shares": None})
     text = f"width {mm(width)} as stated, thickness {mm(thickness)} from the force"
     if allowed is not None:
         text += f", stress {mpa(stress)} up to {mm(task.stroke)}"
@@ -390,7 +396,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
 def _analyse_strip(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
     """Return a uniform strip as a design, if its analysis keeps the stress, too."""
     window, limits = (task.start, task.stroke), _limits(spec)
-    quick = {"points": min(spec.analysis.points, POINTS)}
+    quick = {"points": min(spec.analysis.points, MAX_ANALYSIS_POINTS)}
     plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
     reported = _report(plain, window, run)
     return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
@@ -423,9 +429,9 @@ def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, floa
 def _write_strip(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:
     strip = judged.strip
     values: FloatArray = np.asarray(strip.thickness)
-    listed = tuple(round(float(value), DECIMALS) for value in values)
+    listed = tuple(round(float(value), LENGTH_DECIMALS) for value in values)
     thickness = listed[0] if wanted.shape == "uniform" else listed
-    width = round(float(strip.width), DECIMALS)
+    width = round(float(strip.width), LENGTH_DECIMALS)
     part = _part(spec, {"width": width, "thickness": thickness, "shares": judged.shares})
     return _with_part(spec, part, judged.window)
 
@@ -439,10 +445,10 @@ def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> st
         head = f"within {percent(reported.deviation or 0.0)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
     compared = ""
     if _has_uniform_strip(found):
-        within = percent(max(found.task.ripple, LOOSE))
+        within = percent(max(found.task.ripple, COARSE_RIPPLE))
         compared = f"; one thickness reaches {mm(_one_thickness(found))} within {within}"
-    shown = judged.active[:TOLD]
-    more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
+    shown = judged.active[:MAX_NAMED_LIMITS]
+    more = f" and {len(judged.active) - MAX_NAMED_LIMITS} more" if len(judged.active) > MAX_NAMED_LIMITS else ""
     held = f"; limited by {', '.join(shown)}{more}" if shown else ""
     return f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}"
 

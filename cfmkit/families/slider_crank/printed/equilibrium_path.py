@@ -23,7 +23,7 @@ from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.elastica.results.neighbour import neighbouring
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, kink, mirror_points
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, kink, mirror_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,26 +38,26 @@ if TYPE_CHECKING:
 FIRST_STEP = 1e-5
 """Of the travel."""
 
-STRAIGHT, CLEAR = 1e-9, 2e-4
+STRAIGHT_OFFSET, DECISIVE_OFFSET = 1e-9, 2e-4
 """Offset of the crank pin, in lengths of the chain: below the first there is no kink, above the second it decides."""
 
-BOW = 2e-3
+KINK_OFFSET = 2e-3
 """Offset that a chain is given to send it to one side, in lengths of the chain."""
 
-FEWEST = 2
+MIN_CURVE_POINTS = 2
 """A curve has at least so many points."""
 
 NEAR_LIMIT = 1e-12
 """Last step back towards the limit point of a branch, as a share of the travel at which the branch is known: the force
 there goes with the root of the distance, and is right to 1e-6."""
 
-BESIDE = 1e-4
+SLOPE_STEP = 1e-4
 """Where the slope of the branch is taken, as a share of the travel at its first known point."""
 
-ASTRAY = 0.3
+MAX_PREDICTION_ERROR = 0.3
 """How far unknowns may be from their prediction in such a step, as a share of their change; else another branch."""
 
-BENT = 0.1
+FRAME_OFFSET = 0.1
 """Offset beyond which it is a frame rather than a chain, and goes where its shape sends it."""
 
 
@@ -110,7 +110,7 @@ class Chain(ShortRepr):
     def side(self) -> int:
         """To which side the chain is kinked, +1 or -1; 0 where it is straight."""
         off = kink(self.pins)
-        return int(np.sign(off)) if abs(off) > STRAIGHT * self.length else 0
+        return int(np.sign(off)) if abs(off) > STRAIGHT_OFFSET * self.length else 0
 
     @property
     def length(self) -> float:
@@ -152,9 +152,9 @@ class Chain(ShortRepr):
                 if near.ending is PressingEnd.COMPLETE
                 else near
             )
-        drive = Displacement(SLIDER, self.direction, travel)
+        drive = Displacement(SLIDER_NODE, self.direction, travel)
         wanted = side or self.side or 1
-        clear = abs(kink(self.pins)) > CLEAR * self.length
+        clear = abs(kink(self.pins)) > DECISIVE_OFFSET * self.length
         if wanted == self.side and clear:
             path = _trace(self.build(self.points), drive, tolerance)
             if path.status is PathStatus.COMPLETE:
@@ -169,7 +169,9 @@ class Chain(ShortRepr):
         along = (self.points - self.pins[0]) @ axis
         knee = float((self.pins[1] - self.pins[0]) @ axis)
         hat = np.interp(along, [0.0, knee, self.length], [0.0, 1.0, 0.0])
-        moved: FloatArray = self.points + np.outer(side * BOW * self.length * hat, np.array([-axis[1], axis[0]]))
+        moved: FloatArray = self.points + np.outer(
+            side * KINK_OFFSET * self.length * hat, np.array([-axis[1], axis[0]])
+        )
         return moved
 
     def _trace_from_helper(
@@ -192,7 +194,7 @@ class Chain(ShortRepr):
 
     def _classify_ending(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
         """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
-        ending, message = _ENDINGS.get(path.status, PressingEnd.NOT_CONVERGED), path.message
+        ending, message = _ENDING_BY_STATUS.get(path.status, PressingEnd.NOT_CONVERGED), path.message
         if helped or not len(path.at_requested):
             ending = PressingEnd.NOT_CONVERGED if ending is PressingEnd.COMPLETE else ending
             return Pressed(path, ending, message)
@@ -202,7 +204,7 @@ class Chain(ShortRepr):
         if ending is PressingEnd.COMPLETE and not stable.all():
             first = path.drive[path.at_requested][~stable][0]
             ending, message = PressingEnd.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
-        chain_like = abs(kink(self.pins)) <= BENT * self.length
+        chain_like = abs(kink(self.pins)) <= FRAME_OFFSET * self.length
         if ending is PressingEnd.COMPLETE and side != wanted and (chain_like or wanted != self.side):
             return self._cut_before_crossing(path, sides, wanted)
         return Pressed(path, ending, message, side)
@@ -228,7 +230,7 @@ class Chain(ShortRepr):
     def _cut_before_crossing(self, path: Path, sides: FloatArray, wanted: int) -> Pressed:
         """Return what there is before the chain bends to the other side: nothing where it does so at once."""
         first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
-        if first < FEWEST:
+        if first < MIN_CURVE_POINTS:
             return Pressed(path, PressingEnd.WRONG_BRANCH, PressingEnd.WRONG_BRANCH.value, -wanted)
         places = path.drive[path.at_requested][first - 1 : first + 1] * 1e3
         text = f"between {places[0]:.4g} and {places[1]:.4g} mm {PressingEnd.CROSSES.value}"
@@ -236,7 +238,7 @@ class Chain(ShortRepr):
         return Pressed(kept, PressingEnd.CROSSES, text, wanted)
 
 
-_ENDINGS = {
+_ENDING_BY_STATUS = {
     PathStatus.COMPLETE: PressingEnd.COMPLETE,
     PathStatus.LIMIT_POINT: PressingEnd.LIMIT_POINT,
     PathStatus.JUMPS: PressingEnd.UNSTABLE,
@@ -282,16 +284,16 @@ def _from_its_limit(path: Path, missing: FloatArray) -> Path:
 def _followed_back(path: Path) -> list[MarchState]:
     """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
     own, y, drive = equations(path.mesh), path.free[0], float(path.at.drive[0])
-    beside = own.solve(y, drive * (1.0 + BESIDE))  # tells the slope
+    beside = own.solve(y, drive * (1.0 + SLOPE_STEP))  # tells the slope
     if beside is None:
         return []
-    before, last, step = beside.free, beside.way, BESIDE * drive
+    before, last, step = beside.free, beside.way, SLOPE_STEP * drive
     unstable, found, moves = int(path.unstable[0]), [], np.isinf(own.unit)
     while step > NEAR_LIMIT * path.at.drive[0]:
         guess = y + (y - before) * (step / (last - drive))
         spot = own.solve(guess, drive - step)
         off = np.inf if spot is None else np.abs(spot.free - guess)[moves].max()
-        if spot is None or spot.unstable > unstable or off > ASTRAY * np.abs(guess - y)[moves].max():
+        if spot is None or spot.unstable > unstable or off > MAX_PREDICTION_ERROR * np.abs(guess - y)[moves].max():
             step *= 0.5
             continue
         y, before, drive, last = spot.free, y, spot.way, drive
@@ -315,7 +317,7 @@ def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:
     return arc if good and len(arc.at_requested) == len(drive.points) else path
 
 
-COARSE = 60
+N_LINE_PIECES = 60
 """Straight pieces of the line that are looked at for crossings."""
 
 
@@ -357,7 +359,7 @@ def _find_contact(line: FloatArray, start: FloatArray, thickness: float) -> str:
     share = float(np.clip((anchor - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0))
     if np.hypot(*(start + share * way - anchor)) < thickness:
         return "is pressed through its own anchor"
-    rows = np.unique(np.linspace(0, len(line) - 1, COARSE + 1).astype(int))
+    rows = np.unique(np.linspace(0, len(line) - 1, N_LINE_PIECES + 1).astype(int))
     return "crosses itself" if _crosses(line[rows]) else ""
 
 

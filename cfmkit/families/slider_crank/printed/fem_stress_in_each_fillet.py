@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.fem_results import FilletRow, with_nominal
-from cfmkit.families.nominal_stress_beside_fillets import TOLERANCE, nominal_stresses, with_steps
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURES
+from cfmkit.families.nominal_stress_beside_fillets import PATH_TOLERANCE, nominal_stresses, with_steps
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
@@ -31,7 +31,7 @@ def fillets(
     pads = {place.name: place.shapes for place in solved.part.places}
     rows = []
     for one in stressed_fillets(solved, spec.mechanism.fillet):
-        nearest = FLEXURES[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
+        nearest = FLEXURE_BEAMS[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
         names = [] if spec.piece == "beam" else [nearest]
         names += one.arc.find_touched(pads) or ([] if names else ["strip"])
         if (found := one.largest(*window)) is not None:
@@ -39,7 +39,7 @@ def fillets(
     stresses = nominal_stresses(
         rows,
         np.array([row.motion for row in rows]),
-        lambda travel: [chain.press(with_steps(travel), tolerance=TOLERANCE).path],
+        lambda travel: [chain.press(with_steps(travel), tolerance=PATH_TOLERANCE).path],
         lambda points: points,
     )
     return with_nominal(rows, stresses)

@@ -174,7 +174,7 @@ def _left_out_friction(solution: Solution) -> str:
     return left_out_friction(solution.spec)
 
 
-RULES: tuple[FindingRule[Solution], ...] = (
+FINDING_RULES: tuple[FindingRule[Solution], ...] = (
     FindingRule(
         "overstressed",
         _is_overstressed,

@@ -91,12 +91,12 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int =
     return curves_along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
 
 
-_ROUNDS = 8
+_MAX_ROUNDS = 8
 """`configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many."""
 
-_POINTS = 40
+_N_POINTS = 40
 
-_SLENDER = 2.0  # length over thickness below which a flexure is none
+_MIN_SLENDERNESS = 2.0  # length over thickness below which a flexure is none
 
 
 @dataclass(frozen=True)
@@ -159,12 +159,12 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         if sheet is None
         else of_width(rates, lengths, turn, made_of, sheet, stays)
     )
-    stubby = next((one for one in first if one.length < _SLENDER * one.thickness), None)
+    stubby = next((one for one in first if one.length < _MIN_SLENDERNESS * one.thickness), None)
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
         cure = "make the flexures longer ('design.flexures.length'), or increase the stroke ('design.travel')"
         return no_design(finding("target_unreachable", f"{text}: too stubby for a flexure; {cure}"))
-    travel = np.linspace(0.1 * stroke, stroke, _POINTS)
+    travel = np.linspace(0.1 * stroke, stroke, _N_POINTS)
     springs_force = rates @ curves_along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
     bent = 0 if spec.analysis.side is None else side
@@ -262,7 +262,7 @@ def correct_flexures(
     """
     parts, factors = tuple(flexures), (1.0, 1.0)
     limit, (linkage, unloaded, side) = made_of.allowable_stress or np.inf, built_in
-    for number in range(_ROUNDS if fixed is None else 4 * _ROUNDS):
+    for number in range(_MAX_ROUNDS if fixed is None else 4 * _MAX_ROUNDS):
         pressed = chain_of_flexures(parts, made_of, linkage, unloaded).press(travel, side)
         if pressed.ending is not PressingEnd.COMPLETE:
             return None

@@ -17,7 +17,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, slider_support
+from cfmkit.elastica import (
+    CLAMPED_SUPPORT,
+    FREE_SUPPORT,
+    Beam,
+    Link,
+    Network,
+    Node,
+    Polyline,
+    Section,
+    Support,
+    Taper,
+    slider_support,
+)
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,12 +64,12 @@ class Flexure:
         return 2.0 * stress * self.length / (youngs_modulus * self.thickness)
 
 
-SLIDER = "slider"
+SLIDER_NODE = "slider"
 """Name of the node that moves along the way."""
 
-FLEXURES = ("pivot", "crank_pin", "slider_pin")
+FLEXURE_BEAMS = ("pivot", "crank_pin", "slider_pin")
 
-STRIP = "strip"
+STRIP_BEAM = "strip"
 """Names of the beams."""
 
 
@@ -101,9 +113,12 @@ class Strip:
 
     def network(self, material: Elasticity) -> Network:
         """Return the strip as a beam network."""
-        nodes = {"ground": _node(self.corners[0], CLAMPED), SLIDER: _node(self.corners[-1], slider_support(0.0))}
+        nodes = {
+            "ground": _node(self.corners[0], CLAMPED_SUPPORT),
+            SLIDER_NODE: _node(self.corners[-1], slider_support(0.0)),
+        }
         section = material.section(self.width, Taper(self.places, np.asarray(self.thickness)))
-        return Network(nodes, {STRIP: Beam("ground", SLIDER, section, Polyline(self.corners))})
+        return Network(nodes, {STRIP_BEAM: Beam("ground", SLIDER_NODE, section, Polyline(self.corners))})
 
 
 def _node(place: FloatArray, support: Support) -> Node:
@@ -158,12 +173,12 @@ def mirror_points(points: FloatArray, places: FloatArray) -> FloatArray:
 
 def flexure_network(ends: FloatArray, flexures: Sequence[Flexure], material: Elasticity) -> Network:
     """Return three flexures and two rigid links as a beam network."""
-    names = ("ground", "crank", "crank end", "coupler", "coupler end", SLIDER)
-    supports = {"ground": CLAMPED, SLIDER: slider_support(0.0)}
-    nodes = {name: _node(place, supports.get(name, FREE)) for name, place in zip(names, ends, strict=True)}
+    names = ("ground", "crank", "crank end", "coupler", "coupler end", SLIDER_NODE)
+    supports = {"ground": CLAMPED_SUPPORT, SLIDER_NODE: slider_support(0.0)}
+    nodes = {name: _node(place, supports.get(name, FREE_SUPPORT)) for name, place in zip(names, ends, strict=True)}
     beams = {
         name: Beam(names[2 * k], names[2 * k + 1], material.section(flexure.width, flexure.thickness))
-        for k, (name, flexure) in enumerate(zip(FLEXURES, flexures, strict=True))
+        for k, (name, flexure) in enumerate(zip(FLEXURE_BEAMS, flexures, strict=True))
     }
     return Network(nodes, beams, links=(Link("crank", "crank end"), Link("coupler", "coupler end")))
 

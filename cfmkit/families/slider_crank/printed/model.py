@@ -29,8 +29,8 @@ from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     travel_direction,
 )
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, kept_clear
-from cfmkit.families.slider_crank.printed.findings import RULES
-from cfmkit.families.slider_crank.printed.scalar_results import QUANTITIES
+from cfmkit.families.slider_crank.printed.findings import FINDING_RULES
+from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import window_places
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 DEFAULT_SHARE = 0.35
 """Travel where none is requested, in lengths of the slider's path from the pivot: that of [B, sec. 2.1]."""
 
-_NAMES = {
+_ENDING_NAMES = {
     PressingEnd.LIMIT_POINT: "limit_point",
     PressingEnd.UNSTABLE: "unstable",
     PressingEnd.NOT_CONVERGED: "not_converged",
@@ -92,7 +92,9 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     pressed = chain.press(stops.mark_rows([grid])[0] if stops else grid, side, spec.analysis.accuracy)
     pressed = kept_clear(pressed, _thickness(chain))
     usable = len(pressed.travel) > 1 and pressed.ending is not PressingEnd.WRONG_BRANCH
-    reported = () if pressed.ending is PressingEnd.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
+    reported = (
+        () if pressed.ending is PressingEnd.COMPLETE else (finding(_ENDING_NAMES[pressed.ending], pressed.message),)
+    )
     blocked = "" if reported else stops.blocked(float(pressed.travel[-1]))
     on_stops = tuple(finding(*pair) for pair in stops.sentences(pressed.travel, 0.0)) if usable else ()
     if not usable:
@@ -116,8 +118,8 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         status=Status.PARTIAL if reported or blocked else Status.COMPLETE,
         message=reported[0].message if reported else blocked,
         curves=(_curve(solution),),
-        values=values_of_one(QUANTITIES, solution) | stops.values(solution.travel, False, window),
-        warnings=LazySequence(lambda: (*reported, *on_stops, *findings_of_one(RULES, finding, solution))),
+        values=values_of_one(SCALAR_QUANTITIES, solution) | stops.values(solution.travel, False, window),
+        warnings=LazySequence(lambda: (*reported, *on_stops, *findings_of_one(FINDING_RULES, finding, solution))),
         travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,

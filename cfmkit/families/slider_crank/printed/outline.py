@@ -12,8 +12,8 @@ from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Re
 from cfmkit.export.drawn_as_specified import check_outline
 from cfmkit.export.fillets import round_inside_corners, sharp_notes
 from cfmkit.export.posed_part import PosedBody, swept
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
-from cfmkit.families.slider_crank.printed.part import STRAIGHT, Leg, bodies, choose_points
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP_BEAM
+from cfmkit.families.slider_crank.printed.part import STRAIGHT_SINE, Leg, bodies, choose_points
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.stock.material_and_part_spec import PaddedPart
 
 
-SWEPT = 25
+N_SWEPT_POSES = 25
 """Poses at which what moves must be clear of the frame."""
 
 
@@ -42,7 +42,7 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     cfmkit.errors.GeometryError
         If a flexure or the strip, or the area of the leg, is not that of the specification.
     """
-    from cfmkit.export.union import SAGITTA, OutlinePiece, merge_pieces
+    from cfmkit.export.union import SAGITTA_RTOL, OutlinePiece, merge_pieces
 
     part, fillet = spec.mechanism.cut_part, spec.mechanism.fillet
     outline, path = leg.contours
@@ -51,7 +51,7 @@ def _draw_leg(spec: SliderCrankSpec, leg: Leg) -> Drawing:
     frame = _frame(spec, leg)
     made: tuple[Contour, ...] = (rounded,)
     if frame:
-        check_simple(rounded.points(SAGITTA * leg.thinnest), "the outline of the leg")  # the union would hide it
+        check_simple(rounded.points(SAGITTA_RTOL * leg.thinnest), "the outline of the leg")  # the union would hide it
         made = merge_pieces(
             [OutlinePiece.from_contour(rounded), *map(OutlinePiece.polygon, frame)], leg.thinnest, fillet
         )
@@ -85,7 +85,7 @@ def _table(leg: Leg) -> Curve2D:
         "y": (leg.points[:, 1], "length"),
         "thickness": (leg.thickness, "length"),
     }
-    if leg.pieces[0].name == STRIP:
+    if leg.pieces[0].name == STRIP_BEAM:
         return Curve2D("strip", {"place": (leg.place, "length"), **columns})
     return Curve2D("flexures", {**columns, "width": (leg.width, "length")})
 
@@ -154,7 +154,7 @@ def _moving(spec: SliderCrankSpec, leg: Leg) -> Iterator[PosedBody]:
     fidelity = {"analysis.fidelity": None} if spec.analysis.fidelity == "solid" else {}
     solution: Any = analyze(spec.replace(fidelity), Run()).state
     if solution is not None:
-        _, slider, *found = bodies(spec, solution, choose_points(solution, SWEPT))
+        _, slider, *found = bodies(spec, solution, choose_points(solution, N_SWEPT_POSES))
         yield slider
         yield PosedBody.line("leg", "free", np.concatenate([one.core for one in found], axis=1), leg.widest)
 
@@ -163,7 +163,7 @@ def _dimensions(points: FloatArray) -> Iterator[DrawnDimension]:
     """Yield how far the ends of the centre line are apart."""
     start, end = ((float(x), float(y)) for x, y in (points[0], points[-1]))
     yield DrawnDimension("ends of the centre line", start, end, "x")
-    if abs(end[1] - start[1]) > STRAIGHT:
+    if abs(end[1] - start[1]) > STRAIGHT_SINE:
         yield DrawnDimension("ends of the centre line", start, end, "y")
 
 

@@ -18,7 +18,7 @@ from cfmkit.export.drawn_as_specified import SpecifiedPiece
 from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURES, STRIP
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURE_BEAMS, STRIP_BEAM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Result
 
-PAD = (0.012, 0.010)
+PAD_SIZE = (0.012, 0.010)
 """Length and width of the pads [m]."""
 
-STRAIGHT, MITRE = 1e-9, 2.0
+STRAIGHT_SINE, MITRE_LIMIT = 1e-9, 2.0
 """Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
 
 SAME_PLACE = 1e-9
 """Points nearer to each other than this are one, in lengths of the centre line."""
 
-COMPLEX = np.array([1.0, 1j])
+COMPLEX_AXES = np.array([1.0, 1j])
 """From x and y to x + iy."""
 
 LINK_RATIO = 5.0
@@ -85,7 +85,7 @@ class Leg:
                 0.0 if as_printed else beam.offset
             )
             halves = itertools.pairwise((0.5 * thickness).tolist())
-            pieces = tuple(LegPiece(STRIP, k, half) for k, half in enumerate(halves))
+            pieces = tuple(LegPiece(STRIP_BEAM, k, half) for k, half in enumerate(halves))
             width = np.full(len(points), beam.width)
             return cls(points, shares * marks[-1], thickness, width, pieces, _pad_sizes(spec))
         flexures = flexures_of(spec.mechanism)
@@ -93,7 +93,7 @@ class Leg:
         thickness, width = (np.repeat([getattr(one, key) for one in flexures], 2) for key in ("thickness", "width"))
         half, bar = 0.5 * thickness[::2], 0.5 * LINK_RATIO * float(thickness.max())
         pieces = tuple(
-            LegPiece("", k, (bar, bar)) if k % 2 else LegPiece(FLEXURES[k // 2], k, (float(half[k // 2]),) * 2)
+            LegPiece("", k, (bar, bar)) if k % 2 else LegPiece(FLEXURE_BEAMS[k // 2], k, (float(half[k // 2]),) * 2)
             for k in range(len(points) - 1)
         )
         place = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -153,7 +153,7 @@ class Leg:
         way = (ends[1] - ends[0])[kept] / length[kept, None]
         half = np.array([self.pieces[k].half for k in kept])
         # at a bend without a step the outer edges meet beyond the ends
-        turn = np.abs(np.angle((way[1:] @ COMPLEX) / (way[:-1] @ COMPLEX)))
+        turn = np.abs(np.angle((way[1:] @ COMPLEX_AXES) / (way[:-1] @ COMPLEX_AXES)))
         beyond = np.where(half[:-1, 1] == half[1:, 0], half[1:, 0] * np.tan(0.5 * turn), 0.0)
         before, after = np.append(0.0, beyond), np.append(beyond, 0.0)
         for number, k in enumerate(kept.tolist()):
@@ -170,7 +170,7 @@ class Leg:
 def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:
     """Return depth and breadth of the pads [m]."""
     part = spec.mechanism.part
-    return PAD if part is None or part.pad is None else part.pad
+    return PAD_SIZE if part is None or part.pad is None else part.pad
 
 
 def _pad_sizes(spec: SliderCrankSpec) -> tuple[float, float, float]:
@@ -261,13 +261,13 @@ def _edge(line: FloatArray, half: FloatArray) -> list[FloatArray]:
 
 def _corner(one: _ChainSide, other: _ChainSide) -> list[FloatArray]:
     """Return where two edges meet; where the width steps, both ends on the line that halves the angle."""
-    if abs(_cross(one.along, other.along)) < STRAIGHT:
+    if abs(_cross(one.along, other.along)) < STRAIGHT_SINE:
         return [one.last, other.first]
     at, reach = one.end, float(np.hypot(*(one.last - one.end)))
     ways = one.last - one.first, other.last - other.first
     if np.isclose(reach, np.hypot(*(other.first - at)), rtol=1e-9, atol=0.0):
         met = _meeting(one.last, ways[0], other.first, ways[1])
-        if np.hypot(*(met - at)) <= MITRE * reach:
+        if np.hypot(*(met - at)) <= MITRE_LIMIT * reach:
             return [met]
         middle = one.last + other.first - 2.0 * at
         return [at + reach * middle / np.hypot(*middle)]

@@ -28,7 +28,7 @@ from cfmkit.families.slider_crank.printed.findings import left_out_friction
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
-from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
+from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import format_short, window_places
@@ -47,11 +47,11 @@ if TYPE_CHECKING:
     from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
     from cfmkit.solid.meshed_part import MeshSolution, Part
 
-GATHERED = 3.0
+POSE_EXPONENT = 3.0
 """Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
-LARGEST = 4.0
+LINK_ELEMENT_RATIO = 4.0
 """Sides of elements in links, in those of flexures: links are stiff, and hardly bend."""
-ELSEWHERE = "the model of the part as a solid does not compute it"
+NOT_COMPUTED_TEXT = "the model of the part as a solid does not compute it"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,7 +153,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 def part_of(spec: SliderCrankSpec) -> Part:
     """Return one leg as it is solved: its outline as printed, with its widths and both pads."""
     from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
-    from cfmkit.solid.plane_stress_law import LAWS
+    from cfmkit.solid.plane_stress_law import MATERIAL_LAWS
 
     piece = solved_piece(spec)
     made_of, material = elasticity(spec.mechanism), spec.mechanism.material
@@ -164,11 +164,11 @@ def part_of(spec: SliderCrankSpec) -> Part:
         for name, pad, motion in (("ground", piece.pads[0], np.zeros(3)), ("slider", piece.pads[1], driven))
     )
     assert material is not None  # or `elasticity` had refused
-    law = LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
+    law = MATERIAL_LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
     regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
     rings = rings_of((piece.contour, *piece.holes), piece.thinnest)
     width = float(piece.sheet.thickness or 0.0)
-    return Part(rings, piece.thinnest, width, law, places, regions, LARGEST, piece.frame, piece.sections)
+    return Part(rings, piece.thinnest, width, law, places, regions, LINK_ELEMENT_RATIO, piece.frame, piece.sections)
 
 
 def driven_part(spec: SliderCrankSpec) -> DrivenPart:
@@ -190,7 +190,7 @@ def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
     from cfmkit.elastica import Displacement
     from cfmkit.export.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.families.slider_crank.printed.beam_chain_from_spec import lumped_chain, strip_of
-    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE
 
     spec = resolve(spec)
     linkage = linkage_of(spec.mechanism)
@@ -201,13 +201,15 @@ def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
     else:
         chain = lumped_chain(spec.mechanism, linkage, unloaded)
         network = chain.build(chain.points)
-    return (DrivenNetwork("slider-crank", network, Displacement(SLIDER, travel_direction(linkage), np.array([end]))),)
+    return (
+        DrivenNetwork("slider-crank", network, Displacement(SLIDER_NODE, travel_direction(linkage), np.array([end]))),
+    )
 
 
 def _stops(spec: SliderCrankSpec) -> list[float]:
     """Return the travels to solve for [m]: rest, closer ones where the travel begins, and the ends of every window."""
     low, high = spec.analysis.travel or (0.0, 0.0)
-    own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** GATHERED
+    own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** POSE_EXPONENT
     windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
     ends = [low, *(place for window in windows if window is not None for place in window_places(window, (low, high)))]
     found = np.unique(np.concatenate([own, [place for place in ends if 0.0 < place < high]]))
@@ -238,8 +240,8 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         **solution.error.values(),
     }
     found = {
-        name: Quantity(known.get(name), *about, ELSEWHERE if known.get(name) is None else "")
-        for name, about in DEFINITIONS.items()
+        name: Quantity(known.get(name), *about, NOT_COMPUTED_TEXT if known.get(name) is None else "")
+        for name, about in SCALAR_DEFINITIONS.items()
     }
     return found | largest_concentration(solution.fillets)
 

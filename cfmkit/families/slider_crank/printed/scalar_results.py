@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.rows import ScalarQuantity
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
-from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
+from cfmkit.families.slider_crank.springs.scalar_results import SCALAR_DEFINITIONS as OF_SPRINGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,7 +53,7 @@ def _why_no_stroke(solution: Solution) -> str:
     return NO_STRENGTH if solution.material.allowable_stress is None else "the stress stays below the allowable one"
 
 
-QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "kink": ScalarQuantity(
         "length",
         "offset of the crank pin from the line between pivot and slider pin, unloaded; left is positive",
@@ -91,5 +91,5 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result of the model, in the order in which they are shown."""
 
-DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()}
+SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()}
 """Name -> dimension and definition."""

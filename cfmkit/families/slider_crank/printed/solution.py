@@ -18,7 +18,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.results.member_efforts import effort_error
 from cfmkit.families.end_stops import NO_STOPS
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM
 from cfmkit.metrics.continuous_means_and_extremes import mean
 from cfmkit.numerics.chebyshev_panels import nodes_of, resolve_panels
 from cfmkit.numerics.roots import bracketed_root
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from cfmkit.numerics.chebyshev_panels import ChebyshevPanels
 
 
-NEAREST = 1e-6
+FIRST_NODE_SHARE = 1e-6
 """Share of the travel at which the first node stands: the force there is about a thousandth of its level."""
 
-WIDE = 1.5
+INITIAL_PANEL_WIDTH = 1.5
 """Width of a panel at first, in the logarithm of the travel: a path that has no corner is resolved at once."""
 
-CLOSE = (1e-8, 1e-7)
+COEFFICIENT_RTOL = (1e-8, 1e-7)
 """Size of the last coefficients, relative to the largest, at which force and stress have converged: the force of a good
 chain changes by a hundredth over its travel, and a place on it is to be right to a millionth of that."""
 
-HALVINGS = 12
+MAX_HALVINGS = 12
 """At most so many: the stress has a kink where its place jumps, and a chain without a kink has a sharp corner."""
 
 
@@ -107,10 +107,10 @@ class ChainCurve(ShortRepr):
         if not len(above) or above[0] == 0:
             return float(places[0]) if len(above) else None
 
-        def off(travel: float) -> float:
+        def measure_error(travel: float) -> float:
             return float(self._evaluate(np.array([travel]), which)[0]) - level
 
-        return bracketed_root(off, float(places[above[0] - 1]), float(places[above[0]]))
+        return bracketed_root(measure_error, float(places[above[0] - 1]), float(places[above[0]]))
 
 
 def course(
@@ -129,21 +129,21 @@ def course(
     first : (float, float)
         Force and stress where it begins.
     """
-    low, high = np.log(max(ends[0], NEAREST * ends[1])), np.log(ends[1])
+    low, high = np.log(max(ends[0], FIRST_NODE_SHARE * ends[1])), np.log(ends[1])
 
     def values(places: FloatArray) -> FloatArray:
         found = pressed(np.exp(places))
         return np.full((2, len(places)), np.nan) if found is None else np.array(found)
 
-    borders = np.linspace(low, high, int(np.ceil((high - low) / WIDE)) + 1)
-    force, stress = resolve_panels(values, borders, CLOSE, HALVINGS)
+    borders = np.linspace(low, high, int(np.ceil((high - low) / INITIAL_PANEL_WIDTH)) + 1)
+    force, stress = resolve_panels(values, borders, COEFFICIENT_RTOL, MAX_HALVINGS)
     whole = np.isfinite(force.coefficients).all() and np.isfinite(stress.coefficients).all()
     return ChainCurve(ends, first, (force, stress)) if whole else None
 
 
 ChainModel = Literal["lumped", "beam"]
 
-FOLLOWED = (PressingEnd.COMPLETE, PressingEnd.UNSTABLE)
+COMPLETE_ENDINGS = (PressingEnd.COMPLETE, PressingEnd.UNSTABLE)
 """Endings of a path that has all points that were requested."""
 
 
@@ -199,7 +199,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def _reaction(self) -> FloatArray:
-        reaction: FloatArray = self.legs * self.pressed.path.reaction(SLIDER)[self._at]
+        reaction: FloatArray = self.legs * self.pressed.path.reaction(SLIDER_NODE)[self._at]
         return reaction
 
     @property
@@ -232,7 +232,7 @@ class Solution(ShortRepr):
         points = self.chain.points
         marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         names = list(self.pressed.path.network.beams)
-        if names == [STRIP]:
+        if names == [STRIP_BEAM]:
             return np.asarray(shares * marks[-1])
         first = {name: (marks[2 * k], marks[2 * k + 1]) for k, name in enumerate(names)}
         return np.array(
@@ -255,7 +255,7 @@ class Solution(ShortRepr):
     def _solve_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return force [N] and stress [Pa] at other travels than those of the points; None if one is not reached."""
         found = self.chain.press(travel, self.side, self.accuracy)
-        if found.ending not in FOLLOWED or len(found.travel) < len(travel):
+        if found.ending not in COMPLETE_ENDINGS or len(found.travel) < len(travel):
             return None
         other = replace(self, pressed=found)
         return other.leg_force, other.stress

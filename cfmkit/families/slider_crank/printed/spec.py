@@ -12,7 +12,7 @@ from cfmkit.families.end_stops_spec import EndStop
 from cfmkit.specs.spec import Analysis, Model, PositiveLength
 from cfmkit.specs.units import Length, Ratio
 from cfmkit.stock.material_and_part_spec import MaterialField, PaddedPart, RoundedCorners, SafetyFactor
-from cfmkit.stock.processes import PROCESSES
+from cfmkit.stock.processes import PROCESSES_BY_NAME
 
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 
@@ -144,7 +144,7 @@ class Printed(RoundedCorners, Model):
         position = thinnest = None
         if self.part is not None and self.part.process is not None:
             stated = self.part.process
-            known = stated.accuracy(PROCESSES[stated.name]) if stated.name else stated
+            known = stated.accuracy(PROCESSES_BY_NAME[stated.name]) if stated.name else stated
             position, thinnest = known.position, known.least_feature
         return position, thinnest
 

@@ -31,7 +31,7 @@ from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
 from cfmkit.elastica.results.path import N_PLACES
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
-from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP, Strip, spread
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, STRIP_BEAM, Strip, spread
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-SMALL = 1e-3
+MILLIMETRE = 1e-3
 """Thicknesses and widths are counted in mm."""
 
 Goal = Literal["stroke", "ripple", "rms"]
@@ -105,32 +105,32 @@ class Form:
 
     def is_ordered(self, x: FloatArray, corners: FloatArray) -> bool:
         """Return whether stations that vary come one after the other."""
-        return not self.per_piece or bool((np.diff(self.places(x, corners)) > APART).all())
+        return not self.per_piece or bool((np.diff(self.places(x, corners)) > MIN_STATION_DISTANCE).all())
 
     def width_of(self, x: FloatArray) -> float:
         """Return the width [m]."""
-        return float(np.real(x[-1])) * SMALL if self.width is None else self.width
+        return float(np.real(x[-1])) * MILLIMETRE if self.width is None else self.width
 
     def strip(self, x: Any, corners: FloatArray) -> Strip:
         """Return the strip that numbers describe: thicknesses and width in mm, shares of the pieces' lengths."""
-        thickness = np.asarray(x[: self.count]) * SMALL
+        thickness = np.asarray(x[: self.count]) * MILLIMETRE
         if self.count == 1:
             return Strip(corners, self.width_of(x), np.repeat(thickness, 2), np.array([0.0, 1.0]))
         return Strip(corners, self.width_of(x), thickness, self.places(x, corners))
 
 
-POINTS, DENSE = 12, 81
+N_FORCE_POINTS, N_BAND_POINTS = 12, 81
 """Where the force is computed, and where its band is kept."""
 
 RMS_POINTS = 10
 """Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
 
-TOLERANCE = 1e-6
+PATH_TOLERANCE = 1e-6
 
-APART = 1e-5
+MIN_STATION_DISTANCE = 1e-5
 """Least distance of stations, as a share of the length: ranges that overlap must not exchange them."""
 
-_NUDGE = 1e-5  # of a share, or of the width as a share of itself, for central differences
+_DIFFERENCE_STEP = 1e-5  # of a share, or of the width as a share of itself, for central differences
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class State:
     @cached_property
     def stress(self) -> FloatArray:
         """Stress at the tops of the strip's pieces near the end of the travel, (r,) [Pa]."""
-        sections, last = self.path.sections(STRIP), self.path.at_requested[-LAST:]
+        sections, last = self.path.sections(STRIP_BEAM), self.path.at_requested[-N_STRESS_POINTS:]
         return self.watched.stress(sections.bending_stress[last], sections.axial_stress[last])
 
 
@@ -166,8 +166,8 @@ class StripProgram(DesignProgram):
             self.spots = np.arange(1, RMS_POINTS + 1) / RMS_POINTS
             self.between = np.eye(RMS_POINTS)
             return
-        self.spots = 0.5 * (1.0 - np.cos(np.pi * np.arange(POINTS) / (POINTS - 1)))
-        dense = 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, DENSE)))
+        self.spots = 0.5 * (1.0 - np.cos(np.pi * np.arange(N_FORCE_POINTS) / (N_FORCE_POINTS - 1)))
+        dense = 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, N_BAND_POINTS)))
         self.between = interpolation(self.spots, dense)
         self.slope = differentiation(self.spots)
 
@@ -211,7 +211,7 @@ class StripProgram(DesignProgram):
 
     def _path(self, network: Network, travel: FloatArray) -> Path | None:
         """Return the equilibria near the last ones, else from rest."""
-        drive = Displacement(SLIDER, self.task.direction, travel)
+        drive = Displacement(SLIDER_NODE, self.task.direction, travel)
         if self.known is not None:
             with suppress(InputError):  # stations that move can change how finely the strip is cut
                 near = neighbouring(self.known, network, drive)
@@ -284,11 +284,11 @@ class StripProgram(DesignProgram):
 
         inner = x[: form.count]
         force = [gradient(path, build, inner).effort]
-        last = gradient(path, build, inner, points=path.at_requested[-LAST:]).sections(STRIP)
+        last = gradient(path, build, inner, points=path.at_requested[-N_STRESS_POINTS:]).sections(STRIP_BEAM)
         stress = [state.watched.stress(last.bending_stress, last.axial_stress)]
-        steps = [(k, _NUDGE) for k in range(form.count, form.count + form.placed)]
+        steps = [(k, _DIFFERENCE_STEP) for k in range(form.count, form.count + form.placed)]
         if form.width is None and self.task.material.wide:
-            steps.append((form.size - 1, _NUDGE * float(x[-1])))
+            steps.append((form.size - 1, _DIFFERENCE_STEP * float(x[-1])))
         for k, step in steps:
             by = self._by_difference(z, k, step, state)
             if by is None:
@@ -306,21 +306,21 @@ class StripProgram(DesignProgram):
         It is central, but where only one neighbour has equilibria. Beside a strip with a station at the end of one of
         its segments others are cut into more segments, and are compared with each other.
         """
-        drive = Displacement(SLIDER, self.task.direction, self.travel(z))
+        drive = Displacement(SLIDER_NODE, self.task.direction, self.travel(z))
 
-        def moved(step: float) -> Network:
+        def build_shifted(step: float) -> Network:
             x = z[: self.form.size].copy()
             x[k] += step
             return self.network(x)
 
         paths = [(0.0, state.path)]
         try:
-            paths += [(step, neighbouring(state.path, moved(step), drive)) for step in (-nudge, nudge)]
+            paths += [(step, neighbouring(state.path, build_shifted(step), drive)) for step in (-nudge, nudge)]
         except InputError:
-            beside = _trace(moved(nudge), drive)
+            beside = _trace(build_shifted(nudge), drive)
             paths = []
             if beside is not None:
-                paths = [(nudge, beside), (2.0 * nudge, neighbouring(beside, moved(2.0 * nudge), drive))]
+                paths = [(nudge, beside), (2.0 * nudge, neighbouring(beside, build_shifted(2.0 * nudge), drive))]
         found = [pair for pair in paths if pair[1].status is PathStatus.COMPLETE]
         if len(found) < 2:
             return None
@@ -337,8 +337,10 @@ class StripProgram(DesignProgram):
         travel, at = self.travel(z), state.path.at_requested
         first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
         moves = np.sqrt(travel) / last * self.spots
-        by_travel = self.slope[-LAST:] * (self.spots / (2.0 * last * (last - first)))[-LAST:, None]
-        sections = state.path.sections(STRIP)
+        by_travel = (
+            self.slope[-N_STRESS_POINTS:] * (self.spots / (2.0 * last * (last - first)))[-N_STRESS_POINTS:, None]
+        )
+        sections = state.path.sections(STRIP_BEAM)
         stress = state.watched.stress(
             *(by_travel @ part[at] for part in (sections.bending_stress, sections.axial_stress))
         )
@@ -347,22 +349,22 @@ class StripProgram(DesignProgram):
 
 def _trace(network: Network, drive: Displacement) -> Path | None:
     """Return the equilibria that are reached from rest; None if one is not, or is not stable."""
-    path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
+    path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=PATH_TOLERANCE))
     good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
     return path if good else None
 
 
-LAST, BETWEEN = 4, 13
+N_STRESS_POINTS, N_STRESS_PLACES = 4, 13
 """Points at which the stress is computed, the last ones, and places from the first to the last of them."""
 
-STENCIL = 9
+N_STENCIL_POINTS = 9
 """Samples of a polynomial: more of them, evenly spaced, swing beyond its ends."""
 
-_NODES = np.arange(float(STENCIL))
+_STENCIL_NODES = np.arange(float(N_STENCIL_POINTS))
 
-_SLOPE = differentiation(_NODES)
+_SLOPE_WEIGHTS = differentiation(_STENCIL_NODES)
 
-_NEWTON = 8
+_MAX_NEWTON_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -393,13 +395,13 @@ def stress_places(path: Path, spots: FloatArray) -> Watched:
     spots : (p,) array
         Places of these points in a variable in which the stress is smooth.
     """
-    sections, last = path.sections(STRIP), path.at_requested[-LAST:]
-    beam = path.network.beams[STRIP]
+    sections, last = path.sections(STRIP_BEAM), path.at_requested[-N_STRESS_POINTS:]
+    beam = path.network.beams[STRIP_BEAM]
     breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-12)]
     place = sections.place[0].reshape(-1, N_PLACES)
     tops = [_tops(sections.bending_stress[k], sections.axial_stress[k], place, breaks) for k in last]
-    between = interpolation(spots[-LAST:], np.linspace(spots[-LAST], spots[-1], BETWEEN))
+    between = interpolation(spots[-N_STRESS_POINTS:], np.linspace(spots[-N_STRESS_POINTS], spots[-1], N_STRESS_PLACES))
     return Watched(np.array([one[0] for one in tops]), np.array([one[1] for one in tops]), between)
 
 
@@ -411,11 +413,11 @@ def _tops(bending: FloatArray, axial: FloatArray, place: FloatArray, breaks: Flo
     shape: tuple[int, int] = place.shape[0], place.shape[1]
     stress = (np.abs(bending) + np.abs(axial)).reshape(shape)
     lines, best = np.arange(shape[0]), stress.argmax(axis=1)
-    first = np.clip(best - STENCIL // 2, 0, shape[1] - STENCIL)
-    rows = (lines * shape[1] + first)[:, None] + np.arange(STENCIL)
+    first = np.clip(best - N_STENCIL_POINTS // 2, 0, shape[1] - N_STENCIL_POINTS)
+    rows = (lines * shape[1] + first)[:, None] + np.arange(N_STENCIL_POINTS)
     bend, pull = (np.sign(part.reshape(shape)[lines, best])[:, None] for part in (bending, axial))
     near = bend * bending[rows] + pull * axial[rows]
-    weights = interpolation(_NODES, _top(near, best - first))
+    weights = interpolation(_STENCIL_NODES, _top(near, best - first))
     height = (weights * near).sum(axis=1)
     piece = np.searchsorted(breaks, place.mean(axis=1)) - 1
     chosen = [max(np.flatnonzero(piece == k), key=lambda line: height[line]) for k in range(len(breaks) - 1)]
@@ -427,12 +429,12 @@ def _tops(bending: FloatArray, axial: FloatArray, place: FloatArray, breaks: Flo
 
 def _top(near: FloatArray, best: Any) -> FloatArray:
     """Return where polynomials through nine values (n, 9) are highest beside their highest value; Newton's method."""
-    slope = near @ _SLOPE.T
-    curve = slope @ _SLOPE.T
-    low, high = np.maximum(best - 1.0, 0.0), np.minimum(best + 1.0, STENCIL - 1.0)
+    slope = near @ _SLOPE_WEIGHTS.T
+    curve = slope @ _SLOPE_WEIGHTS.T
+    low, high = np.maximum(best - 1.0, 0.0), np.minimum(best + 1.0, N_STENCIL_POINTS - 1.0)
     at: FloatArray = 0.5 * (low + high)
-    for _ in range(_NEWTON):
-        weights = interpolation(_NODES, at)
+    for _ in range(_MAX_NEWTON_STEPS):
+        weights = interpolation(_STENCIL_NODES, at)
         rise, bend = (weights * slope).sum(axis=1), (weights * curve).sum(axis=1)
         step = np.where(bend < 0, -rise / np.where(bend < 0, bend, -1.0), np.sign(rise))
         at = np.clip(at + step, low, high)

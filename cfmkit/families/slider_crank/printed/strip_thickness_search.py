@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, from_record, run_stage
+from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock, OneStart, Stage, from_record, run_stage
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.sqp_program import SMALL, Form, StripProgram
+from cfmkit.families.slider_crank.printed.sqp_program import MILLIMETRE, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.sqp_program import State, StripTask
 
 
-VIOLATION = 5e-3
+VIOLATION_TOL = 5e-3
 """Of a constraint that counts as none: 0.005 % of the force, 0.05 % of the stress allowed."""
 
 
@@ -34,7 +34,7 @@ def descend(
     bounds: FloatArray,
     steps: int = 100,
     tolerance: float = 1e-6,
-    clock: Clock = NEVER,
+    clock: Clock = UNLIMITED_CLOCK,
 ) -> Optimum:
     """Return where the steps from a start end.
 
@@ -54,35 +54,38 @@ def descend(
         When it is late, the search ends, too.
     """
     return minimize(
-        program, start, bounds, Effort(steps, tolerance, VIOLATION, clock.late, last=True, patience=PATIENCE)
+        program,
+        start,
+        bounds,
+        Effort(steps, tolerance, VIOLATION_TOL, clock.late, last=True, patience=MAX_IDLE_EVALUATIONS),
     )
 
 
-PATIENCE = 20
+MAX_IDLE_EVALUATIONS = 20
 """Evaluations without a smaller violation after which a search is stuck: two of the solver's line searches."""
 
-COARSE = 5
+N_COARSE_THICKNESSES = 5
 """Thicknesses of the first tapered strip; then twice as many intervals each time."""
 
-LOOSE = 0.01
+COARSE_RIPPLE = 0.01
 """Ripple within which the coarse strip is sought: few thicknesses cannot keep less."""
 
-SCATTER = 0.15
+START_DEVIATION = 0.15
 """Standard deviation of the logarithm of the thicknesses that other starts begin with."""
 
-SHORTEST = 2e-3
+MIN_BAND_LENGTH = 2e-3
 """Length of the band that is sought at least [m]."""
 
 MOST_RIPPLE = 100.0
 """Largest deviation from the force that a search for the smallest one considers [%]."""
 
-WIDEST, NARROWING = 0.1, 5
+MAX_BAND_WIDENING, N_NARROWING_STEPS = 0.1, 5
 """Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
 
-GUESS = 1e-3
+INITIAL_THICKNESS = 1e-3
 """Thickness of one that is searched, at first [m]."""
 
-_ROUNDS, _CLOSE = 12, 1e-10
+_MAX_ROUNDS, _STEP_RTOL = 12, 1e-10
 """Steps at most, of which strips of the shipped specifications need four to six, and how near the last two lie."""
 
 
@@ -104,7 +107,7 @@ class FoundStrip:
     ranges: Ranges
     program: StripProgram  # of the last search
     descent: Optimum  # its outcome
-    # that of one thickness, within `LOOSE` at least, for comparison; None if it has no equilibrium
+    # that of one thickness, within `COARSE_RIPPLE` at least, for comparison; None if it has no equilibrium
     uniform: Optimum | None
     lost: tuple[str, ...] = ()  # why processes died that searched from other starts
 
@@ -114,7 +117,7 @@ class FoundStrip:
         return self.descent.z[: self.form.size]
 
 
-def uniform_thickness(task: StripTask, width: float, guess: float = GUESS) -> float:
+def uniform_thickness(task: StripTask, width: float, guess: float = INITIAL_THICKNESS) -> float:
     """Return the thickness [m] with which a strip of one thickness has the force, on average of its extremes.
 
     The force follows the third power of the thickness but for stretching and shear: a few corrections do.
@@ -122,10 +125,10 @@ def uniform_thickness(task: StripTask, width: float, guess: float = GUESS) -> fl
     program = _of_one_thickness(task, width)
 
     def step(thickness: float) -> float | None:
-        state = program.state(np.array([thickness / SMALL, 1.0]))
+        state = program.state(np.array([thickness / MILLIMETRE, 1.0]))
         if state is None:
             return None
-        wanted = np.asarray(task.share(program.travel(np.array([thickness / SMALL, 1.0]))))
+        wanted = np.asarray(task.share(program.travel(np.array([thickness / MILLIMETRE, 1.0]))))
         return float((0.5 * task.force * (wanted.max() + wanted.min()) / _level(state)) ** (1.0 / 3.0))
 
     found = _iterate_thickness(step, guess)
@@ -144,7 +147,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
 
     def step(thickness: float) -> float | None:
         nonlocal width
-        state = _of_one_thickness(task, width).state(np.array([thickness / SMALL, 1.0]))
+        state = _of_one_thickness(task, width).state(np.array([thickness / MILLIMETRE, 1.0]))
         if state is None:
             return None
         factor = limit / _peak(state)
@@ -152,7 +155,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
         width /= factor**3
         return factor
 
-    thickness = _iterate_thickness(step, GUESS)
+    thickness = _iterate_thickness(step, INITIAL_THICKNESS)
     return None if thickness is None else (thickness, width)
 
 
@@ -165,25 +168,25 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
 
     def step(thickness: float) -> float | None:
         nonlocal worst
-        state = _of_one_thickness(task, width).state(np.array([thickness / SMALL, 1.0]))
+        state = _of_one_thickness(task, width).state(np.array([thickness / MILLIMETRE, 1.0]))
         if state is None:
             return None
         worst = _peak(state)
         return float((task.force / _level(state)) ** (1.0 / 3.0))
 
-    thickness = _iterate_thickness(step, GUESS)
+    thickness = _iterate_thickness(step, INITIAL_THICKNESS)
     return None if thickness is None else (thickness, worst)
 
 
 def _iterate_thickness(step: Callable[[float], float | None], guess: float) -> float | None:
     """Return the thickness [m] that steps from a guess lead to, each by a factor; None if there is no factor."""
     thickness = guess
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         factor = step(thickness)
         if factor is None:
             return None
         thickness *= factor
-        if abs(factor - 1.0) < _CLOSE:
+        if abs(factor - 1.0) < _STEP_RTOL:
             break
     return thickness
 
@@ -223,7 +226,7 @@ class StripStarts:
         if number:
             steps = (self.form.count,)
             drawn = np.random.default_rng(self.seed).standard_normal((number, self.form.count))[-1]
-            factors = np.exp(SCATTER * drawn)
+            factors = np.exp(START_DEVIATION * drawn)
         return _climb(self, steps, factors).descent
 
     def read(self, record: dict[str, Any]) -> FoundStrip:
@@ -233,7 +236,13 @@ class StripStarts:
 
 
 def search(
-    task: StripTask, form: Form, ranges: Ranges, starts: int, run: Run, identity: str = "", clock: Clock = NEVER
+    task: StripTask,
+    form: Form,
+    ranges: Ranges,
+    starts: int,
+    run: Run,
+    identity: str = "",
+    clock: Clock = UNLIMITED_CLOCK,
 ) -> FoundStrip | Design:
     """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
 
@@ -306,9 +315,9 @@ def _rank(descent: Optimum) -> tuple[bool, float]:
 
 def _ladder(form: Form) -> tuple[int, ...]:
     """Return the numbers of thicknesses that are gone through."""
-    if form.per_piece or form.shares or form.count <= COARSE:
+    if form.per_piece or form.shares or form.count <= N_COARSE_THICKNESSES:
         return (form.count,)
-    count, steps = COARSE, [COARSE]
+    count, steps = N_COARSE_THICKNESSES, [N_COARSE_THICKNESSES]
     while 2 * count - 1 < form.count:
         count = 2 * count - 1
         steps.append(count)
@@ -326,7 +335,7 @@ def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | Non
         own = len(x) - (form.size - form.count)
         x = np.concatenate([_refine_nodes(x[:own], count), x[own:]])
         coarse = count < steps[-1]
-        goal = replace(task, ripple=max(task.ripple, LOOSE)) if coarse else task
+        goal = replace(task, ripple=max(task.ripple, COARSE_RIPPLE)) if coarse else task
         program = StripProgram(goal, now)
         bounds = _bounds(task, ranges, form, count)
         begin = np.append(x, last) if program.extra else x
@@ -345,9 +354,9 @@ def _tighten_band(start: StripStarts) -> FoundStrip | None:
     """
     task, form, ranges, uniform = start.task, start.form, start.ranges, start.uniform
     x, last = _begin(task, form, ranges, uniform, form.count)
-    missed = 0.0 if uniform is None else min(0.01 * uniform.violation, WIDEST)
-    loose = max(task.ripple, LOOSE) + missed
-    for ripple in np.geomspace(loose, task.ripple, NARROWING):
+    missed = 0.0 if uniform is None else min(0.01 * uniform.violation, MAX_BAND_WIDENING)
+    loose = max(task.ripple, COARSE_RIPPLE) + missed
+    for ripple in np.geomspace(loose, task.ripple, N_NARROWING_STEPS):
         program = StripProgram(replace(task, ripple=float(ripple)), form)
         begin = np.append(x, last)
         descent = descend(program, begin, _bounds(task, ranges, form, form.count), clock=start.clock)
@@ -390,16 +399,20 @@ def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArr
     rows = np.concatenate([thickness, own[form.count :]])
     if task.goal == "rms":
         return rows
-    goal = [100.0 * (task.start + SHORTEST), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, MOST_RIPPLE]
+    goal = (
+        [100.0 * (task.start + MIN_BAND_LENGTH), 100.0 * ranges.longest]
+        if task.goal == "stroke"
+        else [1e-3, MOST_RIPPLE]
+    )
     return np.concatenate([rows, [goal]])
 
 
 def _uniform(task: StripTask, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
     """Return the best strip of one thickness."""
     own = ranges.form
-    width = form.width or float(own[-1].mean()) * SMALL
-    first = uniform_thickness(task, width, float(own[0].mean()) * SMALL) / SMALL
-    program = StripProgram(replace(task, ripple=max(task.ripple, LOOSE)), Form(1, width=width))
+    width = form.width or float(own[-1].mean()) * MILLIMETRE
+    first = uniform_thickness(task, width, float(own[0].mean()) * MILLIMETRE) / MILLIMETRE
+    program = StripProgram(replace(task, ripple=max(task.ripple, COARSE_RIPPLE)), Form(1, width=width))
     last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
     bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
     start = np.array([first, *last]) if program.extra else np.array([first])
@@ -432,7 +445,7 @@ def infeasible(found: FoundStrip) -> Design:
         name = "design.force" if flat else "design.tolerance"
         nearest[name] = newton(task.sum_over_sets(level)) if flat else format_short(off, "ratio")
     worst = float(state.stress.max())
-    if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
+    if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION_TOL):
         missed.append(f"has a stress of {mpa(worst)}")
         nearest["allowable stress"] = mpa(worst)
     text = (

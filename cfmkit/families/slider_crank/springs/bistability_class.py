@@ -38,15 +38,17 @@ if TYPE_CHECKING:
     Ends = tuple[FloatArray, ...]
 
 
-CLASSES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")
+CLASS_NAMES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")
 """The classes; a curve's class is an index."""
 
-POSITIVE, ZERO, NEGATIVE, SNAPS, BISTABLE, TRISTABLE = range(len(CLASSES))
+POSITIVE_CLASS, ZERO_CLASS, NEGATIVE_CLASS, SNAP_THROUGH_CLASS, BISTABLE_CLASS, TRISTABLE_CLASS = range(
+    len(CLASS_NAMES)
+)
 
-ROUNDING = 1e-11
+EFFORT_RTOL = 1e-11
 """An effort so small, as a fraction of the largest, is zero; a fall so small, as a fraction of the peak, none."""
 
-BOUNDARY = 1e-3
+DROP_TOL = 1e-3
 """A drop so near to 1 may be on either side of it in a mechanism that is made."""
 
 
@@ -54,7 +56,7 @@ BOUNDARY = 1e-3
 class Classified(ShortRepr):
     """The classes of m curves."""
 
-    kind: NDArray[np.intp]  # (m,), index into `CLASSES`
+    kind: NDArray[np.intp]  # (m,), index into `CLASS_NAMES`
     drop: (
         FloatArray  # (m,), D, the largest fall after a peak as a fraction of it; from 1 on a second equilibrium exists
     )
@@ -85,9 +87,9 @@ def classify(
     falls = drop > 0.0
     if window is not None:
         falls = falls | _constant(curves, window, tolerance)
-    kind = np.where(drop > 2.0 * tolerance[:, 0], NEGATIVE, np.where(falls, ZERO, POSITIVE))
-    kind = np.where(unstable > 0, SNAPS, kind)
-    kind = np.where(stable == 2, BISTABLE, np.where(stable > 2, TRISTABLE, kind))
+    kind = np.where(drop > 2.0 * tolerance[:, 0], NEGATIVE_CLASS, np.where(falls, ZERO_CLASS, POSITIVE_CLASS))
+    kind = np.where(unstable > 0, SNAP_THROUGH_CLASS, kind)
+    kind = np.where(stable == 2, BISTABLE_CLASS, np.where(stable > 2, TRISTABLE_CLASS, kind))
     return Classified(kind, drop, stable, unstable)
 
 
@@ -107,15 +109,15 @@ def _drop(walk: FloatArray) -> FloatArray:
         peak = np.fmax.accumulate(walk, axis=1)
         fall = np.where(peak > 0.0, 1.0 - walk / peak, 0.0)
     drop = np.fmax.reduce(fall, axis=1, initial=0.0)
-    return np.where(drop > ROUNDING, drop, 0.0)
+    return np.where(drop > EFFORT_RTOL, drop, 0.0)
 
 
 def signs(curves: Monotone, start: FloatArray) -> NDArray[np.int8]:
     """Return the signs of the efforts, (m, k): 0 in the unloaded position and where only rounding is left."""
     scale = np.nanmax(np.abs(curves.value), axis=1, initial=0.0, keepdims=True)
     sign = np.sign(curves.value).astype(np.int8)
-    near = ROUNDING * np.maximum(np.ptp(curves.place, axis=1, keepdims=True), 1e-300)
-    sign[(np.abs(curves.value) <= ROUNDING * scale) | (np.abs(curves.place - start) <= near)] = 0
+    near = EFFORT_RTOL * np.maximum(np.ptp(curves.place, axis=1, keepdims=True), 1e-300)
+    sign[(np.abs(curves.value) <= EFFORT_RTOL * scale) | (np.abs(curves.place - start) <= near)] = 0
     return sign
 
 
@@ -142,7 +144,7 @@ def _fill_zeros(sign: NDArray[np.int8]) -> NDArray[np.int8]:
     return np.where(filled == 0, opening, filled)
 
 
-SAMPLES, AROUND = 1001, 101
+N_SAMPLES, N_CLOSER_SAMPLES = 1001, 101
 """Places of the first look, and of each closer one around the highest of them."""
 
 
@@ -161,13 +163,13 @@ def scale_factors(assembly: Assembly, low: Any, high: Any) -> Ends:
     rates = assembly.rates.reshape(4, -1)
     none = ~rates[:3].any(axis=0) | (rates[3] == 0.0)
 
-    def needed(unit: FloatArray, sign: FloatArray | float) -> FloatArray:
+    def compute_factor(unit: FloatArray, sign: FloatArray | float) -> FloatArray:
         unit = assembly.rates_over(unit) * unit
         return _required_factor(unit[:3].sum(axis=0), unit[3], sign)
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        first = _highest(lambda motion: needed(assembly.forces(motion), motion - assembly.start), low, high)
-        second = _highest(lambda motion: needed(assembly.units(motion).stiffness, 1.0), low, high)
+        first = _highest(lambda motion: compute_factor(assembly.forces(motion), motion - assembly.start), low, high)
+        second = _highest(lambda motion: compute_factor(assembly.units(motion).stiffness, 1.0), low, high)
     return Several((np.where(none, np.nan, first), np.where(none, np.nan, second)))
 
 
@@ -182,14 +184,14 @@ def _highest(function: Callable[[FloatArray], FloatArray], low: Any, high: Any) 
     """Return the largest value in each interval: on a grid, then on ever finer ones around its highest place, (m,)."""
     low, high = np.reshape(low, (-1, 1)), np.reshape(high, (-1, 1))
     best = np.full(1, -np.inf)
-    for count in (SAMPLES, AROUND, AROUND, AROUND):
+    for count in (N_SAMPLES, N_CLOSER_SAMPLES, N_CLOSER_SAMPLES, N_CLOSER_SAMPLES):
         step = (high - low) / (count - 1)
         places = low + step * np.arange(count)
         values = function(places)
         top = values.argmax(axis=1)[:, None]
         here = np.take_along_axis(np.broadcast_to(places, values.shape), top, 1)
         found = np.take_along_axis(values, top, 1)[:, 0]
-        best = np.where(np.isinf(best) & (count < SAMPLES), best, found)
+        best = np.where(np.isinf(best) & (count < N_SAMPLES), best, found)
         low, high = np.maximum(low, here - step), np.minimum(high, here + step)
     return np.where(np.isfinite(best), np.maximum(best, 0.0), best)
 

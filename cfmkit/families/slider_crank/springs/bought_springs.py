@@ -22,7 +22,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import minimax, ranges
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.spec import Bought
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.made_to_measure import PIN_SHARE
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, guide_rod_for, nearest
@@ -39,10 +39,10 @@ if TYPE_CHECKING:
     from cfmkit.stock.material_and_part_spec import Pins
 
 
-PLACES = 41
+N_BOUND_PLACES = 41
 """Places of the window that bounds are taken from; sets themselves are judged at all places."""
 
-SLACK = 1e-9
+BOUND_RTOL = 1e-9
 """Bounds are wider by this share: rounding must not leave a set out."""
 
 
@@ -65,7 +65,7 @@ def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> 
     """
     if any(not len(one) for one in offered):
         return []
-    few = goal.select_rows(np.unique(np.linspace(0, len(goal.wanted) - 1, PLACES).round().astype(int)))
+    few = goal.select_rows(np.unique(np.linspace(0, len(goal.wanted) - 1, N_BOUND_PLACES).round().astype(int)))
     # limits of single rates are those of what is offered
     search = _Sets(goal, replace(few, upper=np.full(len(offered), np.inf), lower=None), count)
     search.begin(offered)
@@ -94,7 +94,7 @@ class SpringOption:
                 guides = offer.guide_rod is not None and offer.guide_rod >= offer.wound.thinnest_guide_rod
                 about["guide_rod"] = (offer.guide_rod if guides else guide_rod_for(offer.wound)) if needed else None
         return Bought.model_validate(
-            {"at": JOINTS[self.joint], "name": self.offer.name, "count": self.count}
+            {"at": JOINT_NAMES[self.joint], "name": self.offer.name, "count": self.count}
             | {key: value for key, value in about.items() if value is not None}
         )
 
@@ -106,7 +106,7 @@ class SpringOption:
     @property
     def label(self) -> str:
         """Number, name and joint."""
-        return f"{self.count} x {self.offer.name} at the {JOINTS[self.joint].replace('_', ' ')}"
+        return f"{self.count} x {self.offer.name} at the {JOINT_NAMES[self.joint].replace('_', ' ')}"
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def least_deviation(task: SpringTask, goal: RateGoal, window: tuple[float, float
 
 def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[Chosen]:
     """Return the sets of options that hold the target best."""
-    least = np.zeros(len(JOINTS)) if goal.lower is None else goal.lower
+    least = np.zeros(len(JOINT_NAMES)) if goal.lower is None else goal.lower
     at = [_by_rate(options, joint, low) for joint, low in enumerate(least.tolist())]
     found = best_sets(goal, [np.array(sorted(one)) for one in at], count)
     return [
@@ -193,7 +193,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
     high, low = (turns[:, 0] for turns in MotionExtremes(assembly, *ends).turns)
     usable: list[SpringOption] = []
     refused: list[Miss] = []
-    for joint, name in enumerate(JOINTS):
+    for joint, name in enumerate(JOINT_NAMES):
         if name not in wanted.springs:
             continue
         kinds = ("torsion",) if joint < 3 else ("extension", "compression")
@@ -264,7 +264,7 @@ class _Sets:
         """Take those of some sets (k, m) that are among the best."""
         if self.goal.least is not None:
             row, least = self.goal.least
-            sets = sets[sets @ row >= least - SLACK * abs(least)]
+            sets = sets[sets @ row >= least - BOUND_RTOL * abs(least)]
         if not len(sets):
             return
         off = np.abs(sets @ self.goal.matrix.T - self.goal.wanted).max(axis=1)
@@ -302,7 +302,7 @@ class _Sets:
         if not np.isfinite(self.bound):
             return offered
         ends = np.array([[one[0], one[-1]] for one in offered])
-        worst = self.bound * (1 + SLACK) + 1e-12
+        worst = self.bound * (1 + BOUND_RTOL) + 1e-12
         found = ranges(replace(self.few, lower=ends[:, 0], upper=ends[:, 1]), worst)
         if np.isnan(found).any():
             return [one[:0] for one in offered]
@@ -318,7 +318,7 @@ class _Sets:
         base = self.few.matrix @ fixed - self.few.wanted + np.outer(own, self.few.matrix[:, first])
         column = self.few.matrix[:, second]
         for k in np.argsort(np.abs(base).min(axis=1), kind="stable").tolist():
-            low, high = _interval(base[k], column, self.bound * (1 + SLACK) + 1e-12)
+            low, high = _interval(base[k], column, self.bound * (1 + BOUND_RTOL) + 1e-12)
             mates = other[(other >= low) & (other <= high)]
             if len(mates):
                 sets = np.tile(fixed, (len(mates), 1))

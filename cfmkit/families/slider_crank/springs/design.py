@@ -38,11 +38,11 @@ from cfmkit.families.slider_crank.springs.design_outcome import (
     too_far,
 )
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import choose_preferred, least_squares, minimax, ranges
-from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE, FREE, task_of, with_lengths
+from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS, N_WINDOW_PLACES, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
-from cfmkit.families.slider_crank.springs.solution import EDGE
-from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, default_motion
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.springs.solution import BAND_EDGE_FACTOR
+from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN, default_motion
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, format_short
@@ -56,13 +56,13 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
-HOPELESS = 0.5
+MAX_DEVIATION = 0.5
 """Springs that miss the target by more are no design, even where no tolerance is stated."""
 
-NEXT = 4
+N_NEXT_SETS = 4
 """Sets of bought springs that are tried where the best one does not have the yield."""
 
-EFFORT = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
+GRID_SIZES = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
 
 
@@ -88,7 +88,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     solved, search = _search_lengths(spec, wanted, run)
     solved = _compensate_friction(solved)
     found = _make_design(solved, search)
-    others = range(NEXT if solved.bought else 0)
+    others = range(N_NEXT_SETS if solved.bought else 0)
     return replace(found, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
 
 
@@ -96,7 +96,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
 def _with_next(solved: Solved, rank: int) -> Design:
     """Return the design with springs that are not the best of the catalogue, with the same lengths."""
     goal = solved.task.goal(solved.window, _places(solved.task.wanted))
-    sets = [] if goal is None else next_sets(solved.task, goal, solved.window, NEXT)
+    sets = [] if goal is None else next_sets(solved.task, goal, solved.window, N_NEXT_SETS)
     if goal is None or rank >= len(sets):
         return no_design(finding("no_spring_fits", "no other springs of the catalogue hold the target"))
     one = sets[rank]
@@ -122,7 +122,7 @@ def _make_design(solved: Solved, search: Lowest | None) -> Design:
     )
 
 
-ROUNDS = 40
+MAX_ROUNDS = 40
 """Rounds in which springs and the friction that they cause are fitted to each other; some 10 are enough."""
 
 
@@ -131,7 +131,7 @@ def _compensate_friction(solved: Solved) -> Solved:
     task = solved.task
     if task.wanted.branch is None or not task.assembly.rubbing.there:
         return solved
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         again = solve(replace(task, rates=solved.rates))
         change = np.abs(again.rates - solved.rates).max()
         solved = again
@@ -152,19 +152,19 @@ def _keep_if_audited(solved: Solved) -> Solved:
         If a given window does not allow it.
     """
     tolerance = solved.task.wanted.tolerance
-    if tolerance is None or not solved.exact or solved.deviation <= tolerance * EDGE:
+    if tolerance is None or not solved.exact or solved.deviation <= tolerance * BAND_EDGE_FACTOR:
         return solved
     if solved.task.wanted.window is None:
         again = solve(solved.task, tolerance * tolerance / solved.deviation)
         again = audit(again, _write_springs(again))
-        if again.deviation <= tolerance * EDGE:
+        if again.deviation <= tolerance * BAND_EDGE_FACTOR:
             return again
     raise Infeasible(*too_far(solved.task, solved.deviation))
 
 
 def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
     """Return the best design, and the search that led to its lengths."""
-    given = {name: ends for name in FREE if (ends := getattr(wanted, name)) is not None}
+    given = {name: ends for name in FREE_LENGTH_KEYS if (ends := getattr(wanted, name)) is not None}
     axes = {name: BoxAxis(low, high, log=name != "offset") for name, (low, high) in given.items()}
     if not axes:
         return solve(task_of(spec)), None
@@ -179,7 +179,7 @@ def _search_lengths(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tup
         best = min(best, value)
         return value
 
-    grid, fine = EFFORT["widest" if wanted.window is None else wanted.objective]
+    grid, fine = GRID_SIZES["widest" if wanted.window is None else wanted.objective]
     found = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
     if not math.isfinite(found.value):
         names = " or ".join(f"'design.{name}'" for name in axes)
@@ -222,7 +222,7 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> fl
 
 def _places(wanted: CrankDesign) -> int | None:
     """Return at how many places of the window springs are chosen; None: as many as a search takes."""
-    return None if wanted.objective == "least-squares" else DENSE
+    return None if wanted.objective == "least-squares" else N_WINDOW_PLACES
 
 
 def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
@@ -249,7 +249,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
         raise Infeasible(finding("infeasible_targets", text))
     if wanted.catalogue:
         picked = choose(task, goal, window)
-        if picked.deviation > HOPELESS and wanted.tolerance is None:
+        if picked.deviation > MAX_DEVIATION and wanted.tolerance is None:
             raise Infeasible(hopeless(task, picked.deviation))
         rms, places = goal.rms(picked.rates), len(goal.wanted)
         return Solved(task, window, picked.rates, picked.deviation, rms, proven, places, bought=picked.options)
@@ -261,7 +261,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     if wanted.slack:
         rates = chosen_rates(goal, rates, wanted, tolerance or wanted.tolerance)
     deviation = goal.deviation(rates)
-    if deviation > HOPELESS and wanted.tolerance is None:
+    if deviation > MAX_DEVIATION and wanted.tolerance is None:
         raise Infeasible(hopeless(task, deviation))
     if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
         raise Infeasible(*too_far(task, deviation))
@@ -271,7 +271,7 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
 def _write_springs(solved: Solved) -> SliderCrankSpec:
     """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
     spec, wanted = resolve(solved.task.spec), solved.task.wanted
-    rates = dict(zip(JOINTS, solved.rates.tolist(), strict=True))
+    rates = dict(zip(JOINT_NAMES, solved.rates.tolist(), strict=True))
     anchor = {"anchor": spec.mechanism.springs.anchor or 0.0} if wanted.anchor_travel is not None else {}
     bought = {"bought": tuple(option.written for option in solved.bought)}
     springs = spec.mechanism.springs.model_copy(update=rates | anchor | bought)
@@ -304,8 +304,8 @@ def _motion_to_show(solved: Solved) -> dict[str, tuple[float, float]]:
     low, high = asked or default_motion(solved.task.assembly)
     if low <= solved.window[0] and solved.window[1] <= high:
         return {}
-    if asked is None and high - low >= TURN and solved.window[1] <= low:
-        return {name: (low - TURN, low)}
+    if asked is None and high - low >= FULL_TURN and solved.window[1] <= low:
+        return {name: (low - FULL_TURN, low)}
     return {name: (min(low, solved.window[0]), max(high, solved.window[1]))}
 
 
@@ -314,7 +314,7 @@ def _reference(solved: Solved) -> float:
     from cfmkit.numerics.roots import bracketed_root
 
     low, high = solved.window
-    places = np.linspace(low, high, DENSE)
+    places = np.linspace(low, high, N_WINDOW_PLACES)
     if solved.task.wanted.curve is not None:
         return 0.5 * (low + high)
     legs, target = solved.task.spec.mechanism.sets, solved.task.wanted.size
@@ -325,20 +325,20 @@ def _reference(solved: Solved) -> float:
         return 0.5 * (low + high)
     at = int(change[np.argmin(np.abs(places[change] - 0.5 * (low + high)))])
 
-    def off(motion: float) -> float:
+    def measure_error(motion: float) -> float:
         return float(solved.rates @ unit.units(np.array([motion])).effort[:, 0]) * legs - target
 
-    return bracketed_root(off, float(places[at]), float(places[at + 1]))
+    return bracketed_root(measure_error, float(places[at]), float(places[at + 1]))
 
 
-NEGLIGIBLE = 5e-4
+DEVIATION_TOL = 5e-4
 """More deviation, as a fraction of the target, that nobody would notice: such designs are reported as equals."""
 
-WITHIN = 1e-3
+TOLERANCE_RESERVE = 1e-3
 """Share of the tolerance that preferred rates keep in reserve: between the places of the search they deviate more, by
 some 1e-5 of the tolerance."""
 
-PLACES = 60
+N_PROGRAMME_PLACES = 60
 """Places of the window for the programmes that say how far the rates may move."""
 
 
@@ -350,7 +350,9 @@ def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign, toleranc
     if wanted.prefer == "small-rotation":  # a matter of lengths only
         return best
     least, most = goal.deviation(best), math.inf if tolerance is None else tolerance
-    found = choose_preferred(goal, min(least + wanted.slack, max(least, most * (1.0 - WITHIN))), wanted.prefer)
+    found = choose_preferred(
+        goal, min(least + wanted.slack, max(least, most * (1.0 - TOLERANCE_RESERVE))), wanted.prefer
+    )
     return best if found is None or goal.deviation(found) > max(least, most) else found
 
 
@@ -369,7 +371,7 @@ def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> 
         return task_of(with_lengths(spec, dict(zip(names, place, strict=True))))
 
     if tolerance is not None:
-        good = [place for place in good if _deviation(task(place), window) <= tolerance * (1.0 - WITHIN)]
+        good = [place for place in good if _deviation(task(place), window) <= tolerance * (1.0 - TOLERANCE_RESERVE)]
     return min([search.place, *good], key=lambda place: task(place).rotation(window))
 
 
@@ -393,7 +395,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     if not reported:
         return ()
     wanted = solved.task.wanted
-    extra = max(wanted.slack, NEGLIGIBLE)
+    extra = max(wanted.slack, DEVIATION_TOL)
     cure = "" if wanted.slack else "; 'design.slack' and 'design.prefer' choose among them"
     text = f"many designs deviate by at most another {100 * extra:.2g} % of the target: {'; '.join(reported)}{cure}"
     return (finding("near_optima", text),)
@@ -401,15 +403,15 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
 
 def _of_rates(solved: Solved) -> str:
     """Return the range of each rate with nearly the same deviation; empty if all are well determined."""
-    goal = solved.task.goal(solved.window, PLACES)
+    goal = solved.task.goal(solved.window, N_PROGRAMME_PLACES)
     if goal is None:
         return ""
-    span = ranges(goal, goal.deviation(solved.rates) + max(solved.task.wanted.slack, NEGLIGIBLE))
+    span = ranges(goal, goal.deviation(solved.rates) + max(solved.task.wanted.slack, DEVIATION_TOL))
     if np.isnan(span).any():
         return ""
     wide = span[:, 1] - span[:, 0] > 0.2 * np.maximum(solved.rates, 1e-300)
     reported = []
-    for k, name in enumerate(JOINTS):
+    for k, name in enumerate(JOINT_NAMES):
         if name in solved.task.wanted.springs and wide[k] and math.isfinite(span[k, 1]):
             dimension = "stiffness" if name == "slider" else "rotational_stiffness"
             low, high = (format_short(float(end), dimension) for end in span[k])
@@ -422,10 +424,10 @@ def _of_lengths(solved: Solved, search: Lowest | None) -> str:
     wanted = solved.task.wanted
     if search is None or wanted.window is None:
         return ""
-    good = [place[0] for place, value in search.profile if value <= search.value + max(wanted.slack, NEGLIGIBLE)]
+    good = [place[0] for place, value in search.profile if value <= search.value + max(wanted.slack, DEVIATION_TOL)]
     if len(good) < 2:
         return ""
-    name = next(name for name in FREE if getattr(wanted, name) is not None)
+    name = next(name for name in FREE_LENGTH_KEYS if getattr(wanted, name) is not None)
     dimension = "angle" if name == "unloaded_offset" else "length"
     low, high = (format_short(end, dimension) for end in (min(good), max(good)))
     return f"{name.replace('_', ' ')} {low} to {high}"

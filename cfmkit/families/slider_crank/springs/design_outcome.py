@@ -11,9 +11,9 @@ from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
-from cfmkit.families.slider_crank.springs.rate_fit_task import FREE
+from cfmkit.families.slider_crank.springs.rate_fit_task import FREE_LENGTH_KEYS
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -165,11 +165,11 @@ def too_far(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]
 def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
     """Return the paths of the design whose limit is reached."""
     active = []
-    for name in FREE:
+    for name in FREE_LENGTH_KEYS:
         ends = getattr(wanted, name)
         if ends is not None and getattr(solved.task.spec.mechanism, name) in ends:
             active.append(f"design.{name}")
-    for name, rate in zip(JOINTS, solved.rates.tolist(), strict=True):
+    for name, rate in zip(JOINT_NAMES, solved.rates.tolist(), strict=True):
         cap = None if wanted.max_rates is None else getattr(wanted.max_rates, name)
         if cap and rate >= cap * (1 - 1e-9):
             active.append(f"design.max_rates.{name}")
@@ -181,7 +181,9 @@ def describe_springs(solved: Solved) -> tuple[Finding, ...]:
     found, wanted = [], solved.task.wanted
     if solved.bought:
         return ()  # which joint gets none is the choice of the catalogue's springs
-    gone = [name for name, rate in zip(JOINTS, solved.rates, strict=True) if rate == 0.0 and name in wanted.springs]
+    gone = [
+        name for name, rate in zip(JOINT_NAMES, solved.rates, strict=True) if rate == 0.0 and name in wanted.springs
+    ]
     if gone:
         names = " and ".join(name.replace("_", " ") for name in gone)
         found.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE
+from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE_CLASS
 from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.part import bodies
 from cfmkit.families.slider_crank.springs.part import joints as joints_at
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -25,13 +25,13 @@ from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.style import (
-    BLUE,
-    BROWN,
-    GREY,
-    INK,
-    OCHRE,
-    PURPLE,
-    VERMILLION,
+    LINE_BLUE,
+    LINE_BROWN,
+    LINE_PURPLE,
+    LINE_VERMILLION,
+    SPRING_OCHRE,
+    TEXT_GREY,
+    TEXT_INK,
     apply_style,
     axes_mm,
     is_plain,
@@ -159,7 +159,7 @@ def torsion_spring(joint: Point, direction: float, radius: float) -> FloatArray:
 STACK_BELOW = 0.55
 """Mechanisms less high than this fraction of their width are drawn below each other, not side by side."""
 
-COLOURS = (BLUE, VERMILLION, PURPLE, BROWN)
+SPRING_COLOURS = (LINE_BLUE, LINE_VERMILLION, LINE_PURPLE, LINE_BROWN)
 """Of the springs, in the order of the joints."""
 
 
@@ -206,16 +206,16 @@ def _kind(solution: Solution) -> str:
 
 def _band(ax: Axes, solution: Solution) -> None:
     """Shade the constant band and name it; of a mechanism that snaps through it says nothing."""
-    if is_plain() or np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE:
+    if is_plain() or np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE_CLASS:
         return
     dimension = motion_scale(solution).dimension
     low, high = (float(to_border(float(end[0]), dimension)) for end in solution.band)
-    ax.axvspan(low, high, color=BLUE, alpha=0.10, linewidth=0, zorder=0.5, gid="no-obstacle")
+    ax.axvspan(low, high, color=LINE_BLUE, alpha=0.10, linewidth=0, zorder=0.5, gid="no-obstacle")
     width = value_text(float(solution.band[1][0] - solution.band[0][0]), dimension)
     text = f"within {100.0 * solution.tolerance[0, 0]:g} %: {width}"
     floor, ceiling = ax.get_ylim()
     places = np.column_stack([np.full(40, 0.5 * (low + high)), np.linspace(floor, ceiling, 42)[1:-1]])
-    place_labels(ax, [Label(text, BLUE, places, prefer=0.12)])
+    place_labels(ax, [Label(text, LINE_BLUE, places, prefer=0.12)])
 
 
 def _equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], float]) -> None:
@@ -225,9 +225,9 @@ def _equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], f
         x, y = float(to_border(item.motion, dimension)), height(item.motion, item.energy)
         if not ax.get_ylim()[0] <= y <= ax.get_ylim()[1]:
             continue
-        face = INK if item.stable else "white"
+        face = TEXT_INK if item.stable else "white"
         ax.plot(
-            [x], [y], marker="o", markersize=5, color=INK, markerfacecolor=face,
+            [x], [y], marker="o", markersize=5, color=TEXT_INK, markerfacecolor=face,
             linestyle="", zorder=5, clip_on=False, gid="stable" if item.stable else "unstable",
         )  # fmt: skip
 
@@ -238,11 +238,11 @@ def energy(result: Result) -> Figure:
     solution: Solution = result.state
     rates = solution.assembly.rates
     shares = 0.5 * rates[:, None] * solution.units.turn[:, 0] ** 2
-    series = [Series(solution.energy[0], "all springs", INK, prefer=0.75)]
+    series = [Series(solution.energy[0], "all springs", TEXT_INK, prefer=0.75)]
     if (rates > 0.0).sum() > 1:
         series += [
-            Series(shares[k], name.replace("_", " "), COLOURS[k], dashed=True, prefer=0.9 - 0.1 * k)
-            for k, name in enumerate(JOINTS)
+            Series(shares[k], name.replace("_", " "), SPRING_COLOURS[k], dashed=True, prefer=0.9 - 0.1 * k)
+            for k, name in enumerate(JOINT_NAMES)
             if rates[k] > 0.0
         ]
     diagram = Diagram(solution.motion[0], motion_scale(solution), Scale("energy", "energy"), series)
@@ -257,7 +257,7 @@ def _name_wells(ax: Axes, solution: Solution) -> None:
     for item in solution.equilibria:
         place = float(to_border(item.motion, dimension)), float(to_border(item.energy, "energy"))
         text = f"{'stable' if item.stable else 'unstable'} pose at {value_text(item.motion, dimension)}"
-        found.append(Label(text, INK if item.stable else GREY, np.array([place]), toward=(0.0, 1.0)))
+        found.append(Label(text, TEXT_INK if item.stable else TEXT_GREY, np.array([place]), toward=(0.0, 1.0)))
     place_labels(ax, found)
 
 
@@ -268,13 +268,13 @@ def springs(result: Result) -> Figure:
     drive, over = solution.drive, motion_scale(solution)
     there = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
     series = [
-        Series(solution.shares[k, 0], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.9 - 0.12 * n)
+        Series(solution.shares[k, 0], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.9 - 0.12 * n)
         for n, k in enumerate(there)
     ]
     if len(there) > 1:
-        series.insert(0, Series(solution.effort[0], "all springs", INK, prefer=0.7))
+        series.insert(0, Series(solution.effort[0], "all springs", TEXT_INK, prefer=0.7))
     rate = "rotational_stiffness" if drive == "torque" else "stiffness"
-    slope = [Series(solution.stiffness[0], "", INK)]
+    slope = [Series(solution.stiffness[0], "", TEXT_INK)]
     upper = Diagram(solution.motion[0], over, Scale(f"{drive} of a spring", drive), series)
     lower = Diagram(solution.motion[0], over, Scale("stiffness", rate), slope, [Limit(0.0, "zero stiffness")])
     heading = Heading.from_result(result, f"what each spring adds to the {drive}, and the slope of all")
@@ -286,12 +286,14 @@ def joints(result: Result) -> Figure:
     """Return how far each joint turns, against its limit, and the forces inside."""
     solution: Solution = result.state
     turn, over = solution.units.turn[:, 0], motion_scale(solution)
-    series = [Series(turn[k], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.85 - 0.15 * k) for k in range(3)]
-    limits = [limit for name in JOINTS[:3] for limit in limits_on(result, f"{name}_rotation_max")]
+    series = [
+        Series(turn[k], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.85 - 0.15 * k) for k in range(3)
+    ]
+    limits = [limit for name in JOINT_NAMES[:3] for limit in limits_on(result, f"{name}_rotation_max")]
     coupler, guide = (force[0] for force in solution.reactions)
     forces = [
-        Series(coupler, "along the coupler, tension", BLUE),
-        Series(guide, "on the guide", VERMILLION, prefer=0.8),
+        Series(coupler, "along the coupler, tension", LINE_BLUE),
+        Series(guide, "on the guide", LINE_VERMILLION, prefer=0.8),
     ]
     diagrams = [
         Diagram(solution.motion[0], over, Scale("rotation", "angle"), series, limits),
@@ -311,7 +313,7 @@ def linkage(result: Result) -> Figure:
     stacked = slender < STACK_BELOW
     size = (138.0, 138.0 * slender) if stacked else (43.5, min(43.5 * slender, 90.0))
     rows = len(keys) if stacked else 1
-    figure = new_figure(160.0, 12.0 + rows * (size[1] + parts.TITLE) + KEY_ROOM + heading.height_mm)
+    figure = new_figure(160.0, 12.0 + rows * (size[1] + parts.TITLE_HEIGHT) + KEY_ROOM + heading.height_mm)
     write_heading(figure, heading)
     panels = parts.panels(figure, size, [key.title(solution) for key in keys], stacked)
     for number, (ax, key) in enumerate(zip(panels, keys, strict=True)):
@@ -321,7 +323,7 @@ def linkage(result: Result) -> Figure:
         ax.set_xlabel("x [mm]" if not stacked or last else "")
         ax.set_ylabel("y [mm]" if stacked or number == 0 else "")
     place_labels(panels[0], _names(solution, keys[0], view))
-    _key_curve(figure, result, keys, (17.0, 20.0 + rows * (size[1] + parts.TITLE), 138.0, KEY_ROOM - 12.0))
+    _key_curve(figure, result, keys, (17.0, 20.0 + rows * (size[1] + parts.TITLE_HEIGHT), 138.0, KEY_ROOM - 12.0))
     return figure
 
 
@@ -339,8 +341,8 @@ def _key_curve(
             float(to_border(key.motion, dimension)),
             float(to_border(solution.frictionless(np.array([[key.motion]]))[0], drive)),
         )
-        ax.plot(*[[value] for value in place], marker="o", markersize=4, color=VERMILLION, linestyle="", zorder=5)
-        names.append(Label(key.name, VERMILLION, np.array([place]), toward=(0.0, 1.0)))
+        ax.plot(*[[value] for value in place], marker="o", markersize=4, color=LINE_VERMILLION, linestyle="", zorder=5)
+        names.append(Label(key.name, LINE_VERMILLION, np.array([place]), toward=(0.0, 1.0)))
     place_labels(ax, names)
 
 
@@ -349,11 +351,11 @@ def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: PanelView
     """Draw the linkage at one place of its motion; return the axes, which are in millimetres."""
     link, rates, size = solution.assembly.linkage, solution.assembly.rates, view.size
     pin, end = key.crank_pin, key.slider_pin
-    ax.axhline(float(parts.mm(link.offset)), color=GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1, gid="guide")
+    ax.axhline(float(parts.mm(link.offset)), color=TEXT_GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1, gid="guide")
     if rates[3] > 0.0:
         parts.spring(ax, end, (view.wall, link.offset), 0.5 * size, "spring-slider")
         wall = np.array([[view.wall, link.offset - size], [view.wall, link.offset + size]])
-        parts.edge(ax, wall, "wall", color=INK, linewidth=1.6)
+        parts.edge(ax, wall, "wall", color=TEXT_INK, linewidth=1.6)
     parts.slider(ax, end, 0.9 * size)
     parts.link(ax, (0.0, 0.0), pin, "crank")
     parts.link(ax, pin, end, "coupler")
@@ -361,7 +363,9 @@ def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: PanelView
     parts.plate(ax, [base], "ground")
     for rate, joint, direction in zip(rates[:3], key.joints, key.directions, strict=True):
         if rate > 0.0:
-            parts.edge(ax, torsion_spring(joint, direction, 0.55 * size), "torsion-spring", color=OCHRE, zorder=3.6)
+            parts.edge(
+                ax, torsion_spring(joint, direction, 0.55 * size), "torsion-spring", color=SPRING_OCHRE, zorder=3.6
+            )
     if solution.drive == "force":
         tail = end[0] + 2.6 * size * link.branch, end[1]
         parts.force_arrow(ax, tail, (end[0] + 0.6 * size * link.branch, end[1]))
@@ -380,7 +384,7 @@ def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]
     ]
     if solution.drive == "force":
         tail = np.array([key.slider_pin[0] + 1.8 * view.size * solution.assembly.linkage.branch, key.slider_pin[1]])
-        found.append(parts.part_name("F", [tail], (0.0, 1.0), VERMILLION))
+        found.append(parts.part_name("F", [tail], (0.0, 1.0), LINE_VERMILLION))
     return found
 
 
@@ -406,8 +410,8 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     way = np.array([[at, offset] for at in (solution.units.position.min(), solution.units.position.max())])
     for held in hardware(spec, solution).bodies:
         outline = held.outline()
-        parts.edge(ax, np.vstack([outline, outline[:1]]), held.name, color=GREY, linewidth=0.6)
-    parts.edge(ax, way, "guide", color=GREY, linewidth=0.6)
+        parts.edge(ax, np.vstack([outline, outline[:1]]), held.name, color=TEXT_GREY, linewidth=0.6)
+    parts.edge(ax, way, "guide", color=TEXT_GREY, linewidth=0.6)
     parts.slider(ax, key.slider_pin, 2.0 * half)
     *links, pivot, crank_pin, slider_pin = bodies(spec, solution, solution.assembly.units(np.array([key.motion])))
     for link in links:
@@ -418,7 +422,7 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     for rate, joint, direction, coil in zip(rates[:3], key.joints, key.directions, coils, strict=True):
         if rate > 0.0:
             spiral = np.vstack([torsion_spring(joint, direction, coil.reach), coil.outline()])
-            parts.edge(ax, spiral, "torsion-spring", color=OCHRE, zorder=3.6)
+            parts.edge(ax, spiral, "torsion-spring", color=SPRING_OCHRE, zorder=3.6)
     if rates[3] > 0.0:
         wide = max((coil.outer_diameter for coil in spec.mechanism.springs.coils_at("slider")), default=half)
         parts.spring(ax, key.slider_pin, (view.wall, offset), wide, "spring-slider")

@@ -12,10 +12,15 @@ import numpy as np
 
 from cfmkit.families.findings import deg, mm, newton
 from cfmkit.families.rows import FindingRule
-from cfmkit.families.slider_crank.springs.bistability_class import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
+from cfmkit.families.slider_crank.springs.bistability_class import (
+    BISTABLE_CLASS,
+    DROP_TOL,
+    SNAP_THROUGH_CLASS,
+    TRISTABLE_CLASS,
+)
 from cfmkit.families.slider_crank.springs.bought_spring_limits import fault_of_bought_spring
-from cfmkit.families.slider_crank.springs.sprung_linkage import TURN
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -64,7 +69,7 @@ def _locks(number: int, name: str) -> Rule:
 
 
 def _snaps_out(solution: Solution) -> Any:
-    return (solution.classified.kind == SNAPS) & (solution.classified.unstable > 0)
+    return (solution.classified.kind == SNAP_THROUGH_CLASS) & (solution.classified.unstable > 0)
 
 
 def _snap(solution: Solution) -> Sentence:
@@ -76,7 +81,7 @@ def _snap(solution: Solution) -> Sentence:
 
 def _boundary(solution: Solution) -> Sentence:
     kind, drop = int(solution.classified.kind[0]), float(solution.classified.drop[0])
-    side = "has" if kind in (SNAPS, BISTABLE, TRISTABLE) else "just misses"
+    side = "has" if kind in (SNAP_THROUGH_CLASS, BISTABLE_CLASS, TRISTABLE_CLASS) else "just misses"
     return (
         f"the lowest {solution.drive} after the peak is {100 * (1 - drop):.2g} % of the peak: the "
         f"mechanism {side} a second equilibrium, and springs a little stiffer or softer change that",
@@ -104,13 +109,13 @@ def _rest(_solution: Solution) -> Sentence:
 
 
 def _winds_up(solution: Solution) -> Any:
-    turns = (solution.high - solution.low)[:, 0] >= TURN * (1 - 1e-9)
+    turns = (solution.high - solution.low)[:, 0] >= FULL_TURN * (1 - 1e-9)
     return (solution.drive == "torque") & turns & (solution.assembly.rates.reshape(4, -1)[:2] > 0.0).any(axis=0)
 
 
 def _winding(solution: Solution) -> Sentence:
     rates = solution.assemblies[0].rates
-    wound = [name for name, rate in zip(JOINTS[:2], rates, strict=False) if rate > 0.0]
+    wound = [name for name, rate in zip(JOINT_NAMES[:2], rates, strict=False) if rate > 0.0]
     return (
         f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
         "wound up: the torque differs in the next turn; only springs at slider and slider pin repeat",
@@ -119,12 +124,12 @@ def _winding(solution: Solution) -> Sentence:
 
 def _same_poses(rests: Sequence[float]) -> list[tuple[float, float]]:
     """Return pairs of crank angles that are whole turns apart."""
-    return [(a, b) for a in rests for b in rests if a < b and abs(math.remainder(b - a, TURN)) < 1e-6]
+    return [(a, b) for a in rests for b in rests if a < b and abs(math.remainder(b - a, FULL_TURN)) < 1e-6]
 
 
 def _rests_again(solution: Solution) -> Any:
     again = np.zeros(len(solution), dtype=bool)
-    if solution.drive == "torque" and (solution.high - solution.low > TURN - 2e-6).any():
+    if solution.drive == "torque" and (solution.high - solution.low > FULL_TURN - 2e-6).any():
         rows, places, stable, _ = solution.all_equilibria
         for row in np.unique(rows).tolist():
             again[row] = bool(_same_poses(places[(rows == row) & stable].tolist()))
@@ -290,7 +295,7 @@ def _fails(number: int, spring: Bought) -> Rule:
 
     def fault(solution: Solution, row: int) -> Sentence | None:
         turns = np.broadcast_to(solution.extremes.largest_turns, (4, len(solution)))
-        return fault_of_bought_spring(solution.specs[row], number, float(turns[JOINTS.index(spring.at), row]))
+        return fault_of_bought_spring(solution.specs[row], number, float(turns[JOINT_NAMES.index(spring.at), row]))
 
     return FindingRule(
         "spring_buckles" if spring.kind == "compression" else "spring_binds_on_pin",
@@ -301,7 +306,7 @@ def _fails(number: int, spring: Bought) -> Rule:
 
 def _overturns(joint: int) -> Rule:
     """Return the rule on a spring that is deflected beyond its limit."""
-    name = JOINTS[joint]
+    name = JOINT_NAMES[joint]
 
     def holds(solution: Solution) -> Any:
         limits = solution.settings(lambda spec: getattr(spec.mechanism.limits, name, None))[:, 0]
@@ -318,11 +323,11 @@ def _overturns(joint: int) -> Rule:
     return FindingRule("joint_overrotated", holds, sentence)
 
 
-RULES: tuple[Rule, ...] = (
+FINDING_RULES: tuple[Rule, ...] = (
     _locks(0, "forth"),
     _locks(1, "back"),
     FindingRule("second_stable_outside", _snaps_out, _snap),
-    FindingRule("class_boundary", lambda solution: np.abs(solution.classified.drop - 1.0) < BOUNDARY, _boundary),
+    FindingRule("class_boundary", lambda solution: np.abs(solution.classified.drop - 1.0) < DROP_TOL, _boundary),
     FindingRule("quartic_minimum", _is_restless, _rest),
     FindingRule("spring_winds_up", _winds_up, _winding),
     FindingRule("same_position_twice", _rests_again, _again),
@@ -369,4 +374,4 @@ def rules_of(solution: Solution) -> tuple[Rule, ...]:
     if not solution.assemblies[0].rates.any():
         return (NO_SPRING,)
     springs = solution.spec.mechanism.springs.bought
-    return (*RULES, *(_fails(*one) for one in enumerate(springs)), *(_overturns(joint) for joint in range(4)))
+    return (*FINDING_RULES, *(_fails(*one) for one in enumerate(springs)), *(_overturns(joint) for joint in range(4)))

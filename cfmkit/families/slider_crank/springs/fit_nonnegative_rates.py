@@ -60,10 +60,10 @@ class RateGoal:
         return replace(self, matrix=self.matrix[index], wanted=self.wanted[index])
 
 
-RESOLVED = 1e-5
+MIN_RESOLVED_DEVIATION = 1e-5
 """Below this deviation a second programme, in units of it, refines the rates: the first meets its rows to 1e-7 only."""
 
-ALL, FEW = 128, 25
+MAX_PROGRAMME_PLACES, N_FIRST_PLACES = 128, 25
 """So many places the linear programme takes at once; of more it starts with few, and adds those where it fails."""
 
 
@@ -73,7 +73,9 @@ def minimax(goal: RateGoal) -> FloatArray | None:
     Solved on a few places, to which the worst of the others are added until none is worse.
     """
     count = len(goal.wanted)
-    rows = np.unique(np.linspace(0, count - 1, count if count <= ALL else FEW).round().astype(int))
+    rows = np.unique(
+        np.linspace(0, count - 1, count if count <= MAX_PROGRAMME_PLACES else N_FIRST_PLACES).round().astype(int)
+    )
     while True:
         found = _minimax(goal.select_rows(rows))
         if found is None:
@@ -103,7 +105,7 @@ def can_keep(goal: RateGoal, worst: float) -> bool:
     return rates is not None and goal.deviation(rates) <= worst
 
 
-ROOM = 100.0
+MAX_RATE_RATIO = 100.0
 """How much larger than those of least squares, and than 1, the scaled rates of the smallest largest deviation may be
 for the bound to hold; they are of the same size."""
 
@@ -120,7 +122,7 @@ def _least_possible(goal: RateGoal, rates: FloatArray) -> float:
         return 0.0
     gradient, scaled = (goal.matrix / scales).T @ residual, rates * scales
     low = np.zeros(len(rates)) if goal.lower is None else goal.lower * scales
-    high = np.minimum(goal.upper * scales, ROOM * (1.0 + scaled.sum()))
+    high = np.minimum(goal.upper * scales, MAX_RATE_RATIO * (1.0 + scaled.sum()))
     gained = np.maximum(gradient * (high - scaled), gradient * (low - scaled)).sum()
     return float((residual @ residual - gained) / weight)
 
@@ -137,7 +139,7 @@ def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
     if found is None:
         return None
     rates, unit = found[0], goal.deviation(found[0])
-    if not 0.0 < unit < RESOLVED:
+    if not 0.0 < unit < MIN_RESOLVED_DEVIATION:
         return found
     more = _smallest_deviation(_enlarge_goal(goal, rates, unit))
     if more is not None:

@@ -29,7 +29,7 @@ from cfmkit.families.hardware import (
 )
 from cfmkit.families.slider_crank.springs.link_strength import link_loads
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 from cfmkit.stock.joint_strength import link_stress, pin_that_bears
 from cfmkit.stock.parts_list import ListedPart
@@ -87,7 +87,14 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     parts = (
         *_parts(spec, solution, strength, (sheet, 2.0 * eye, pin), load),
         ListedPart(
-            "carries pivot and guide", "ground", 1, _of(strength), "make", mm(*(high - low), sheet), "", "ground"
+            "carries pivot and guide",
+            "ground",
+            1,
+            _describe_strength(strength),
+            "make",
+            mm(*(high - low), sheet),
+            "",
+            "ground",
         ),
         guide_part(rod, 1, mechanism.guide is None),
         screw_part("ground to its base, countersunk", len(places), screw, sheet, "screw"),
@@ -102,7 +109,7 @@ def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: fl
         yield PosedBody.line(name, "free", np.stack(joints[k : k + 2], axis=1), eye, round=True)
     corners = eye * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     yield PosedBody.polygon("slider", "driven", joints[2][:, None] + corners)
-    for joint, name, rate in zip(joints, JOINTS, rates[:3], strict=False):
+    for joint, name, rate in zip(joints, JOINT_NAMES, rates[:3], strict=False):
         if np.any(rate > 0.0):
             coils = [0.5 * coil.outer_diameter for coil in spec.mechanism.springs.coils_at(name)]
             yield PosedBody.line(f"spring-{name}", "free", joint[:, None], max(coils, default=0.8 * eye))
@@ -126,7 +133,7 @@ def _sheet(loads: LinkLoads, width: float, hole: float, strength: PartStrength, 
     return next(bearing, series.sizes[-1])
 
 
-def _of(strength: PartStrength) -> str:
+def _describe_strength(strength: PartStrength) -> str:
     return strength.name + (", assumed" if strength.assumed else "")
 
 
@@ -147,7 +154,9 @@ def _parts(
     mechanism, legs, link = spec.mechanism, spec.mechanism.sets, solution.assembly.linkage
     sheet, width, pin = sizes
     for name, length in (("crank", link.crank), ("coupler", link.coupler)):
-        data = f"{_of(strength)}; {mm(float(length))} between holes of {mm(pin)}; geometry/slider-crank.dxf"
+        data = (
+            f"{_describe_strength(strength)}; {mm(float(length))} between holes of {mm(pin)}; geometry/slider-crank.dxf"
+        )
         yield ListedPart("link", name, legs, data, "make", mm(float(length) + width, width, sheet), "", name)
     yield ListedPart(
         "on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", mm(width, width, sheet), "", "slider"
@@ -164,7 +173,7 @@ def _parts(
             entry.at.replace("_", " "), entry.name, entry.count * legs, data, "buy", size, "", f"spring-{entry.at}"
         )
     reference = {entry.at for entry in mechanism.springs.bought}
-    for name, stiffness in zip(JOINTS, mechanism.springs.rates, strict=True):
+    for name, stiffness in zip(JOINT_NAMES, mechanism.springs.rates, strict=True):
         if stiffness > 0.0 and name not in reference:
             kind = "spring" if name == "slider" else "torsion spring"
             value = format_short(float(stiffness), "stiffness" if name == "slider" else "rotational_stiffness")

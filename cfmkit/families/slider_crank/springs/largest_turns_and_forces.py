@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 
-NODES, TURN_NODES = 129, 385
+GRID_SIZES, TURN_NODES = 129, 385
 """Places of the grid for less and for more than a quarter turn."""
 
 Ends = tuple["FloatArray", "FloatArray"]
@@ -50,7 +50,7 @@ class MotionExtremes(ShortRepr):
         """A grid over the motion, (m, n), the unloaded position one of its places; the last one may stand twice."""
         low, high, start = (np.reshape(one, (-1, 1)) for one in (self.low, self.high, self.assembly.start))
         wide = is_wide(self.assembly, self.low, self.high)
-        share = np.linspace(0.0, 1.0, TURN_NODES if wide else NODES)
+        share = np.linspace(0.0, 1.0, TURN_NODES if wide else GRID_SIZES)
         if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
             share = share**2
         places = low + (high - low) * share

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
-DEFINITIONS = {
+STRENGTH_DEFINITIONS = {
     "link_stress_max": (
         "stress",
         "largest tension and bending in crank and coupler, in the section through a pin hole",
@@ -167,7 +167,7 @@ LARGEST_TURN_SHARE = 0.01
 WIDEST_SHARE = 0.5
 """Largest width of a link over the length of the shorter one: wider ones are plates, and bend as plates do."""
 
-SPARE = 1.001
+SIZE_MARGIN = 1.001
 """Sizes are larger by this share than just enough."""
 
 
@@ -198,7 +198,8 @@ def links_that_bear(
     def bears(width: float) -> bool:
         link = LinkBar(width, sheet, pin, modulus)
         return bool(
-            link.safety(loads, strength.allowable) >= SPARE and SPARE * link.turn_share(loads) <= LARGEST_TURN_SHARE
+            link.safety(loads, strength.allowable) >= SIZE_MARGIN
+            and SIZE_MARGIN * link.turn_share(loads) <= LARGEST_TURN_SHARE
         )
 
     if low > high or not bears(high):
@@ -221,4 +222,4 @@ def _pin_bears(diameter: float, loads: LinkLoads, sheet: float, strength: PartSt
     """Return True if a pin bears its load: in its hole, and bent between two links, whose middles are a sheet apart."""
     pressure = bearing_pressure(loads.pin_max, diameter, sheet)
     bent = pin_bending(loads.pin_max, sheet, diameter)
-    return bool(SPARE * pressure <= strength.allowable and SPARE * bent <= strength.pins)
+    return bool(SIZE_MARGIN * pressure <= strength.allowable and SIZE_MARGIN * bent <= strength.pins)

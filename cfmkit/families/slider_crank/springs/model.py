@@ -28,14 +28,14 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.rows import SolvedRows, drop_numbers, findings_of_one, valid, values_of_one, without_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
-from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.findings import rules_of
 from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import is_wide
-from cfmkit.families.slider_crank.springs.scalar_results import QUANTITIES
+from cfmkit.families.slider_crank.springs.scalar_results import SCALAR_QUANTITIES
 from cfmkit.families.slider_crank.springs.solution import ClosedFormEffort, Solution, target_of
-from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, asked_motion, assemble
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.springs.sprung_linkage import FULL_TURN, asked_motion, assemble
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.metrics.branches_cut_to_window import find_between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
@@ -56,13 +56,13 @@ if TYPE_CHECKING:
 
 Ends = tuple[float, float]
 
-RATES = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
+RATE_KEYS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINT_NAMES)}
 """Where a specification has the rates, and the rows of the springs."""
 
 ROWS_TOGETHER = 96
 """Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
-COLUMNS = without_values(OF_PARTS | OF_STOPS) | dict(QUANTITIES)
+ROW_COLUMNS = without_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows: of values that only printed parts and stops have their cells are empty."""
 
 
@@ -87,7 +87,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         status=Status.PARTIAL if shortfalls or stuck else Status.COMPLETE,
         message=shortfalls[0].message if shortfalls else stuck,
         curves=(_curve(solution),),
-        values=values_of_one(QUANTITIES, solution),
+        values=values_of_one(SCALAR_QUANTITIES, solution),
         warnings=LazySequence(partial(_findings, solution, shortfalls)),
         travel=asked_motion(spec, assembly),
         target=target_of(spec),
@@ -131,7 +131,7 @@ def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.in
         for start in range(0, len(members), ROWS_TOGETHER):
             chosen = members[start : start + ROWS_TOGETHER]
             solution = _solution(*zip(*(built[index] for index in chosen), strict=True))
-            yield np.array(chosen), SolvedRows(solution, COLUMNS, rules_of(solution), _is_complete(solution))
+            yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, rules_of(solution), _is_complete(solution))
 
 
 def _kind(spec: SliderCrankSpec, assembly: Assembly, asked: Ends) -> tuple[Any, ...]:
@@ -197,7 +197,7 @@ def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]
 
 
 def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
-    whole = asked[1] - asked[0] >= TURN * (1 - 1e-9)
+    whole = asked[1] - asked[0] >= FULL_TURN * (1 - 1e-9)
     return finding(
         "no_full_turn" if whole else "coupler_dead_point",
         f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are "
@@ -233,10 +233,10 @@ def _curve(solution: Solution) -> Curve:
     extra = {
         "stiffness": Column(solution.stiffness[0], rate),
         "energy": Column(solution.energy[0], "energy"),
-        **{f"{drive}_{name}": Column(row[0], drive) for name, row in zip(JOINTS, solution.shares, strict=True)},
+        **{f"{drive}_{name}": Column(row[0], drive) for name, row in zip(JOINT_NAMES, solution.shares, strict=True)},
         **({"crank_angle": Column(units.angle[0], "angle")} if drive == "force" else {}),
         "slider_position": Column(units.position[0], "length"),
-        **{f"{name}_rotation": Column(row[0], "angle") for name, row in zip(JOINTS[:3], units.turn, strict=False)},
+        **{f"{name}_rotation": Column(row[0], "angle") for name, row in zip(JOINT_NAMES[:3], units.turn, strict=False)},
         "slider_travel": Column(units.turn[3, 0] - assembly.tight, "length"),
         "coupler_force": Column(coupler[0], "force"),
         "guide_force": Column(guide[0], "force"),
@@ -283,7 +283,7 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
         return {}
     if short or not solution.assemblies[0].rates.any():
         return {}
-    known = {path: RATES[path] for path in paths if path in RATES}
+    known = {path: RATE_KEYS[path] for path in paths if path in RATE_KEYS}
     legs = spec.mechanism.sets
     slopes = dict(_slopes(solution))
     return {name: {path: legs * float(by[row]) for path, row in known.items()} for name, by in slopes.items()}

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, Sheet, circle
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.specs.units import format_short
 from cfmkit.stock.stock_series import series_of
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 
-KEY = "mechanism.part.sheet"
+SHEET_KEY = "mechanism.part.sheet"
 """Says how thick the links are: without springs that are part of them, they have no width."""
 
 EYE_SHARE, HOLE_SHARE = 0.08, 0.04
@@ -41,7 +41,7 @@ def eye_and_hole(spec: SliderCrankSpec) -> tuple[float, float]:
     linkage = linkage_of(spec.mechanism)
     short = min(linkage.crank, linkage.coupler)
     pins, links = spec.mechanism.pins, spec.mechanism.links
-    coils = [coil for name in JOINTS[:3] for coil in spec.mechanism.springs.coils_at(name)]
+    coils = [coil for name in JOINT_NAMES[:3] for coil in spec.mechanism.springs.coils_at(name)]
     around = min((0.5 * PIN_IN_COIL * coil.inner_diameter for coil in coils), default=short)
     hole = 0.5 * (pin_within(2.0 * min(HOLE_SHARE * short, around)) if pins is None else pins.diameter)
     if links is not None:
@@ -75,5 +75,5 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     facts += [("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
     facts += [("links", f"{format_short(2.0 * eye, 'length')} wide, ends round")]
     facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []
-    sheet = Sheet(part.sheet if part else None, (), KEY)
+    sheet = Sheet(part.sheet if part else None, (), SHEET_KEY)
     return Drawing("slider-crank", tuple(contours), sheet=sheet, dimensions=reported, facts=tuple(facts))

@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.export.posed_part import PosedBody, PosedPart
 from cfmkit.families.slider_crank.springs.hardware import hardware
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.stock.springs.helical_spring_formulas import Wound
 
-PLATES = 3
+N_SHEETS = 3
 """Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
 
 
@@ -71,13 +71,13 @@ def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray) -> tuple
     if part is None or part.sheet is None:
         return None, "; the depth of links is not known (mechanism.part.sheet)"
     high = {}
-    for name, turn in ((name, turn) for name, rate, turn in zip(JOINTS, rates, turns, strict=True) if rate):
+    for name, turn in ((name, turn) for name, rate, turn in zip(JOINT_NAMES, rates, turns, strict=True) if rate):
         coils = springs.coils_at(name)
         if not coils:
             return None, f"; the spring at the {name.replace('_', ' ')} has no size"
         high[name] = max(height_of(name, coil, float(turn)) for coil in coils)
     below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
-    return PLATES * part.sheet + below + above, f"; {PLATES} sheets and the springs on both sides of them"
+    return N_SHEETS * part.sheet + below + above, f"; {N_SHEETS} sheets and the springs on both sides of them"
 
 
 def height_of(name: str, coil: Wound, turn: float) -> float:
@@ -89,7 +89,7 @@ def height_of(name: str, coil: Wound, turn: float) -> float:
 
 
 def _sizes(springs: Springs) -> str:
-    found = [coil for name in JOINTS[:3] for coil in springs.coils_at(name)]
+    found = [coil for name in JOINT_NAMES[:3] for coil in springs.coils_at(name)]
     if not found:
         return "springs at pins have no size"
     wide, long = (1e3 * max(getattr(one, name) for one in found) for name in ("outer_diameter", "body_length"))

@@ -14,7 +14,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, mean_effort_per_angle
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
 
-FREE = ("crank_length", "offset", "unloaded_offset")
+FREE_LENGTH_KEYS = ("crank_length", "offset", "unloaded_offset")
 """Lengths that a design may choose."""
 
-PROBES = 721
+N_PROBES = 721
 """Places at which the limits of the joints are looked at."""
 
-REFINED = 3
+N_REFINEMENTS = 3
 """Times that they are looked at, each between two neighbours of the last: a window may end where a limit is reached."""
 
-DENSE = 1001
+N_WINDOW_PLACES = 1001
 """Places of a window over which the largest deviation is kept."""
 
 
@@ -54,7 +54,7 @@ class SpringTask:
     @cached_property
     def allowed(self) -> tuple[float, float]:
         """Ends of the motion that linkage and joint limits allow around the unloaded position [rad or m]."""
-        low, high = replace(self.assembly, rates=np.ones(len(JOINTS))).clip_motion(*self.assembly.reach)
+        low, high = replace(self.assembly, rates=np.ones(len(JOINT_NAMES))).clip_motion(*self.assembly.reach)
         start = self.assembly.start
         if self.assembly.drive == "torque":
             low, high = max(low, start - math.pi), min(high, start + math.pi)
@@ -63,7 +63,7 @@ class SpringTask:
         limits = self.spec.mechanism.limits
         if limits is None:
             return low, high
-        most = np.array([getattr(limits, name) or math.inf for name in JOINTS])
+        most = np.array([getattr(limits, name) or math.inf for name in JOINT_NAMES])
         return self._farthest(low, most), self._farthest(high, most)
 
     @property
@@ -76,8 +76,8 @@ class SpringTask:
     def _farthest(self, end: float, most: FloatArray) -> float:
         """Return the last place from the unloaded position towards an end up to which no joint is moved too far."""
         good = self.assembly.start
-        for _ in range(REFINED):
-            places = np.linspace(good, end, PROBES)
+        for _ in range(N_REFINEMENTS):
+            places = np.linspace(good, end, N_PROBES)
             turn = self.assembly.units(places).turn
             bad = np.flatnonzero(~(np.abs(turn) <= most[:, None] * (1 + 1e-12)).all(axis=0))
             if not len(bad):
@@ -101,7 +101,7 @@ class SpringTask:
         share = np.linspace(1.0 / points if runs_in else 0.0, 1.0, count or points + (not runs_in))
         if self.wanted.spacing == "even" or self.assembly.drive == "torque":
             return low + (high - low) * share
-        angle = self.assembly.units(np.linspace(low, high, PROBES)).angle
+        angle = self.assembly.units(np.linspace(low, high, N_PROBES)).angle
         if np.ptp(np.sign(np.diff(angle))) > 0.0:
             text = "the crank turns back within the window, where the coupler is perpendicular to the guide"
             cure = "set 'design.spacing: even', or change the window"
@@ -165,7 +165,7 @@ class SpringTask:
         if wanted.adjustment is None or wanted.angle_travel is None:
             return None
         row = mean_effort_per_angle([self.assembly], *window)[:, 0] * (wanted.angle_travel * self.spec.mechanism.sets)
-        used = np.array([name in wanted.springs for name in JOINTS])
+        used = np.array([name in wanted.springs for name in JOINT_NAMES])
         share = row / np.maximum(np.abs(self.assembly.forces(np.array(window))).max(axis=1), 1e-300)
         return row * (1.0 if share[used].sum() >= 0 else -1.0), wanted.adjustment
 
@@ -181,15 +181,15 @@ class SpringTask:
 
     def _upper(self) -> FloatArray:
         most, used = self.wanted.max_rates, self.wanted.springs
-        caps = [None if most is None else getattr(most, name) for name in JOINTS]
+        caps = [None if most is None else getattr(most, name) for name in JOINT_NAMES]
         limits = [math.inf if cap is None else cap for cap in caps]
-        return np.array([limit if name in used else 0.0 for name, limit in zip(JOINTS, limits, strict=True)])
+        return np.array([limit if name in used else 0.0 for name, limit in zip(JOINT_NAMES, limits, strict=True)])
 
     def rotation(self, window: tuple[float, float]) -> float:
         """Return the largest rotation of a joint that may have a spring, up to the end of the window [rad]."""
         ends = min(self.assembly.start, window[0]), max(self.assembly.start, window[1])
-        turn = np.abs(self.assembly.units(np.linspace(*ends, PROBES)).turn[:3])
-        used = [k for k, name in enumerate(JOINTS[:3]) if name in self.wanted.springs]
+        turn = np.abs(self.assembly.units(np.linspace(*ends, N_PROBES)).turn[:3])
+        used = [k for k, name in enumerate(JOINT_NAMES[:3]) if name in self.wanted.springs]
         return float(turn[used].max()) if used else 0.0
 
 

@@ -20,38 +20,38 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import can_keep, minimax
-from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE
+from cfmkit.families.slider_crank.springs.rate_fit_task import N_WINDOW_PLACES
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
 
 
-COARSE = 48
+N_SEARCH_PLACES = 48
 """Places of a window during the search; the result is judged on `DENSE` ones."""
 
-LAW = 0.533
+WIDTH_OVER_LEAD = 0.533
 """Width of the best window over the lead of the unloaded position, for 0.5 % and small angles."""
 
-STEPS = 24
+MAX_STEPS = 24
 """Twenty halvings leave 1e-6 of a width, which ends the search; with steps by the law, the tests need ten."""
 
-CLOSE = 1.0 - 1e-4
+MIN_TOLERANCE_SHARE = 1.0 - 1e-4
 """A deviation between this share of the tolerance and all of it ends the search: the width is then right to 3e-5."""
 
-GAIN, NARROWEST = 1e-3, 5e-4
+MIN_WIDTH_GAIN, MIN_WIDTH_SHARE = 1e-3, 5e-4
 """A window wider by less than the first share is not looked for; nor one below the second share of the motion."""
 
-BEGINNINGS, PROGRAMMES = 32, 4000
+N_START_INTERVALS, MAX_PROGRAMMES = 32, 4000
 """Intervals of beginnings that the search of the whole motion starts with, and its largest number of programmes."""
 
-NARROW = 0.08
+NEIGHBOUR_WIDTH_SHARE = 0.08
 """Once a window is found, the next one is looked for so near, as a share of its width."""
 
-POOR, PLACES = 0.5, 25
+POOR_WIDTH_SHARE, N_ELSEWHERE_PLACES = 0.5, 25
 """A window narrower than this share of what was expected is also looked for elsewhere, at so many places."""
 
-KEPT = 1.0 - 2e-5
+TOLERANCE_SHARE = 1.0 - 2e-5
 """Between the places on which it is judged, a deviation can be larger by this."""
 
 
@@ -76,28 +76,30 @@ def widest(task: SpringTask, tolerance: float) -> FittedWindow | None:
     first, last = task.searched
     if not last > first:
         return None
-    tolerance *= KEPT
+    tolerance *= TOLERANCE_SHARE
     width, middle = _first_guess(task, tolerance)
     width = min(width, last - first)
     best = _grow_window(task, tolerance, width, middle, 0.6)
-    if best is not None and best.width >= POOR * width:
+    if best is not None and best.width >= POOR_WIDTH_SHARE * width:
         return best
     elsewhere = _flattest(task, width)
-    found = None if elsewhere is None else _grow_window(task, tolerance, width, elsewhere, NARROW)
+    found = None if elsewhere is None else _grow_window(task, tolerance, width, elsewhere, NEIGHBOUR_WIDTH_SHARE)
     return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
 
 
 def widest_of_all(task: SpringTask, tolerance: float) -> tuple[FittedWindow | None, bool]:
-    """Return the widest window of the whole motion, and whether all that are wider by `GAIN` are ruled out."""
+    """Return the widest window of the motion, and whether all that are wider by `MIN_WIDTH_GAIN` are ruled out."""
     first, last = task.searched
     if not last > first:
         return None, True
-    search = _Everywhere(task, tolerance * KEPT)
+    search = _Everywhere(task, tolerance * TOLERANCE_SHARE)
     found = search.run()
     if found is None:
         return widest(task, tolerance), search.finished
     low, high = found
-    return _grow_window(task, tolerance * KEPT, high - low, 0.5 * (low + high), NARROW), search.finished
+    return _grow_window(
+        task, tolerance * TOLERANCE_SHARE, high - low, 0.5 * (low + high), NEIGHBOUR_WIDTH_SHARE
+    ), search.finished
 
 
 class _Everywhere:
@@ -106,17 +108,17 @@ class _Everywhere:
     def __init__(self, task: SpringTask, tolerance: float) -> None:
         self.task, self.tolerance = task, tolerance
         self.first, self.last = task.searched
-        self.width = NARROWEST * (self.last - self.first)
-        self.left, self.finished = PROGRAMMES, True
+        self.width = MIN_WIDTH_SHARE * (self.last - self.first)
+        self.left, self.finished = MAX_PROGRAMMES, True
 
     def run(self) -> tuple[float, float] | None:
-        """Return the widest window, judged on `COARSE` places; None if there is none above `NARROWEST`."""
+        """Return the widest window, judged on `N_SEARCH_PLACES` places; None if there is none above `NARROWEST`."""
         best: tuple[float, float] | None = None
-        ends = np.linspace(self.first, self.last, BEGINNINGS + 1).tolist()
+        ends = np.linspace(self.first, self.last, N_START_INTERVALS + 1).tolist()
         queue = deque(itertools.pairwise(ends))
         while queue:
             low, high = queue.popleft()
-            wanted = self.width * (1.0 + GAIN)
+            wanted = self.width * (1.0 + MIN_WIDTH_GAIN)
             if low + wanted > self.last or not self._may(low, min(high, self.last - wanted), wanted):
                 continue
             if self.left <= 0:
@@ -126,7 +128,7 @@ class _Everywhere:
             if middle + wanted <= self.last and self._keeps(middle, middle + wanted):
                 best = middle, self._end(middle, middle + wanted)
                 self.width = best[1] - best[0]
-            if high - low > 0.5 * self.width * (GAIN if best else 1.0):
+            if high - low > 0.5 * self.width * (MIN_WIDTH_GAIN if best else 1.0):
                 queue += [(low, middle), (middle, high)]
         return best
 
@@ -137,13 +139,13 @@ class _Everywhere:
     def _keeps(self, low: float, high: float) -> bool:
         """Return whether springs keep the tolerance over a window."""
         self.left -= 1
-        goal = self.task.goal((low, high), COARSE)
+        goal = self.task.goal((low, high), N_SEARCH_PLACES)
         return goal is not None and can_keep(goal, self.tolerance)
 
     def _end(self, low: float, high: float) -> float:
         """Return where the widest window from its beginning ends: double, then halve."""
         step, bad = high - low, math.inf
-        while high < self.last and bad - high > 0.25 * GAIN * (high - low):
+        while high < self.last and bad - high > 0.25 * MIN_WIDTH_GAIN * (high - low):
             trial = min(high + step, self.last) if math.isinf(bad) else 0.5 * (high + bad)
             if self._keeps(low, trial):
                 high, step = trial, 2.0 * step
@@ -155,8 +157,10 @@ class _Everywhere:
 def _flattest(task: SpringTask, width: float) -> float | None:
     """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
     first, last = task.searched
-    places = (first + (last - width - first) * k / (PLACES - 1) for k in range(PLACES))
-    found = [item for item in (_solve_window(task, low, low + width, COARSE) for low in places) if item is not None]
+    places = (first + (last - width - first) * k / (N_ELSEWHERE_PLACES - 1) for k in range(N_ELSEWHERE_PLACES))
+    found = [
+        item for item in (_solve_window(task, low, low + width, N_SEARCH_PLACES) for low in places) if item is not None
+    ]
     best = min(found, key=lambda item: item.deviation, default=None)
     return None if best is None else 0.5 * (best.low + best.high)
 
@@ -166,14 +170,14 @@ def _grow_window(task: SpringTask, tolerance: float, width: float, middle: float
     first, last = task.searched
     best: FittedWindow | None = None
     low, high = 0.0, last - first
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         width = min(width, last - first)
         found = _best_place(task, width, middle, look)
         if found is not None:
-            middle, look = 0.5 * (found.low + found.high), NARROW
+            middle, look = 0.5 * (found.low + found.high), NEIGHBOUR_WIDTH_SHARE
         if found is not None and found.deviation <= tolerance:
             best, low = found, max(low, width)
-            if found.deviation >= tolerance * CLOSE or width >= last - first:
+            if found.deviation >= tolerance * MIN_TOLERANCE_SHARE or width >= last - first:
                 break
             if width > 0.9 * high and found.deviation < 0.5 * tolerance:
                 high = last - first  # the window has moved on from where that width had failed
@@ -191,7 +195,7 @@ def _first_guess(task: SpringTask, tolerance: float) -> tuple[float, float]:
     assembly = task.assembly
     lead = assembly.stretched - assembly.start
     if assembly.drive == "torque" and abs(lead) > 1e-6:
-        return LAW * abs(lead) * (tolerance / 0.005) ** (1 / 3), assembly.stretched
+        return WIDTH_OVER_LEAD * abs(lead) * (tolerance / 0.005) ** (1 / 3), assembly.stretched
     return 0.1 * (last - first), first + 0.1 * (last - first)
 
 
@@ -199,7 +203,7 @@ def _next_width(found: FittedWindow | None, tolerance: float, bracket: tuple[flo
     low, high = bracket
     if found is None or found.deviation <= 0.0:
         return 0.5 * (low + high)
-    wanted = tolerance * (0.5 + 0.5 * CLOSE)
+    wanted = tolerance * (0.5 + 0.5 * MIN_TOLERANCE_SHARE)
     step = width * min(max((wanted / found.deviation) ** (1 / 3), 0.5), 2.0)
     return step if low < step < high else 0.5 * (low + high)
 
@@ -214,7 +218,7 @@ def _best_place(task: SpringTask, width: float, middle: float, look: float) -> F
         return evaluate_window(task, first, last)
 
     def deviation(low: float) -> float:
-        found = _solve_window(task, low, low + width, COARSE)
+        found = _solve_window(task, low, low + width, N_SEARCH_PLACES)
         return found.deviation if found else 1e300
 
     start = min(max(middle - 0.5 * width, first), room)
@@ -229,7 +233,7 @@ def _best_place(task: SpringTask, width: float, middle: float, look: float) -> F
 
 def evaluate_window(task: SpringTask, low: float, high: float) -> FittedWindow | None:
     """Return the best springs for a window, judged on many places; None if there are none."""
-    return _solve_window(task, low, high, DENSE)
+    return _solve_window(task, low, high, N_WINDOW_PLACES)
 
 
 def _solve_window(task: SpringTask, low: float, high: float, count: int) -> FittedWindow | None:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.rows import ScalarQuantity
-from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, small_angle_number
-from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
+from cfmkit.families.slider_crank.springs.bistability_class import CLASS_NAMES, small_angle_number
+from cfmkit.families.slider_crank.springs.link_strength import STRENGTH_DEFINITIONS as LINK_DEFINITIONS
 from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, allowable_of, link_loads, link_of
 from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.unit_springs import JOINT_NAMES
 from cfmkit.stock.springs.stress_and_life import (
     WIRE_DEFINITIONS,
     SpringInUse,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Function = Callable[[Solution], Any]
 
 
-_AT = "the reference (`analysis.reference_angle` or `reference_travel`)"
+_REFERENCE_TEXT = "the reference (`analysis.reference_angle` or `reference_travel`)"
 
 NO_UNSTABLE = "there is no unstable equilibrium"
 
@@ -40,7 +40,7 @@ NO_SECOND = "there is no second stable equilibrium in the motion"
 
 NO_FACTOR = "it needs torsion springs and a spring at the slider"
 
-HELD = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
+HELD_TEXT = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
 
 
 def _of_drive(drive: str, dimension: str, definition: str, function: Function, reason: str) -> ScalarQuantity[Solution]:
@@ -51,7 +51,7 @@ def _of_drive(drive: str, dimension: str, definition: str, function: Function, r
 def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
     """Return width, start and end of the constant band over the motion of one kind of drive."""
     reason = f"the reference is outside the motion, or the {drive} there is zero"
-    within = f"of the interval around {_AT} with the {drive} within `analysis.tolerance`"
+    within = f"of the interval around {_REFERENCE_TEXT} with the {drive} within `analysis.tolerance`"
     name = f"constant_{motion}"
     return {
         name: _of_drive(drive, dimension, f"width {within}", lambda one: one.band[1] - one.band[0], reason),
@@ -79,7 +79,7 @@ def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
     """Return the bought springs of a mechanism between their smallest and their largest load over the motion."""
     springs, found = solution.specs[number].mechanism.springs, []
     for one in springs.bought:
-        joint = JOINTS.index(one.at)
+        joint = JOINT_NAMES.index(one.at)
         high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
         least, largest = in_the_sense_of_the_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
@@ -168,13 +168,13 @@ def _guide_force(solution: Solution) -> FloatArray:
     return np.maximum(np.abs(up), np.abs(down))
 
 
-QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "stiffness_class": ScalarQuantity(
         "text",
         "positive, zero, local negative, snap-through (the second stable position lies outside), bistable or "
         "tristable over the motion; a drop of at most twice `analysis.tolerance` counts as zero [LH, sec. 3]",
         lambda solution: solution.classified.kind,
-        words=CLASSES,
+        words=CLASS_NAMES,
     ),
     "stiffness_drop": ScalarQuantity(
         "ratio",
@@ -230,10 +230,18 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     **_of_band("torque", "angle", "angle"),
     **_of_band("force", "travel", "length"),
     "reference_torque": _of_drive(
-        "torque", "torque", f"torque at {_AT}", lambda solution: solution.level, "the reference is outside the motion"
+        "torque",
+        "torque",
+        f"torque at {_REFERENCE_TEXT}",
+        lambda solution: solution.level,
+        "the reference is outside the motion",
     ),
     "reference_force": _of_drive(
-        "force", "force", f"force at {_AT}", lambda solution: solution.level, "the reference is outside the motion"
+        "force",
+        "force",
+        f"force at {_REFERENCE_TEXT}",
+        lambda solution: solution.level,
+        "the reference is outside the motion",
     ),
     "start_force": _of_drive(
         "force",
@@ -350,10 +358,10 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "force",
         "largest compression of the coupler of one leg; negative: only tension",
         lambda solution: -solution.reaction_extremes[0][1],
-        HELD,
+        HELD_TEXT,
     ),
     "guide_force_max": ScalarQuantity(
-        "force", "largest transverse force of the slider of one leg on its guide", _guide_force, HELD
+        "force", "largest transverse force of the slider of one leg on its guide", _guide_force, HELD_TEXT
     ),
     **{name: _of_wire(name) for name in WIRE_DEFINITIONS},
     "link_stress_max": _of_link("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
@@ -363,5 +371,5 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result, in the order in which they are shown."""
 
-DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()}
+SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()}
 """Name -> dimension and definition."""

@@ -19,7 +19,13 @@ import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
 from cfmkit.families.rows import rows_of, stack
-from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, scale_factors, signs
+from cfmkit.families.slider_crank.springs.bistability_class import (
+    CLASS_NAMES,
+    Classified,
+    classify,
+    scale_factors,
+    signs,
+)
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, window_of
@@ -44,16 +50,16 @@ if TYPE_CHECKING:
     Ends = tuple[FloatArray, ...]
 
 
-GRID = 1025
+N_GRID_PLACES = 1025
 """Places of the grid. Efforts between them are cubics; classes change within 1e-9 of where they should."""
 
-SAME = 1e-9
+MOTION_RTOL = 1e-9
 """An equilibrium so near to the unloaded position, as a share of the motion, is that position."""
 
 NEXT_TO_START = 1e-9
 """Share of the motion at which forces with friction are computed at its start: a stretched start itself is 0/0."""
 
-EDGE = 1.0 + 1e-9
+BAND_EDGE_FACTOR = 1.0 + 1e-9
 """An effort on the edge of a band is inside it, whatever the last bits say."""
 
 NO_LEVEL = 1e-9
@@ -69,7 +75,7 @@ def target_of(spec: SliderCrankSpec) -> float | None:
 
 def grid_over(drive: Kind, low: Any, high: Any) -> FloatArray:
     """Return the places of the grid over a motion, (n,) [rad or m]; over several motions, (m, 1), (m, n)."""
-    share = np.linspace(0.0, 1.0, GRID)
+    share = np.linspace(0.0, 1.0, N_GRID_PLACES)
     if drive == "force":  # the force runs like the square root of the travel from the stretched place
         share = share**2
     return np.asarray(low + (high - low) * share)
@@ -137,7 +143,7 @@ class Solution(ShortRepr):
     @property
     def name(self) -> str:
         """Its class in words."""
-        return CLASSES[int(self.classified.kind[0])]
+        return CLASS_NAMES[int(self.classified.kind[0])]
 
     def nearest_of_one(self, stable: bool) -> Equilibrium | None:
         """Return its equilibrium next to the unloaded position, of one kind; None if there is none."""
@@ -278,8 +284,8 @@ class Solution(ShortRepr):
         effort = self.broadcast(self.assembly.total(units.effort))
         slope = self.broadcast(self.assembly.total(units.stiffness))
         if not np.isfinite(effort).all():
-            slope = finite_samples(slope, effort, GRID - 1)[0]
-            grid, effort, end = finite_samples(grid, effort, GRID - 1)
+            slope = finite_samples(slope, effort, N_GRID_PLACES - 1)[0]
+            grid, effort, end = finite_samples(grid, effort, N_GRID_PLACES - 1)
             grid, effort, slope = (one[:, : int(end.max()) + 1] for one in (grid, effort, slope))
         return monotone(grid, effort, slope, self.assembly.efforts)
 
@@ -304,7 +310,7 @@ class Solution(ShortRepr):
 
         root = last_places(excess, low[:, None], high[:, None])[:, 0]
         width = np.broadcast_to((self.high - self.low)[:, 0], len(self))[rows]
-        root = np.where((low != high) & (np.abs(root - rest[rows]) <= SAME * width), rest[rows], root)
+        root = np.where((low != high) & (np.abs(root - rest[rows]) <= MOTION_RTOL * width), rest[rows], root)
         known = np.isfinite(root)
         energy = 0.5 * assembly.total(assembly.units(root[:, None]).turn ** 2)[:, 0]
         return Several((rows[known], root[known], stable[known], np.broadcast_to(energy, len(root))[known]))
@@ -338,7 +344,7 @@ class Solution(ShortRepr):
         """
         place, value = self.curve.place, self.curve.value
         known = self.has_level
-        level, limit = np.where(known, self.level, 1.0)[:, None], self.tolerance * EDGE
+        level, limit = np.where(known, self.level, 1.0)[:, None], self.tolerance * BAND_EDGE_FACTOR
         outside, inner, beyond = np.abs(value / level - 1.0) > limit, [], []
         for sign in (-1.0, 1.0):  # towards the low end, and towards the high one
             way, here = sign * place, sign * self.reference
@@ -435,12 +441,12 @@ def _roots(place: FloatArray, sign: NDArray[np.int8], rest: float) -> Iterator[t
     if not len(known):
         return
 
-    def at_end(end: float, inner: float) -> float:
+    def choose_end(end: float, inner: float) -> float:
         return rest if abs(end - rest) <= abs(end - inner) else end
 
     first, last = int(known[0]), int(known[-1])
     if first > 0:
-        at = at_end(float(place[0]), float(place[first]))
+        at = choose_end(float(place[0]), float(place[first]))
         yield at, at, bool(sign[first] > 0)
     for k in np.flatnonzero(sign[known[:-1]] != sign[known[1:]]).tolist():
         before, after = int(known[k]), int(known[k + 1])
@@ -448,7 +454,7 @@ def _roots(place: FloatArray, sign: NDArray[np.int8], rest: float) -> Iterator[t
         is_rest = low <= rest <= high and after - before > 1
         yield (rest if is_rest else low), (rest if is_rest else high), bool(sign[after] > 0)
     if last < len(place) - 1:
-        at = at_end(float(place[-1]), float(place[last]))
+        at = choose_end(float(place[-1]), float(place[last]))
         yield at, at, bool(sign[last] < 0)
 
 

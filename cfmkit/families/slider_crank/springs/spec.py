@@ -10,7 +10,7 @@ from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength,
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire, is_made
+from cfmkit.stock.springs.spec import RATE_RTOL, Catalogue, Life, SpringWire, is_made
 from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
@@ -103,7 +103,10 @@ class Springs(Model):
             if joint not in self.model_fields_set:
                 # past the frozen model, and not counted as set: another wire then has another rate
                 object.__setattr__(self, joint, total)
-            elif not is_made(info) and abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > AGREE:
+            elif (
+                not is_made(info)
+                and abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > RATE_RTOL
+            ):
                 refuse(
                     "Springs",
                     {

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.families.guide_friction import FREE, GuideFriction
+from cfmkit.families.guide_friction import FRICTIONLESS_GUIDE, GuideFriction
 from cfmkit.families.rows import stack
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import (
@@ -44,12 +44,12 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 
-TURN = 2.0 * math.pi
+FULL_TURN = 2.0 * math.pi
 
 SHORT_OF_END = 1e-3
 """Share of an arc that a motion stays away from its ends, where efforts are unbounded."""
 
-CLOSEST = 1e-6
+MIN_END_SHARE = 1e-6
 """Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
 
 
@@ -58,7 +58,7 @@ class Rubbing:
     """Friction in a slider-crank."""
 
     pin: float = 0.0  # friction couple per load of each pin, mu d/2 [m]
-    guide: GuideFriction = FREE
+    guide: GuideFriction = FRICTIONLESS_GUIDE
     mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
 
     @property
@@ -216,9 +216,9 @@ class Assembly(ShortRepr):
         """
         (first, last), (at_first, at_last) = self.reach, self.poles
         to_first, to_last = self._ways
-        if at_first and low < first + CLOSEST * to_first:
+        if at_first and low < first + MIN_END_SHARE * to_first:
             first += SHORT_OF_END * to_first
-        if at_last and high > last - CLOSEST * to_last:
+        if at_last and high > last - MIN_END_SHARE * to_last:
             last -= SHORT_OF_END * to_last
         return max(low, first), min(high, last)
 
@@ -242,7 +242,7 @@ class Assembly(ShortRepr):
         if self.drive == "force":
             first, last = self.reach
             return first if self.linkage.way(self.unloaded)[1] == self.linkage.stretched_position else last
-        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, TURN)
+        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
 
 
 def _with_more_at_slider(rows: FloatArray, more: Any) -> FloatArray:
@@ -288,7 +288,7 @@ def default_motion(assembly: Assembly) -> tuple[float, float]:
     """Return the motion that is run through where none is requested: all of it, a full turn at most."""
     low, high = assembly.reach
     if math.isinf(low):
-        return assembly.start, assembly.start + TURN
+        return assembly.start, assembly.start + FULL_TURN
     room = SHORT_OF_END * (high - low)
     if assembly.drive == "force":
         return (0.0, high - room) if high > room else (low + room, 0.0)  # relaxed folded, it can only be pulled
@@ -361,10 +361,10 @@ def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
     return angle
 
 
-STEP = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Of the angle [rad]: the effort is a quadratic of q at most, so that central differences are off by rounding alone."""
 
-PLACES = 201
+N_WINDOW_PLACES = 201
 """Of the window, over which the change of the effort is averaged."""
 
 
@@ -392,11 +392,11 @@ def mean_effort_per_angle(assemblies: Sequence[Assembly], low: Any, high: Any) -
     low, high : float or (m, 1) array
         The windows over which the means are taken [rad or m].
     """
-    places = np.linspace(np.reshape(low, -1), np.reshape(high, -1), PLACES, axis=1)
+    places = np.linspace(np.reshape(low, -1), np.reshape(high, -1), N_WINDOW_PLACES, axis=1)
     rows = []
-    for step in (STEP, -STEP):
+    for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
         others, less = zip(*(turn_unloaded(one, step) for one in assemblies), strict=True)
         rows.append(stack(others).forces(places - np.reshape(less, (-1, 1))))
     with np.errstate(invalid="ignore"):  # at the end of the reach some efforts are unbounded
-        change = (rows[0] - rows[1]) / (2.0 * STEP)
+        change = (rows[0] - rows[1]) / (2.0 * DIFFERENCE_STEP)
     return np.asarray(change.mean(axis=-1))

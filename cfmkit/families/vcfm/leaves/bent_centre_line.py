@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE, axial_root, pose
+from cfmkit.families.vcfm.leaves.s_form import BUCKLING_LOAD, POLE_LOAD, axial_root, pose
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
-POINTS = 81
+N_LINE_POINTS = 81
 
 
 def bent_leaf(strip: LeafStrip, travel: float, critical: float | None = None, free: bool = False) -> FloatArray:
@@ -34,18 +34,18 @@ def bent_leaf(strip: LeafStrip, travel: float, critical: float | None = None, fr
     stretch = (strip.thickness / length) ** 2 / 3.0
     z = 0.0 if free else float(axial_root(at.shortening, at.turn, stretch))
     if critical is not None:
-        z = BUCKLED
-    place = np.linspace(0.0, 1.0, POINTS)
-    slope = float(at.turn) * _s_slope(min(z, POLE - 0.05), 2.0 * place - 1.0)
+        z = BUCKLING_LOAD
+    place = np.linspace(0.0, 1.0, N_LINE_POINTS)
+    slope = float(at.turn) * _s_slope(min(z, POLE_LOAD - 0.05), 2.0 * place - 1.0)
     if critical is not None:
         spare = float(at.shortening) - critical / float(strip.axial) - 0.25 * float(at.turn) ** 2
         slope = slope + 2.0 * np.sqrt(max(spare, 0.0)) * np.sin(2.0 * np.pi * place)
     angles = angle - float(at.turn) + slope
     end = (float(strip.reach), float(strip.rise) - travel)
     if free:
-        steps = np.full(POINTS, length / POINTS)
+        steps = np.full(N_LINE_POINTS, length / N_LINE_POINTS)
         end = (float((np.cos(angles) * steps).sum()), end[1])
-    return line_between(angles, np.full(POINTS, length / POINTS), end)
+    return line_between(angles, np.full(N_LINE_POINTS, length / N_LINE_POINTS), end)
 
 
 def _s_slope(z: float, eta: FloatArray) -> FloatArray:

@@ -18,21 +18,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS, line_between
+from cfmkit.families.vcfm.leaves.bent_centre_line import N_LINE_POINTS, line_between
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
-from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE
+from cfmkit.families.vcfm.leaves.s_form import BUCKLING_LOAD, POLE_LOAD
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-_LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_POSITIVE, _HALF = _NODES[12:], _WEIGHTS[12:]
+_MAX_TENSION = 1e5  # tension down to z = -1e5: strains beyond anything that bends
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
+_POSITIVE_NODES, _POSITIVE_WEIGHTS = _GAUSS_NODES[12:], _GAUSS_WEIGHTS[12:]
 """What is integrated is even."""
 
-_ROUNDING = 4.0 * float(np.finfo(float).eps)
-_PLACES = np.linspace(-1.0, 1.0, 41)
+_ROUNDING_ERROR = 4.0 * float(np.finfo(float).eps)
+_BRACKET_PLACES = np.linspace(-1.0, 1.0, 41)
 
 N_EDGE_POINTS = 201
 """Points of the unloaded centre line, from which edges are drawn."""
@@ -77,8 +77,8 @@ class CosineLeaf(LeafLaw):
         At a given load the shortening is quadratic in the travel: where it fits the load of buckling, that begins.
         """
         rise = float(self.strip.rise)
-        constant, by_drop, by_square = (float(item[0]) for item in self._quadratic(np.array([BUCKLED])))
-        drops = np.roots([by_square, by_drop, constant - self._stretch * BUCKLED])
+        constant, by_drop, by_square = (float(item[0]) for item in self._quadratic(np.array([BUCKLING_LOAD])))
+        drops = np.roots([by_square, by_drop, constant - self._stretch * BUCKLING_LOAD])
         if np.iscomplex(drops).any():
             return np.nan, np.nan
         first, last = sorted(rise - drops.real)
@@ -87,7 +87,7 @@ class CosineLeaf(LeafLaw):
     @property
     def _stretch(self) -> Any:
         """Shortening by the axial force, per z."""
-        return self.critical_force / (BUCKLED * self.strip.axial)
+        return self.critical_force / (BUCKLING_LOAD * self.strip.axial)
 
     def force(self, travel: Any) -> FloatArray:
         """Return the force of one leaf along the motion [N], on the stable branch."""
@@ -96,15 +96,15 @@ class CosineLeaf(LeafLaw):
         z = self.root(travel)
         q, _, _, g = self.waves(z, travel)
         slope = np.real(g * np.cos(q))
-        bent = self.critical_force * z / BUCKLED * slope * self.developed / self.strip.reach
-        return np.asarray(np.where(z >= BUCKLED, line, bent))
+        bent = self.critical_force * z / BUCKLING_LOAD * slope * self.developed / self.strip.reach
+        return np.asarray(np.where(z >= BUCKLING_LOAD, line, bent))
 
     def stress(self, travel: Any) -> FloatArray:
         """Return the largest stress of the arch, bending and axial [Pa]."""
         travel = np.asarray(travel, dtype=float)
         z = self.root(travel)
-        curvature = np.where(z >= BUCKLED, self._buckled_curvature(travel), self._bent_curvature(z, travel))
-        axial = np.abs(self.critical_force * np.minimum(z, BUCKLED) / BUCKLED) / self.strip.area
+        curvature = np.where(z >= BUCKLING_LOAD, self._buckled_curvature(travel), self._bent_curvature(z, travel))
+        axial = np.abs(self.critical_force * np.minimum(z, BUCKLING_LOAD) / BUCKLING_LOAD) / self.strip.area
         return np.asarray(0.5 * self.strip.youngs_modulus * self.strip.thickness * curvature + axial)
 
     def waves(self, z: FloatArray, travel: FloatArray) -> tuple[Any, Any, Any, Any]:
@@ -125,7 +125,7 @@ class CosineLeaf(LeafLaw):
         tense = (z < 0) & (q >= 1e-4)
         q = np.where(~tense & (np.abs(q - 0.5 * np.pi) < 1e-6), 0.5 * np.pi + 1e-6, np.where(q < 1e-4, 1e-4, q))
         c = 0.5 * self.strip.rise * np.pi**2 / (np.where(tense, -4.0, 4.0) * q * q - np.pi**2)
-        along = q[..., None] * _POSITIVE
+        along = q[..., None] * _POSITIVE_NODES
         with np.errstate(all="ignore"):
             cosines = np.cos(along)
             np.cosh(along, out=cosines, where=tense[..., None])
@@ -133,17 +133,17 @@ class CosineLeaf(LeafLaw):
             wave = (q / self.developed / (q * end - across))[..., None] * (end[..., None] - cosines)
         still = c[..., None] * (2.0 * wave - self._own)
         made = (0.5 * self.strip.rise * self._own) ** 2
-        return tuple(0.5 * item @ _HALF for item in (made - still**2, -2.0 * still * wave, -(wave**2)))
+        return tuple(0.5 * item @ _POSITIVE_WEIGHTS for item in (made - still**2, -2.0 * still * wave, -(wave**2)))
 
     @cached_property
     def _own(self) -> FloatArray:
         """Slope of the unloaded shape over half its rise, at the places of the quadrature [1/m]."""
-        return np.asarray(np.pi / self.developed * np.cos(0.5 * np.pi * _POSITIVE))
+        return np.asarray(np.pi / self.developed * np.cos(0.5 * np.pi * _POSITIVE_NODES))
 
     @cached_property
     def _table(self) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         """Loads z from strong tension up to the pole, and the shortening's coefficients there."""
-        z = POLE - np.geomspace(_LOOSE, 1e-10, 4000)
+        z = POLE_LOAD - np.geomspace(_MAX_TENSION, 1e-10, 4000)
         return z, self._quadratic(z)
 
     def root(self, travel: FloatArray) -> FloatArray:
@@ -169,15 +169,15 @@ class CosineLeaf(LeafLaw):
                 step = size * (z - before) / (size - size_before)
             before, size_before = z, size
             z = np.clip(z - np.where(np.isfinite(step), step, 0.0), table[low], table[high])
-            if (np.abs(z - before) <= _ROUNDING * np.abs(z)).all():
+            if (np.abs(z - before) <= _ROUNDING_ERROR * np.abs(z)).all():
                 break
             size = excess(z, self._quadratic(z))
         return np.asarray(z)
 
     def _bent_curvature(self, z: FloatArray, travel: FloatArray) -> FloatArray:
-        q, k, c, g = (item[..., None] for item in self.waves(np.minimum(z, POLE - 0.1), travel))
-        wave = (np.pi / self.developed) ** 2 * np.cos(0.5 * np.pi * (1.0 + _PLACES))
-        bend = np.real(-(c + 0.5 * self.strip.rise) * wave + g * k * np.sin(q * _PLACES))
+        q, k, c, g = (item[..., None] for item in self.waves(np.minimum(z, POLE_LOAD - 0.1), travel))
+        wave = (np.pi / self.developed) ** 2 * np.cos(0.5 * np.pi * (1.0 + _BRACKET_PLACES))
+        bend = np.real(-(c + 0.5 * self.strip.rise) * wave + g * k * np.sin(q * _BRACKET_PLACES))
         return np.asarray(np.abs(bend).max(axis=-1))
 
     def buckled_amplitude(self, travel: FloatArray) -> FloatArray:
@@ -192,7 +192,7 @@ class CosineLeaf(LeafLaw):
     def _buckled_curvature(self, travel: FloatArray) -> FloatArray:
         length, rise = self.developed, self.strip.rise
         a, c = np.pi / length, rise / 6.0
-        slope, phase = (self.balance - travel) / length, np.pi * (1.0 + _PLACES)
+        slope, phase = (self.balance - travel) / length, np.pi * (1.0 + _BRACKET_PLACES)
         free = self.buckled_amplitude(travel)[..., None] * np.cos(phase)
         own = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * slope[..., None] * np.sin(phase)
         both = (np.abs(own + sign * 2.0 * a * free).max(axis=-1) for sign in (1.0, -1.0))
@@ -218,9 +218,9 @@ class CosineLeaf(LeafLaw):
         """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]."""
         at = np.array([travel])
         z, length, rise = float(self.root(at)[0]), float(self.developed), float(self.strip.rise)
-        eta = np.linspace(-1.0, 1.0, POINTS)
+        eta = np.linspace(-1.0, 1.0, N_LINE_POINTS)
         own = np.pi / length * np.cos(0.5 * np.pi * eta)
-        if z >= BUCKLED:
+        if z >= BUCKLING_LOAD:
             slope = (float(self.balance) - travel) / length
             free = float(self.buckled_amplitude(at)[0])
             phase = np.pi * (1.0 + eta)
@@ -231,10 +231,10 @@ class CosineLeaf(LeafLaw):
             )
             turn = np.real(-c * own + g * (np.cos(q) - np.cos(q * eta)))
         end = (float(self.strip.reach), rise - travel)
-        return line_between(np.arctan(turn), np.full(POINTS, length / POINTS), end)
+        return line_between(np.arctan(turn), np.full(N_LINE_POINTS, length / N_LINE_POINTS), end)
 
 
-COSINE = LeafKind(
+COSINE_LEAF = LeafKind(
     "cosine",
     "half cosine arches",
     lambda strip, _keys: CosineLeaf(strip),

@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import percent
-from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS, line_between
+from cfmkit.families.vcfm.leaves.bent_centre_line import N_LINE_POINTS, line_between
 from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-SLENDER, CRUSHED = 6.0, 0.25
+MAX_RISE_RATIO, MAX_BUCKLING_RATIO = 6.0, 0.25
 """Rise over the thickness of a flexure, and axial force over its own buckling load, above which that force bends it."""
 
-STIFFENING = 4.0
+MIDDLE_THICKNESS_RATIO = 4.0
 """Thickness of the middle over that of the flexures, where none is stated."""
 
 PROPOSED_FLEXURE = 0.2
@@ -45,7 +45,7 @@ class HybridLeaf(LeafLaw):
     """The law of one hybrid leaf, of flexures as thick as its strip; some force is left where its chord is flat."""
 
     flexure: Any  # length of each flexure [m]
-    stiffening: Any = STIFFENING  # thickness of the bar over that of the flexures
+    stiffening: Any = MIDDLE_THICKNESS_RATIO  # thickness of the bar over that of the flexures
 
     @property
     def pivot(self) -> Any:
@@ -72,7 +72,7 @@ class HybridLeaf(LeafLaw):
     @property
     def flexures_buckle(self) -> bool:
         """Whether the flexures are too thin for this model."""
-        return float(self.strip.slenderness) > SLENDER or self.crushing > CRUSHED
+        return float(self.strip.slenderness) > MAX_RISE_RATIO or self.crushing > MAX_BUCKLING_RATIO
 
     def _pose(self, travel: Any) -> tuple[Any, Any, Any]:
         """Return distance of the pivots [m], angle of the bar, and how much it has turned [rad]."""
@@ -134,8 +134,8 @@ class HybridLeaf(LeafLaw):
         strip, end, n = self.strip, float(self.flexure), N_FLEXURE_POINTS
         tilt = float(np.arctan2(self.bar * np.sin(strip.angle) - travel, self.bar * np.cos(strip.angle)))
         bend = np.linspace(float(strip.angle), tilt, n)
-        angles = np.concatenate([bend, np.full(POINTS - 2 * n, tilt), bend[::-1]])
-        middle = np.full(POINTS - 2 * n, (strip.length - 2 * end) / (POINTS - 2 * n))
+        angles = np.concatenate([bend, np.full(N_LINE_POINTS - 2 * n, tilt), bend[::-1]])
+        middle = np.full(N_LINE_POINTS - 2 * n, (strip.length - 2 * end) / (N_LINE_POINTS - 2 * n))
         lengths = np.concatenate([np.full(n, end / n), middle, np.full(n, end / n)])
         return line_between(angles, lengths, (strip.reach, strip.rise - travel))
 
@@ -159,10 +159,10 @@ def _as_proposed(leaf: Any) -> dict[str, Any]:
     return {"structure": "hybrid", "flexure_length": PROPOSED_FLEXURE * leaf.length, "angle": angle}
 
 
-HYBRID = LeafKind(
+HYBRID_LEAF = LeafKind(
     "hybrid",
     "flexures with a stiff middle",
-    lambda strip, keys: HybridLeaf(strip, keys.flexure_length, keys.stiffening or STIFFENING),
+    lambda strip, keys: HybridLeaf(strip, keys.flexure_length, keys.stiffening or MIDDLE_THICKNESS_RATIO),
     needs={"flexure_length": "of each of its two flexures"},
     lengths=("flexure_length",),
     fidelity="exact",

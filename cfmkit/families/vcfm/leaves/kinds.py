@@ -100,9 +100,9 @@ class LeafLaw(ABC):
 
     def beam_shapes(self) -> tuple[Any, Any]:
         """Return the shapes of `cfmkit.elastica` of a leaf from wall to shuttle, and of its mirror image."""
-        from cfmkit.elastica import STRAIGHT
+        from cfmkit.elastica import STRAIGHT_SHAPE
 
-        return STRAIGHT, STRAIGHT
+        return STRAIGHT_SHAPE, STRAIGHT_SHAPE
 
     def bent_line(self, travel: float) -> FloatArray:
         """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]: bent into an S."""
@@ -210,7 +210,7 @@ class ProposedStructure:
 
     name: str
     variant: str  # what two Vs and a diamond are called with it
-    turn: int  # the order in which variants are tried, see `proposals.TURNS`
+    turn: int  # the order in which variants are tried, see `proposals.VARIANT_ORDER`
     changes: Callable[[Any], dict[str, Any]]  # from the block as designed: keys of it -> values
 
 

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
 
-RIM = 0.75
+BLOCK_HEIGHT_RATIO = 0.75
 """Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
 
-FITS = 1.02
+FILLET_MARGIN = 1.02
 """Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
 
 
@@ -60,9 +60,9 @@ def leaf_compliance(strip: LeafStrip) -> Any:
 
 def leaf_chain(strip: LeafStrip, section: Section, support: Support, travel: float, count: float) -> SpringChain:
     """Return one leaf, clamped at one end, as what is traced of a spring."""
-    from cfmkit.elastica import CLAMPED, Beam, Network, Node
+    from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Network, Node
 
-    nodes = {"wall": Node(0, 0, CLAMPED), "end": Node(strip.reach, strip.rise, support)}
+    nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "end": Node(strip.reach, strip.rise, support)}
     return SpringChain(Network(nodes, {"leaf": Beam("wall", "end", section)}), "end", travel, count)
 
 
@@ -91,7 +91,9 @@ class Diamond(LeafSpring):
 
     def room(self, corner: float) -> float:
         """Return by how much it can be compressed until the blocks meet [m]."""
-        return float(2.0 * self.strip.length * sin(self.strip.angle) + corner - 2.0 * RIM * self.strip.thickness)
+        return float(
+            2.0 * self.strip.length * sin(self.strip.angle) + corner - 2.0 * BLOCK_HEIGHT_RATIO * self.strip.thickness
+        )
 
     def chain(self, section: Section) -> SpringChain:
         """Return one leaf, whose corner moves across as it likes."""
@@ -106,7 +108,7 @@ class Diamond(LeafSpring):
         """
         thickness, angle = self.strip.thickness, self.strip.angle
         beside = float(np.tan(0.25 * np.pi + 0.5 * angle)) * fillet
-        return float(max(RIM * thickness, 0.5 * thickness / np.cos(angle) + FITS * beside))
+        return float(max(BLOCK_HEIGHT_RATIO * thickness, 0.5 * thickness / np.cos(angle) + FILLET_MARGIN * beside))
 
     def edges(self, block: float, corner: float, fillet: float, top: float) -> Edges:
         """Return outer and inner edge of the right chain from its top down, and its lowest point [m]."""
@@ -191,7 +193,7 @@ class UShape(LeafSpring):
 
     def room(self, _corner: float) -> float:
         """Return by how much it can be compressed until the blocks meet [m]."""
-        return float(2.0 * self.radius - 2.0 * RIM * self.strip.thickness)
+        return float(2.0 * self.radius - 2.0 * BLOCK_HEIGHT_RATIO * self.strip.thickness)
 
     def opening(self, _corner: float, needed: float) -> tuple[str, float]:
         """Return the key of the radius, and its value for so much more room [m]."""
@@ -199,10 +201,10 @@ class UShape(LeafSpring):
 
     def chain(self, section: Section) -> SpringChain:
         """Return one chain: two legs and the bend."""
-        from cfmkit.elastica import CLAMPED, Beam, Network, Node, arc, slider_support
+        from cfmkit.elastica import CLAMPED_SUPPORT, Beam, Network, Node, arc, slider_support
 
         nodes = {
-            "wall": Node(0, 0, CLAMPED),
+            "wall": Node(0, 0, CLAMPED_SUPPORT),
             "low": Node(self.strip.length, 0),
             "high": Node(self.strip.length, 2.0 * self.radius),
             "end": Node(0, 2.0 * self.radius, slider_support(0.5 * np.pi)),
@@ -350,7 +352,7 @@ class Coils:
         return 0.0 * np.asarray(compression, dtype=float)
 
 
-DIAMOND = SpringKind(
+DIAMOND_SPRING = SpringKind(
     "diamond",
     "two chains of inclined leaves",
     lambda strip, _keys, share: Diamond(strip, share),
@@ -358,7 +360,7 @@ DIAMOND = SpringKind(
     can_be_designed=True,
 )
 
-FOLDED = SpringKind(
+FOLDED_SPRING = SpringKind(
     "folded",
     "eight folded ones",
     lambda strip, _keys, share: Folded(strip, share),
@@ -369,7 +371,7 @@ FOLDED = SpringKind(
     drawing_note="one half of the eight folded beams is drawn: make it twice",
 )
 
-STRAIGHT = SpringKind(
+STRAIGHT_SPRING = SpringKind(
     "straight",
     "one straight beam",
     lambda strip, _keys, share: StraightSpring(strip, share),

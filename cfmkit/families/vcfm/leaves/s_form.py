@@ -26,27 +26,27 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-POLE = 20.190728556426629
+POLE_LOAD = 20.190728556426629
 """z at which tan q = q: the S form can carry no more."""
 
-BUCKLED = np.pi**2
+BUCKLING_LOAD = np.pi**2
 """z of the buckling form 1 - cos(2 pi s/L), P = 4 pi^2 E I/L^2."""
 
-SERIES = 0.35
+MAX_SERIES_LOAD = 0.35
 """Below this |z| the closed forms cancel and the series is used."""
 
 NEWTON_STEPS = 60
 """At most so many to find z."""
 
-_W = np.array(
+_STIFFNESS_SERIES = np.array(
     [
         6.0, -2 / 5, -2 / 175, -4 / 7875, -74 / 3031875, -236 / 197071875, -11012 / 186232921875, -6616 / 2261399765625,
         -1.4485013706484022e-10, -7.173272831196296e-12, -3.5526189671387116e-13, -1.759506952822918e-14,
     ]
 )  # fmt: skip
-_E = -0.25 * np.arange(1, len(_W)) * _W[1:]
-_SLOPE = np.arange(1, len(_E)) * _E[1:]
-_LEAST = 20.19  # below e(z) (POLE - z)^2 on 0 <= z < POLE, which falls from 40.8 to POLE
+_EXTENSION_SERIES = -0.25 * np.arange(1, len(_STIFFNESS_SERIES)) * _STIFFNESS_SERIES[1:]
+_SLOPE_SERIES = np.arange(1, len(_EXTENSION_SERIES)) * _EXTENSION_SERIES[1:]
+_POLE_BOUND = 20.19  # below e(z) (POLE_LOAD - z)^2 on 0 <= z < POLE, which falls from 40.8 to POLE
 
 
 @dataclass(frozen=True)
@@ -86,12 +86,12 @@ def compliance(z: FloatArray) -> tuple[FloatArray, FloatArray]:
         e = 0.25 * top * inverse * inverse
         rate = ds * (c - 4.0 * s) - 0.5 * s * s
         slope = 0.25 * inverse * inverse * (rate + 2.0 * top * inverse * (0.5 * s + ds))
-    pulled = z < -SERIES
+    pulled = z < -MAX_SERIES_LOAD
     if pulled.any():
         e[pulled], slope[pulled] = _tension_compliance(z[pulled])
-    near = np.abs(z) <= SERIES
+    near = np.abs(z) <= MAX_SERIES_LOAD
     if near.any():
-        e[near], slope[near] = _series(z[near], _E), _series(z[near], _SLOPE)
+        e[near], slope[near] = _series(z[near], _EXTENSION_SERIES), _series(z[near], _SLOPE_SERIES)
     return e, slope
 
 
@@ -119,10 +119,10 @@ def end_curvature(z: FloatArray) -> FloatArray:
         c, s = np.cos(q), np.sin(q) / q
         w = -2.0 * z * s / (c - s)
         t = np.tanh(q) / q
-        w = np.where(z < -SERIES, -2.0 * z * t / (1.0 - t), w)
-    near = np.abs(z) <= SERIES
+        w = np.where(z < -MAX_SERIES_LOAD, -2.0 * z * t / (1.0 - t), w)
+    near = np.abs(z) <= MAX_SERIES_LOAD
     if near.any():
-        w[near] = _series(z[near], _W)
+        w[near] = _series(z[near], _STIFFNESS_SERIES)
     return w
 
 
@@ -160,14 +160,14 @@ def axial_root(shortening: Any, turn: Any, stretch: Any) -> FloatArray:
     m, bend, a = (np.broadcast_to(item, shape).ravel() for item in parts)
     with np.errstate(all="ignore"):
         free = m / a
-        bent = POLE - np.sqrt(bend * _LEAST / np.where(m > 0, m, 1.0))
+        bent = POLE_LOAD - np.sqrt(bend * _POLE_BOUND / np.where(m > 0, m, 1.0))
     # at zero the function is bend/10 - m: its sign says on which side the root lies, and what bounds it from the right
     z = np.where(m < 0, free, np.where(0.1 * bend >= m, 0.0, np.minimum(free, bent)))
-    z = np.minimum(z, POLE * (1.0 - 1e-9))
+    z = np.minimum(z, POLE_LOAD * (1.0 - 1e-9))
     for _ in range(NEWTON_STEPS):  # from the right of the root of a convex function none overshoots
         e, slope = compliance(z)
         step = (a * z + bend * e - m) / (a + bend * slope)
-        z = np.minimum(z - step, POLE * (1.0 - 1e-12))
+        z = np.minimum(z - step, POLE_LOAD * (1.0 - 1e-12))
         if not (np.abs(step) > 1e-11 * (1.0 + np.abs(z))).any():
             break
     return z.reshape(shape)

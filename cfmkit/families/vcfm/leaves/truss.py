@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS
+from cfmkit.families.vcfm.leaves.bent_centre_line import N_LINE_POINTS
 from cfmkit.families.vcfm.leaves.kinds import LeafLaw
 
 if TYPE_CHECKING:
@@ -58,6 +58,6 @@ class TrussLeaf(LeafLaw):
 
     def bent_line(self, travel: float) -> FloatArray:
         """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]: straight."""
-        share = np.linspace(0.0, 1.0, POINTS)[:, None]
+        share = np.linspace(0.0, 1.0, N_LINE_POINTS)[:, None]
         line: FloatArray = share * np.array([self.strip.reach, self.strip.rise - travel])
         return line
