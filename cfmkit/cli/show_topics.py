@@ -45,8 +45,8 @@ def explain(name: str | None) -> Document:
         return TOPIC_HEADINGS[name][1]()
     if name in families.names() or name in families.clashing():
         return family_page(name)
-    if (known := find_page(name)) is not None:
-        return known
+    if (page := find_page(name)) is not None:
+        return page
     from cfmkit.specs.yamlio import did_you_mean
 
     topics = [*TOPIC_HEADINGS, *families.names()]
@@ -170,7 +170,7 @@ def family_page(name: str) -> Document:
     from cfmkit.specs.units import border_unit
 
     record = families.family(name)
-    known = [asdict(key) for key in keys(record.spec_type)]
+    spec_keys = [asdict(key) for key in keys(record.spec_type)]
     values = [
         {"name": key, "unit": border_unit(dimension), "definition": definition, "per_branch": False}
         for key, (dimension, definition) in record.values.items()
@@ -178,12 +178,12 @@ def family_page(name: str) -> Document:
     findings = [{"name": key, "meaning": meaning} for key, meaning in record.findings.items()]
     references = [{"reference": reference} for reference in record.references]
     sections = (
-        *_key_sections(known),
+        *_key_sections(spec_keys),
         ("values beside the metrics", values, METRIC_FIELDS),
         ("warnings and failures", findings, (field("name", ""), field("meaning", "", wraps=True))),
         ("references", references, (field("reference", "", wraps=True),)),
     )
-    data = {"keys": known, "values": values, "findings": findings, "references": references}
+    data = {"keys": spec_keys, "values": values, "findings": findings, "references": references}
     drawn = f"; `cfmkit show {name} --figure` draws it with its dimensions named" if record.dimension_drawing else ""
     text = f"{record.summary}. `cfmkit new {name}` starts a file{drawn}"
     return _page(name, text, sections, data)
@@ -193,13 +193,13 @@ READ_FIRST = {name: place for place, name in enumerate(("mechanism", "design", "
 """Blocks in the order in which a file is written; those of studies come after them."""
 
 
-def _key_sections(known: Sequence[Record]) -> list[Section]:
+def _key_sections(spec_keys: Sequence[Record]) -> list[Section]:
     """Return one table for the keys at the top and one for each block, those within a block after it."""
     blocks: dict[str, list[Record]] = {}
-    for key in known:
+    for key in spec_keys:
         parent, _, name = key["path"].rpartition(".")
         blocks.setdefault(parent, []).append(dict(key) | {"path": name})
-    about = {key["path"]: key["description"] for key in known}
+    about = {key["path"]: key["description"] for key in spec_keys}
     top = [key for key in blocks.pop("", []) if key["path"] not in {parent.removesuffix("[]") for parent in blocks}]
     sections = [("spec", top)]
     for parent in sorted(blocks, key=_when_read):
@@ -227,14 +227,20 @@ def find_page(name: str) -> Document | None:
     sections: list[Section] = []
     for kind, (records, fields) in TOPIC_KINDS.items():
         every = records()
-        if known := [one for key in _keys(kind, name) for one in every.get(key, ())]:
-            sections.append((kind, known, fields or SPEC_KEY_FIELDS))
+        if entries_of_kind := [entry for key in _keys(kind, name) for entry in every.get(key, ())]:
+            sections.append((kind, entries_of_kind, fields or SPEC_KEY_FIELDS))
     if not sections and (drawn := _symbols(name)):
         sections.append(("symbols", drawn, SYMBOL_FIELDS))
     if not sections:
         return None
-    page = _page(name, "", sections, {kind: known for kind, known, _ in sections})
-    entries = [text for kind, known, _ in sections if kind == "references" for one in known if (text := _bibtex(one))]
+    page = _page(name, "", sections, {kind: entries_of_kind for kind, entries_of_kind, _ in sections})
+    entries = [
+        text
+        for kind, entries_of_kind, _ in sections
+        if kind == "references"
+        for entry in entries_of_kind
+        if (text := _bibtex(entry))
+    ]
     more = (block for text in entries for block in (line(""), Verbatim(text + "\n")))
     return Document({**page.data, **({"bibtex": entries} if entries else {})}, (*page.body, *more))
 
@@ -296,21 +302,25 @@ def _measured_in(unit: str) -> list[str]:
     if not is_unit(unit):
         return []
     powers = unit_size(unit).powers
-    return [one.name for one in DIMENSIONS_BY_NAME.values() if one.unit and border_size(one.name).powers == powers]
+    return [
+        dimension.name
+        for dimension in DIMENSIONS_BY_NAME.values()
+        if dimension.unit and border_size(dimension.name).powers == powers
+    ]
 
 
 def _gather_records(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
-    known: dict[str, list[dict[str, Any]]] = {}
+    records: dict[str, list[dict[str, Any]]] = {}
     for name, record in pairs:
-        known.setdefault(name, []).append(record)
-    return known
+        records.setdefault(name, []).append(record)
+    return records
 
 
 def _materials() -> Records:
     from cfmkit.stock import MATERIALS_BY_NAME
 
     return _gather_records(
-        (name, asdict(one)) for one in MATERIALS_BY_NAME.values() for name in (one.name, *one.aliases)
+        (name, asdict(entry)) for entry in MATERIALS_BY_NAME.values() for name in (entry.name, *entry.aliases)
     )
 
 
@@ -319,10 +329,13 @@ def _metrics() -> Records:
     from cfmkit.specs.units import border_unit
     from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
-    known = [(one.name, border_unit(one.dimension), one.definition) for one in definitions(None)]
-    known += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]
+    definitions_of_metrics = [
+        (definition.name, border_unit(definition.dimension), definition.definition) for definition in definitions(None)
+    ]
+    definitions_of_metrics += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]
     return _gather_records(
-        (name, {"name": name, "unit": unit, "definition": definition}) for name, unit, definition in known
+        (name, {"name": name, "unit": unit, "definition": definition})
+        for name, unit, definition in definitions_of_metrics
     )
 
 
@@ -332,14 +345,14 @@ def _values() -> Records:
     from cfmkit.specs.units import border_unit
 
     every = families.records()
-    known = [(record.name, record.values) for record in every]
-    known += [
+    values_by_source = [(record.name, record.values) for record in every]
+    values_by_source += [
         (record.name, import_module(record.attribution).DEVIATION_DEFINITIONS) for record in every if record.attribution
     ]
-    known.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
+    values_by_source.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
     return _gather_records(
         (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})
-        for name, values in known
+        for name, values in values_by_source
         for key, (dimension, definition) in values.items()
     )
 
@@ -349,13 +362,13 @@ def _spec_keys() -> Records:
     from cfmkit.specs.keys_and_schema import keys
 
     every = families.records()
-    known: dict[Key, list[str]] = {}
+    families_by_key: dict[Key, list[str]] = {}
     for record in every:
         for key in keys(record.spec_type):
-            known.setdefault(key, []).append(record.name)
+            families_by_key.setdefault(key, []).append(record.name)
 
     def yield_names() -> Iterator[tuple[str, dict[str, Any]]]:
-        for key, of in known.items():
+        for key, of in families_by_key.items():
             reported = {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
             for name in {key.path, key.path.rpartition(".")[2].removesuffix("[]")}:
                 yield name, reported
@@ -368,12 +381,12 @@ def _findings() -> Records:
     from cfmkit.experiment import calibration, correction, findings
     from cfmkit.studies.findings import STUDY_FINDINGS
 
-    known = [(record.name, record.findings) for record in families.records()]
-    known += [("recordings", findings.RECORDING_FINDINGS), ("calibrate", calibration.CALIBRATION_FINDINGS)]
-    known += [("correct", correction.CORRECTION_FINDINGS), *STUDY_FINDINGS.items()]
+    findings_by_source = [(record.name, record.findings) for record in families.records()]
+    findings_by_source += [("recordings", findings.RECORDING_FINDINGS), ("calibrate", calibration.CALIBRATION_FINDINGS)]
+    findings_by_source += [("correct", correction.CORRECTION_FINDINGS), *STUDY_FINDINGS.items()]
     return _gather_records(
         (key, {"name": key, "family": name, "meaning": meaning})
-        for name, meanings in known
+        for name, meanings in findings_by_source
         for key, meaning in meanings.items()
     )
 
@@ -382,24 +395,34 @@ def _units() -> Records:
     from cfmkit.specs.units import unit_table
 
     keys = ("symbol", "name", "dimension", "si", "input_only")
-    each = [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
-    return _gather_records((str(unit[key]), unit) for unit in each for key in ("symbol", "name"))
+    entries = [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
+    return _gather_records((str(unit[key]), unit) for unit in entries for key in ("symbol", "name"))
 
 
 def _dimensions() -> Records:
     from cfmkit.specs.units import DIMENSIONS_BY_NAME
 
     return _gather_records(
-        (one.name, {"name": one.name, "unit": one.unit, "meaning": one.description, "example": one.example})
-        for one in DIMENSIONS_BY_NAME.values()
-        if one.unit
+        (
+            dimension.name,
+            {
+                "name": dimension.name,
+                "unit": dimension.unit,
+                "meaning": dimension.description,
+                "example": dimension.example,
+            },
+        )
+        for dimension in DIMENSIONS_BY_NAME.values()
+        if dimension.unit
     )
 
 
 def _references() -> Records:
-    each = references()
+    entries = references()
     return _gather_records(
-        (name, one) for one in each for name in {one["name"], re.sub(r"-[0-9]{4}$", "", one["name"])}
+        (name, reference)
+        for reference in entries
+        for name in {reference["name"], re.sub(r"-[0-9]{4}$", "", reference["name"])}
     )
 
 

@@ -45,7 +45,7 @@ def document_of(record: Mapping[str, Any], code: ExitCode, files: Written | None
     files : Written, optional
         What was written.
     """
-    found = [*record["proposals"], *record["unjudged"]]
+    proposals = [*record["proposals"], *record["unjudged"]]
     head, _, rest = record["message"].partition("; ")
     notes = [Note("time", rest, whole=True)] if rest and not record["warnings"] else []  # which say the same
     return Document(
@@ -53,18 +53,25 @@ def document_of(record: Mapping[str, Any], code: ExitCode, files: Written | None
         title="suggest",
         summary=head,
         tables=tuple(_tables(record)),
-        notes=(*notes, *_remarks(found), *_unmet(record["near_misses"]), *(_incomplete(found, files) if files else ())),
-        warnings=tuple(WarningEntry(one["name"], one["message"], one["message"]) for one in record["warnings"]),
+        notes=(
+            *notes,
+            *_remarks(proposals),
+            *_unmet(record["near_misses"]),
+            *(_incomplete(proposals, files) if files else ()),
+        ),
+        warnings=tuple(
+            WarningEntry(warning["name"], warning["message"], warning["message"]) for warning in record["warnings"]
+        ),
         files=files,
-        next=_next(found, files) if files else "",
+        next=_next(proposals, files) if files else "",
     )
 
 
-def _next(found: Sequence[Mapping[str, Any]], files: Written) -> str:
+def _next(proposals: Sequence[Mapping[str, Any]], files: Written) -> str:
     """Return the command that writes the files to cut or print of the best proposal."""
-    if not found:
+    if not proposals:
         return ""
-    return command_line("cfmkit", "export", str(Path(files.folder) / found[0]["folder"] / "design.yaml"))
+    return command_line("cfmkit", "export", str(Path(files.folder) / proposals[0]["folder"] / "design.yaml"))
 
 
 def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
@@ -75,41 +82,52 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
     )
     listed = (*record["proposals"], *record["unjudged"])
     order = f"proposals by {', '.join(record['order'])}" + ("; not judged in full last" if record["unjudged"] else "")
-    numbered = [Span(f"{k} {one['family']}", link=_page_of(one)) for k, one in enumerate(listed, 1)]
-    near = record["near_misses"]
+    numbered = [
+        Span(f"{k} {record_of_proposal['family']}", link=_page_of(record_of_proposal))
+        for k, record_of_proposal in enumerate(listed, 1)
+    ]
+    near_misses = record["near_misses"]
     for heading, names, rows in (
         (order, numbered, listed),
-        ("alternatives: one unmet requirement", [one["family"] for one in near], near),
+        (
+            "alternatives: one unmet requirement",
+            [record_of_proposal["family"] for record_of_proposal in near_misses],
+            near_misses,
+        ),
     ):
         if rows:
-            cells = ((name, *(cell(one) for cell in columns.values())) for name, one in zip(names, rows, strict=True))
+            cells = (
+                (name, *(cell(record_of_proposal) for cell in columns.values()))
+                for name, record_of_proposal in zip(names, rows, strict=True)
+            )
             yield PageTable(heading, heads, tuple(cells))
     pair = (GridColumn("", False), GridColumn())
-    named = {one["family"] for one in listed}
-    known = {(one["family"], one["misses"][0]) for one in near}
+    named = {record_of_proposal["family"] for record_of_proposal in listed}
+    known = {(record_of_proposal["family"], record_of_proposal["misses"][0]) for record_of_proposal in near_misses}
     silent = tuple(
-        _silent(one)
-        for one in record["families"]
-        if one["family"] not in named and (one["nearest"] or (one["family"], one["reason"]) not in known)
+        _silent(record_of_proposal)
+        for record_of_proposal in record["families"]
+        if record_of_proposal["family"] not in named
+        and (record_of_proposal["nearest"] or (record_of_proposal["family"], record_of_proposal["reason"]) not in known)
     )
     if silent:
         yield PageTable("no proposals from these families", pair, silent)
 
 
-def _remarks(found: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
+def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     """Yield what was not judged and what is warned of, each once with the numbers of its proposals."""
     texts: dict[str, list[int]] = defaultdict(list)
-    for number, one in enumerate(found, 1):
-        for text in (*one["unjudged"], *(f"{name} (see `cfmkit show {name}`)" for name in one["warnings"])):
+    for number, proposal in enumerate(proposals, 1):
+        for text in (*proposal["unjudged"], *(f"{name} (see `cfmkit show {name}`)" for name in proposal["warnings"])):
             texts[text].append(number)
     for text, numbers in texts.items():
         yield Note(f"no. {_numbers(numbers)}", text, whole=True)
 
 
-def _unmet(near: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
+def _unmet(near_misses: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     """Yield what each alternative misses."""
-    for one in near:
-        yield Note("unmet", f"{one['family']} {one['variant']}: {one['misses'][0]}", whole=True)
+    for miss in near_misses:
+        yield Note("unmet", f"{miss['family']} {miss['variant']}: {miss['misses'][0]}", whole=True)
 
 
 def _numbers(numbers: Sequence[int]) -> str:
@@ -129,8 +147,8 @@ def _numbers(numbers: Sequence[int]) -> str:
     return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs)
 
 
-def _incomplete(found: Sequence[Mapping[str, Any]], files: Written) -> Iterator[Note]:
-    bare = [one["folder"] for one in found if f"{one['folder']}/metrics.json" not in files.files]
+def _incomplete(proposals: Sequence[Mapping[str, Any]], files: Written) -> Iterator[Note]:
+    bare = [proposal["folder"] for proposal in proposals if f"{proposal['folder']}/metrics.json" not in files.files]
     if bare:
         text = (
             f"no time was left for the curve and figures of {', '.join(bare)}: `cfmkit analyze` of its design.yaml "
@@ -139,10 +157,12 @@ def _incomplete(found: Sequence[Mapping[str, Any]], files: Written) -> Iterator[
         yield Note("note", text, whole=True)
 
 
-def _silent(one: Mapping[str, Any]) -> tuple[str, str]:
+def _silent(record: Mapping[str, Any]) -> tuple[str, str]:
     """Return why a family has no proposal, and the nearest request that it could meet."""
-    nearest = ", or with ".join(f"{key} {value}" for key, value in one["nearest"].items())
-    return one["family"], (one["reason"] or "no mechanism fits") + (f"; feasible with {nearest}" if nearest else "")
+    nearest = ", or with ".join(f"{key} {value}" for key, value in record["nearest"].items())
+    return record["family"], (record["reason"] or "no mechanism fits") + (
+        f"; feasible with {nearest}" if nearest else ""
+    )
 
 
 def _columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]], str]]:
@@ -150,36 +170,36 @@ def _columns(record: Mapping[str, Any]) -> dict[str, Callable[[Mapping[str, Any]
     block, listed = record["suggest"], (*record["proposals"], *record["unjudged"], *record["near_misses"])
     kind, unit = ("torque", "N*mm") if "torque" in block else ("force", "N")
     columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
-        "variant": lambda one: str(one["variant"]),
-        kind: lambda one: _cell(one["mean"], lambda value: f"{value:.4g} {unit}"),
-        "ripple": lambda one: _cell(one["ripple"], lambda value: f"{100 * value:.2g} %"),
+        "variant": lambda proposal: str(proposal["variant"]),
+        kind: lambda proposal: _cell(proposal["mean"], lambda value: f"{value:.4g} {unit}"),
+        "ripple": lambda proposal: _cell(proposal["ripple"], lambda value: f"{100 * value:.2g} %"),
         "size": _size,
-        "safety": lambda one: _cell(one["safety_factor"], lambda value: f"{value:.3g}"),
+        "safety": lambda proposal: _cell(proposal["safety_factor"], lambda value: f"{value:.3g}"),
     }
     for name, key in (("hysteresis", "hysteresis"), ("yield", "yield"), ("life", "cycles")):
-        if key in block or any(one[name] is not None for one in listed):
+        if key in block or any(proposal[name] is not None for proposal in listed):
             shown = (lambda value: f"{value:.2g}") if name == "life" else (lambda value: f"{100 * value:.3g} %")
             columns[name] = partial(_value, name, shown)
     columns |= {
-        "parts": lambda one: NO_VALUE if one["parts"] is None else str(one["parts"]),
-        "verdict": lambda one: str(one["verdict"]),
+        "parts": lambda proposal: NO_VALUE if proposal["parts"] is None else str(proposal["parts"]),
+        "verdict": lambda proposal: str(proposal["verdict"]),
     }
     empty = (NOT_JUDGED, NO_VALUE, "")
-    return {name: cell for name, cell in columns.items() if any(cell(one) not in empty for one in listed)}
+    return {name: cell for name, cell in columns.items() if any(cell(proposal) not in empty for proposal in listed)}
 
 
-def _value(name: str, shown: Callable[[float], str], one: Mapping[str, Any]) -> str:
-    return _cell(one[name], shown)
+def _value(name: str, shown: Callable[[float], str], proposal: Mapping[str, Any]) -> str:
+    return _cell(proposal[name], shown)
 
 
 def _cell(value: float | None, shown: Callable[[float], str]) -> str:
     return NOT_JUDGED if value is None else shown(value)
 
 
-def _size(one: Mapping[str, Any]) -> str:
-    sides = [one[side] for side in ("across", "along", "depth") if one[side] is not None]
+def _size(proposal: Mapping[str, Any]) -> str:
+    sides = [proposal[side] for side in ("across", "along", "depth") if proposal[side] is not None]
     return "x".join(f"{side:.3g}" for side in sides) + " mm"
 
 
-def _page_of(one: Mapping[str, Any]) -> str:
-    return quote(f"{one['folder']}/report.html")
+def _page_of(proposal: Mapping[str, Any]) -> str:
+    return quote(f"{proposal['folder']}/report.html")

@@ -161,7 +161,7 @@ class MadeAs(Protocol):
 
     @property
     def values(self) -> FloatArray:
-        """What they are, (n,) [SI]."""
+        """The values themselves, (n,) [SI]."""
 
     def part_of(self, drawn: Spec) -> Spec:
         """Return the part that is made of a drawing."""

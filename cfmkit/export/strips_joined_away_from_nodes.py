@@ -48,11 +48,11 @@ class DrawnStrip:
 
     def sample(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points (k, 2), the way to them from the start (k,) and half thicknesses (k,) there, closely [m]."""
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
+        distances = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
         step = (float(self.thickness.min()) + 2.0 * fillet) / POINTS_PER_THICKNESS
-        places = np.linspace(0.0, way[-1], min(MAX_STRIP_POINTS, math.ceil(way[-1] / step) + 1))
-        at = np.column_stack([np.interp(places, way, self.points[:, k]) for k in (0, 1)])
-        return at, places, 0.5 * np.interp(places, way, self.thickness)
+        places = np.linspace(0.0, distances[-1], min(MAX_STRIP_POINTS, math.ceil(distances[-1] / step) + 1))
+        at = np.column_stack([np.interp(places, distances, self.points[:, k]) for k in (0, 1)])
+        return at, places, 0.5 * np.interp(places, distances, self.thickness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +88,9 @@ class NodesAndBodies:
         at = np.array([self.places[name] for name in number]).reshape(-1, 2)
         ways = np.full((len(number), len(number)), np.inf)
         np.fill_diagonal(ways, 0.0)
-        for one, other in itertools.combinations(self.bodies, 2):
-            if self.bodies[one] == self.bodies[other]:
-                i, j = number[one], number[other]
+        for first, second in itertools.combinations(self.bodies, 2):
+            if self.bodies[first] == self.bodies[second]:
+                i, j = number[first], number[second]
                 ways[i, j] = ways[j, i] = float(np.hypot(*(at[i] - at[j])))
         for strip in strips:
             i, j = (number[end] for end in strip.ends)
@@ -123,19 +123,19 @@ def joined_away_from_nodes(
     import shapely
 
     look = _Look(strips, nodes, fillet)
-    found = [*look.find_close_strips(), *look.find_strips_close_to_blocks(blocks), *look.find_close_blocks(blocks)]
-    if not found:
+    candidates = [*look.find_close_strips(), *look.find_strips_close_to_blocks(blocks), *look.find_close_blocks(blocks)]
+    if not candidates:
         return ()
     whole = _material(contours, look.thinnest)
     shapely.prepare(whole)
     joins: dict[tuple[str, str], Join] = {}
-    for one, other, starts, ends, gaps in found:
+    for first, second, starts, ends, gaps in candidates:
         order = np.argsort(gaps, kind="stable")[:MAX_TRIED_LINES]
         lines = shapely.linestrings(np.stack([starts[order], ends[order]], axis=1))
         inside = np.flatnonzero(shapely.covers(whole, lines))
-        if len(inside) and (one, other) not in joins:
+        if len(inside) and (first, second) not in joins:
             k = order[inside[0]]
-            joins[one, other] = Join(one, other, 0.5 * (starts[k] + ends[k]), float(gaps[k]))
+            joins[first, second] = Join(first, second, 0.5 * (starts[k] + ends[k]), float(gaps[k]))
     return tuple(joins.values())
 
 
@@ -143,9 +143,8 @@ def _material(contours: Sequence[Contour], thinnest: float) -> Any:
     """Return the area within outlines and outside of holes, a little larger for rounding."""
     from shapely import Polygon, union_all
 
-    closed = [one for one in contours if one.closed]
-    areas = [union_all([Polygon(one.points(SAGITTA_RTOL * thinnest)).buffer(0.0) for one in closed if one.hole is hole])
-             for hole in (False, True)]  # fmt: skip
+    rings = [(one.hole, Polygon(one.points(SAGITTA_RTOL * thinnest)).buffer(0.0)) for one in contours if one.closed]
+    areas = [union_all([ring for is_hole, ring in rings if is_hole is hole]) for hole in (False, True)]
     return areas[0].difference(areas[1]).buffer(OUTSIDE_RTOL * thinnest)
 
 
@@ -163,13 +162,13 @@ class _Look:
         self.names = [strip.name for strip in strips]
         sampled = [strip.sample(fillet) for strip in strips]
         self.points, self.way, self.half = (
-            np.concatenate([one[k] for one in sampled]) if sampled else np.zeros((0, 2) if k == 0 else 0)
+            np.concatenate([sample[k] for sample in sampled]) if sampled else np.zeros((0, 2) if k == 0 else 0)
             for k in range(3)
         )
-        self.strip = np.repeat(np.arange(len(strips)), [len(one[1]) for one in sampled])
+        self.strip = np.repeat(np.arange(len(strips)), [len(sample[1]) for sample in sampled])
         self.number, self.ways = nodes.ways(strips)
         # how far each point is from both nodes of its strip, and which they are
-        length = np.array([one[1][-1] for one in sampled])[self.strip]
+        length = np.array([sample[1][-1] for sample in sampled])[self.strip]
         self.to_ends = np.stack([self.way, length - self.way])
         self.ends = (
             np.array([[self.number[end] for end in strip.ends] for strip in strips]).reshape(-1, 2)[self.strip].T
@@ -182,25 +181,27 @@ class _Look:
         if not len(self.points):
             return
         reach = 2.0 * float(self.half.max()) + self.filled
-        one, other = cKDTree(self.points).query_pairs(reach, output_type="ndarray").T
-        gap = np.hypot(*(self.points[one] - self.points[other]).T) - self.half[one] - self.half[other]
-        near = gap < self.filled
-        one, other, gap = one[near], other[near], gap[near]
-        apart = self._way_between(one, other) > MIN_WAY_APART * (self.half[one] + self.half[other] + 2.0 * self.fillet)
-        one, other, gap = one[apart], other[apart], gap[apart]
-        pair = self.strip[one] * len(self.names) + self.strip[other]
+        first, second = cKDTree(self.points).query_pairs(reach, output_type="ndarray").T
+        gap = np.hypot(*(self.points[first] - self.points[second]).T) - self.half[first] - self.half[second]
+        is_close = gap < self.filled
+        first, second, gap = first[is_close], second[is_close], gap[is_close]
+        apart = self._way_between(first, second) > MIN_WAY_APART * (
+            self.half[first] + self.half[second] + 2.0 * self.fillet
+        )
+        first, second, gap = first[apart], second[apart], gap[apart]
+        pair = self.strip[first] * len(self.names) + self.strip[second]
         for which in np.unique(pair).tolist():
             a, b = (self.names[k] for k in divmod(which, len(self.names)))
-            own = pair == which
+            of_pair = pair == which
             if not _found_in_other_half(a, b):
-                yield *_order_names(a, b), self.points[one[own]], self.points[other[own]], gap[own]
+                yield *_order_names(a, b), self.points[first[of_pair]], self.points[second[of_pair]], gap[of_pair]
 
-    def _way_between(self, one: Any, other: Any) -> FloatArray:
+    def _way_between(self, first: Any, second: Any) -> FloatArray:
         """Return the shortest way along strips and through bodies between points (k,) [m]."""
-        along = np.where(self.strip[one] == self.strip[other], np.abs(self.way[one] - self.way[other]), np.inf)
+        along = np.where(self.strip[first] == self.strip[second], np.abs(self.way[first] - self.way[second]), np.inf)
         for i, j in itertools.product((0, 1), repeat=2):
-            through = self.ways[self.ends[i, one], self.ends[j, other]]
-            along = np.minimum(along, self.to_ends[i, one] + through + self.to_ends[j, other])
+            through = self.ways[self.ends[i, first], self.ends[j, second]]
+            along = np.minimum(along, self.to_ends[i, first] + through + self.to_ends[j, second])
         return np.asarray(along)
 
     def find_strips_close_to_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
@@ -210,38 +211,38 @@ class _Look:
         places = shapely.points(self.points)
         for block in blocks:
             to_node = self.ways[:, [self.number[node] for node in block.nodes]].min(axis=1)
-            way = np.minimum(*(self.to_ends[k] + to_node[self.ends[k]] for k in (0, 1)))
+            distance = np.minimum(*(self.to_ends[k] + to_node[self.ends[k]] for k in (0, 1)))
             shape = shapely.Polygon(block.shape)
             gap = shapely.distance(places, shape) - self.half
-            near = (gap < self.filled) & (way > MIN_WAY_APART * 2.0 * (self.half + self.fillet))
-            for which in np.unique(self.strip[near]).tolist():
-                own = np.flatnonzero(near & (self.strip == which))
+            is_close = (gap < self.filled) & (distance > MIN_WAY_APART * 2.0 * (self.half + self.fillet))
+            for which in np.unique(self.strip[is_close]).tolist():
+                of_strip = np.flatnonzero(is_close & (self.strip == which))
                 if _found_in_other_half(self.names[which], block.name):
                     continue
-                ends = shapely.get_coordinates(shapely.shortest_line(places[own], shape)).reshape(-1, 2, 2)
-                yield self.names[which], block.name, ends[:, 0], ends[:, 1], gap[own]
+                ends = shapely.get_coordinates(shapely.shortest_line(places[of_strip], shape)).reshape(-1, 2, 2)
+                yield self.names[which], block.name, ends[:, 0], ends[:, 1], gap[of_strip]
 
     def find_close_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
         """Yield blocks of different bodies that come close to each other."""
         import shapely
 
         body = {block.name: self.nodes.bodies.get(block.nodes[0], block.nodes[0]) for block in blocks}
-        for one, other in itertools.combinations(blocks, 2):
-            if body[one.name] == body[other.name] or _found_in_other_half(one.name, other.name):
+        for first, second in itertools.combinations(blocks, 2):
+            if body[first.name] == body[second.name] or _found_in_other_half(first.name, second.name):
                 continue
-            line = shapely.shortest_line(shapely.Polygon(one.shape), shapely.Polygon(other.shape))
+            line = shapely.shortest_line(shapely.Polygon(first.shape), shapely.Polygon(second.shape))
             if line.length < self.filled:
                 ends = shapely.get_coordinates(line)
-                yield *_order_names(one.name, other.name), ends[:1], ends[1:], np.array([line.length])
+                yield *_order_names(first.name, second.name), ends[:1], ends[1:], np.array([line.length])
 
 
-def _found_in_other_half(one: str, other: str) -> bool:
+def _found_in_other_half(first: str, second: str) -> bool:
     """Return True if both are of the mirrored half: what they do, the described half does."""
-    return one.endswith("'") and other.endswith("'")
+    return first.endswith("'") and second.endswith("'")
 
 
-def _order_names(one: str, other: str) -> tuple[str, str]:
+def _order_names(first: str, last: str) -> tuple[str, str]:
     """Return two names in one order, whichever of both is the mirrored one: b1 and b2' as well as b1' and b2."""
-    plain, second = sorted((one.rstrip("'"), other.rstrip("'")))
-    image = "'" if one.endswith("'") != other.endswith("'") else ""
+    plain, second = sorted((first.rstrip("'"), last.rstrip("'")))
+    image = "'" if first.endswith("'") != last.endswith("'") else ""
     return plain, second + image

@@ -118,17 +118,17 @@ def merge_pieces(
     cfmkit.errors.GeometryError
         If nothing is left.
     """
-    near = MAX_GRID_DISTANCES * GRID_DISTANCE * size
+    tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for piece in pieces for edge in piece.edges]
     whole = _unite([area for piece in pieces for area in piece.to_polygons(size)], size)
-    rings = [_recognise_edges(_ring(runs, near), near) for runs in _trace_rings(whole, tracks, size)]
+    rings = [_recognise_edges(_ring(runs, tolerance), tolerance) for runs in _trace_rings(whole, tracks, size)]
     if fillet > 0:
         rings = _round_chains(rings, fillet, size)
     if holes:
         tracks = [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for ring in rings for edge in ring]
         tracks += [TracedEdge.from_edge(edge, SAGITTA_RTOL * size) for hole in holes for edge in hole.reverse_edges()]
         left = _area(rings, size).difference(_unite([area for hole in holes for area in hole.to_polygons(size)], size))
-        rings = [_ring(runs, near) for runs in _trace_rings(left, tracks, size)]
+        rings = [_ring(runs, tolerance) for runs in _trace_rings(left, tracks, size)]
     if not rings:
         raise GeometryError("the pieces of the part leave nothing to cut")
     return tuple(Contour(tuple(ring), layer, closed=True, hole=_encloses(ring) < 0) for ring in rings)
@@ -158,11 +158,11 @@ def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
 
 def _encloses(ring: Sequence[Edge]) -> float:
     """Return the area of a closed chain of edges [m2], negative where it runs clockwise; of smooth ones by points."""
-    found = 0.0
+    area = 0.0
     for edge in ring:
         z = TracedEdge.from_edge(edge, math.inf).z
-        found += 0.5 * float((np.conj(z[:-1]) * z[1:]).imag.sum())
-    return found
+        area += 0.5 * float((np.conj(z[:-1]) * z[1:]).imag.sum())
+    return area
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,10 +204,10 @@ def _trace_rings(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Itera
                 yield sources.runs(corners)
 
 
-def _apart(corners: NDArray[np.complex128], near: float) -> NDArray[np.complex128]:
-    """Return the corners of a ring without those that are `near` the one before."""
+def _apart(corners: NDArray[np.complex128], tolerance: float) -> NDArray[np.complex128]:
+    """Return the corners of a ring without those that are `tolerance` the one before."""
     while len(corners) > 2:
-        close = np.abs(corners - np.roll(corners, 1)) <= near
+        close = np.abs(corners - np.roll(corners, 1)) <= tolerance
         if not close.any():
             break
         close &= ~np.roll(close, 1)  # of several in a row every second one first
@@ -238,24 +238,24 @@ class _Sources:
         off = np.maximum(np.abs(first.imag), np.abs(last.imag)) * length
         slack = self.near / length
         on = (off <= self.near) & (first.real < last.real) & (first.real >= -slack) & (last.real <= 1 + slack)
-        found: dict[int, list[tuple[int, float, float]]] = {}
+        candidates: dict[int, list[tuple[int, float, float]]] = {}
         for k in np.flatnonzero(on).tolist():
             place = float(self.number[source[k]])
             ends = place + float(first[k].real), place + float(last[k].real)
-            found.setdefault(int(line[k]), []).append((int(self.owner[source[k]]), *ends))
-        return self._join_runs([found.get(k) for k in range(len(corners))], a, b)
+            candidates.setdefault(int(line[k]), []).append((int(self.owner[source[k]]), *ends))
+        return self._join_runs([candidates.get(k) for k in range(len(corners))], a, b)
 
     def _join_runs(
-        self, found: list[list[tuple[int, float, float]] | None], a: NDArray[Any], b: NDArray[Any]
+        self, sources: list[list[tuple[int, float, float]] | None], a: NDArray[Any], b: NDArray[Any]
     ) -> list[_Run]:
         """Return the runs that lines with some possible sources each make: the same track as long as it goes on."""
         runs: list[list[Any]] = []
-        for k, candidates in enumerate(found):
+        for k, candidates in enumerate(sources):
             if candidates is None:  # a line that no edge explains stands for itself
                 runs.append([TracedEdge(Line(pair(a[k]), pair(b[k])), np.array([a[k], b[k]])), 0.0, 1.0])
                 continue
-            same = [one for one in candidates if runs and self._follows(runs[-1], one)]
-            owner, first, last = min(same or candidates, key=lambda one: (one[0], one[1]))
+            same = [candidate for candidate in candidates if runs and self._follows(runs[-1], candidate)]
+            owner, first, last = min(same or candidates, key=lambda candidate: (candidate[0], candidate[1]))
             if same:
                 runs[-1][2] = last
             else:
@@ -264,21 +264,21 @@ class _Sources:
             runs[0][1] = runs.pop()[1]
         return [_Run(*run) for run in runs]
 
-    def _follows(self, run: list[Any], one: tuple[int, float, float]) -> bool:
+    def _follows(self, run: list[Any], candidate: tuple[int, float, float]) -> bool:
         """Return True if a line goes on where a run ends."""
-        return run[0] is self.tracks[one[0]] and abs(run[2] - one[1]) < 0.01
+        return run[0] is self.tracks[candidate[0]] and abs(run[2] - candidate[1]) < 0.01
 
 
-def _ring(runs: Sequence[_Run], near: float) -> list[Edge]:
+def _ring(runs: Sequence[_Run], tolerance: float) -> list[Edge]:
     """Return runs as edges that meet: each begins where the one before ends."""
     if len(runs) == 1:
         return [runs[0].whole]
-    meetings = [_meeting(one, other) for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)]
+    meetings = [_meeting(first, second) for first, second in zip(runs, [*runs[1:], runs[0]], strict=True)]
     edges: list[Edge] = []
     for run, before, after in zip(runs, [meetings[-1], *meetings[:-1]], meetings, strict=True):
-        if abs(after.at - before.at) > near or abs(after.first - before.last) > 1.0:
+        if abs(after.at - before.at) > tolerance or abs(after.first - before.last) > 1.0:
             edges.append(run.track.part(before.last, after.first, before.at, after.at))
-    return _straighten_chain(edges, near)
+    return _straighten_chain(edges, tolerance)
 
 
 @dataclass(frozen=True)
@@ -290,12 +290,12 @@ class _Meeting:
     last: float
 
 
-def _meeting(one: _Run, other: _Run) -> _Meeting:
+def _meeting(before: _Run, after: _Run) -> _Meeting:
     """Return where the tracks of two runs meet, near the end of the first and the start of the second one.
 
     Tangent ones stay where the polygons have them; what they have in common is an end of one of them then.
     """
-    u, v, a, b = one.last, other.first, one.track, other.track
+    u, v, a, b = before.last, after.first, before.track, after.track
     step = 1e-4
     crossing = abs((a.ahead(u).conjugate() * b.ahead(v)).imag) > MIN_CROSSING_ANGLE
     for _ in range(30 if crossing else 0):
@@ -306,62 +306,64 @@ def _meeting(one: _Run, other: _Run) -> _Meeting:
             break
         by = (gap.conjugate() * q).imag / cross, (gap.conjugate() * p).imag / cross
         u, v = u + by[0], v + by[1]
-        if max(abs(u - one.last), abs(v - other.first)) > 1.5:
+        if max(abs(u - before.last), abs(v - after.first)) > 1.5:
             break
         if max(map(abs, by)) < 1e-12:
             return _Meeting(a.locate(u), u, v)
-    u, v = one.last, other.first
+    u, v = before.last, after.first
     ends = [(a, u, float(len(a.z) - 1)), (b, v, 0.0)]
     at = next((track.locate(end) for track, w, end in ends if abs(w - end) < 1e-3), a.locate(u))
     return _Meeting(at, *(end if abs(w - end) < 1e-3 else w for _, w, end in ends))
 
 
-def _recognise_edges(edges: Sequence[Edge], near: float) -> list[Edge]:
+def _recognise_edges(edges: Sequence[Edge], tolerance: float) -> list[Edge]:
     """Return a closed chain in which smooth edges that are lines or arcs are such."""
-    return _straighten_chain([_simplest(edge, near) if isinstance(edge, Smooth) else edge for edge in edges], near)
+    return _straighten_chain(
+        [_simplest(edge, tolerance) if isinstance(edge, Smooth) else edge for edge in edges], tolerance
+    )
 
 
-def _simplest(edge: Smooth, near: float) -> Edge:
-    """Return a smooth edge as the line or the arc that it is within `near` [m]."""
+def _simplest(edge: Smooth, tolerance: float) -> Edge:
+    """Return a smooth edge as the line or the arc that it is within `tolerance` [m]."""
     z = edge.points @ np.array([1, 1j])
     chord, middle = z[-1] - z[0], z[len(z) // 2]
-    if np.abs(((z - z[0]) / chord).imag).max() * abs(chord) <= near:
+    if np.abs(((z - z[0]) / chord).imag).max() * abs(chord) <= tolerance:
         return Line(pair(z[0]), pair(z[-1]))
     turns = np.angle(np.diff(z)[1:] / np.diff(z)[:-1])
     if len(z) < 4 or abs(turns.sum()) > 1.9 * math.pi:
         return edge
-    way = middle - z[0]  # the centre of the circle through the first, a middle and the last point
-    twice = 2.0 * (way.conjugate() * chord).imag
-    center = z[0] + 1j * (way * abs(chord) ** 2 - chord * abs(way) ** 2) / twice
+    chord_to_middle = middle - z[0]  # the centre of the circle through the first, a middle and the last point
+    twice = 2.0 * (chord_to_middle.conjugate() * chord).imag
+    center = z[0] + 1j * (chord_to_middle * abs(chord) ** 2 - chord * abs(chord_to_middle) ** 2) / twice
     spokes = z - center
-    if np.abs(np.abs(spokes) - abs(spokes[0])).max() > near:
+    if np.abs(np.abs(spokes) - abs(spokes[0])).max() > tolerance:
         return edge
     start, turn = float(np.angle(spokes[0])), float(np.angle(spokes[1:] / spokes[:-1]).sum())
     return Arc(pair(center), float(np.abs(spokes).mean()), start, start + turn)
 
 
-def _straighten_chain(edges: Sequence[Edge], near: float) -> list[Edge]:
+def _straighten_chain(edges: Sequence[Edge], tolerance: float) -> list[Edge]:
     """Return a closed chain in which lines, and arcs about one centre, that go on as they are, are one edge."""
-    found: list[Edge] = []
+    chain: list[Edge] = []
     for edge in edges:
-        one = _as_one(found[-1], edge, near) if found else None
-        found[len(found) - (one is not None) :] = [edge if one is None else one]
-    if len(found) > 2 and (one := _as_one(found[-1], found[0], near)) is not None:
-        found = [one, *found[1:-1]]
-    return found
+        merged = _as_one(chain[-1], edge, tolerance) if chain else None
+        chain[len(chain) - (merged is not None) :] = [edge if merged is None else merged]
+    if len(chain) > 2 and (merged := _as_one(chain[-1], chain[0], tolerance)) is not None:
+        chain = [merged, *chain[1:-1]]
+    return chain
 
 
-def _as_one(one: Edge, other: Edge, near: float) -> Edge | None:
+def _as_one(before: Edge, after: Edge, tolerance: float) -> Edge | None:
     """Return two edges as one; None if there is a corner between them, or they are of two kinds."""
-    if isinstance(one, Line) and isinstance(other, Line):
-        first, second = (edge.ends[1] - edge.ends[0] for edge in (one, other))
+    if isinstance(before, Line) and isinstance(after, Line):
+        first, second = (edge.ends[1] - edge.ends[0] for edge in (before, after))
         off = abs(float(np.angle(second / first))) * min(abs(first), abs(second))
-        return Line(one.start, other.end) if off <= near else None
-    if isinstance(one, Arc) and isinstance(other, Arc) and (one.end > one.start) == (other.end > other.start):
-        apart = abs(complex(*one.center) - complex(*other.center)) + abs(one.radius - other.radius)
-        turn = one.end - one.start + other.end - other.start
-        if apart <= 10 * near and abs(turn) <= 2 * math.pi:
-            return Arc(one.center, one.radius, one.start, one.start + turn)
+        return Line(before.start, after.end) if off <= tolerance else None
+    if isinstance(before, Arc) and isinstance(after, Arc) and (before.end > before.start) == (after.end > after.start):
+        apart = abs(complex(*before.center) - complex(*after.center)) + abs(before.radius - after.radius)
+        turn = before.end - before.start + after.end - after.start
+        if apart <= 10 * tolerance and abs(turn) <= 2 * math.pi:
+            return Arc(before.center, before.radius, before.start, before.start + turn)
     return None
 
 
@@ -385,9 +387,9 @@ def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -
             elif turn < -TANGENT_ANGLE:  # an inside corner: beside edges shorter than the radius only it is near enough
                 areas.append(TracedEdge.from_edge(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
     reach = _unite(areas, size, _area(rings, size))
-    near = MAX_GRID_DISTANCES * GRID_DISTANCE * size
-    touched = (_touch_edges(runs, radius, near) for runs in _trace_rings(reach, ways, size))
-    closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= near)
+    tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
+    touched = (_touch_edges(runs, radius, tolerance) for runs in _trace_rings(reach, ways, size))
+    closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= tolerance)
     return [ring for ring in closed if abs(_encloses(ring)) > (MIN_HOLE_SIDE * size) ** 2]
 
 
@@ -409,36 +411,36 @@ def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iter
                 yield np.asarray(hull.exterior.coords)[:-1]
 
 
-def _touch_edges(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
+def _touch_edges(runs: Sequence[_Run], radius: float, tolerance: float) -> list[Edge]:
     """Return the edges that a cutter touches whose centre runs so, and the arcs that it leaves between them."""
     runs = [run for run in runs if run.track.moved or isinstance(run.track.edge, Arc)]
     if len(runs) < 2:
         return [run.whole for run in runs if run.track.moved]
-    meetings = [_meeting(one, other) for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)]
+    meetings = [_meeting(first, second) for first, second in zip(runs, [*runs[1:], runs[0]], strict=True)]
     edges: list[Edge] = []
     around = zip(runs, [*runs[1:], runs[0]], [meetings[-1], *meetings[:-1]], meetings, strict=True)
     for run, following, before, after in around:
         start, end, beyond = _foot(run, before.last), _foot(run, after.first), _foot(following, after.last)
-        if run.track.moved and (abs(end - start) > near or after.first - before.last > 1.0):
+        if run.track.moved and (abs(end - start) > tolerance or after.first - before.last > 1.0):
             edges.append(run.track.part(before.last, after.first, start, end))
-        if abs(beyond - end) > near:
+        if abs(beyond - end) > tolerance:
             center = _center_between(end, beyond, after.at, radius)
             first, turn = float(np.angle(end - center)), float(np.angle((beyond - center) / (end - center)))
             edges.append(Arc(pair(center), radius, first, first - (-turn % (2 * math.pi))))
-    return _straighten_chain(edges, near)
+    return _straighten_chain(edges, tolerance)
 
 
-def _center_between(start: complex, end: complex, near: complex, radius: float) -> complex:
+def _center_between(start: complex, end: complex, place: complex, radius: float) -> complex:
     """Return the centre of the arc of a radius [m] through two points: that on the side of a place near it.
 
     Where two ways of the cutter meet at a small angle the place is known less exactly than the points are.
     """
     half = 0.5 * (end - start)
     if not 0 < abs(half) < radius:
-        return near
+        return place
     aside = 1j * half / abs(half) * math.sqrt(radius**2 - abs(half) ** 2)
     middle = 0.5 * (start + end)
-    return min(middle + aside, middle - aside, key=lambda center: abs(center - near))
+    return min(middle + aside, middle - aside, key=lambda center: abs(center - place))
 
 
 def _foot(run: _Run, u: float) -> complex:

@@ -112,10 +112,12 @@ def drawing_figure(
     figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()
     overall = _overall(drawing)
-    own = [one for one in drawing.dimensions if not any(_same(one, whole) for whole in overall)]
-    dimensions = [*own, *overall]
-    below = DIMENSION_STEP * (1 + sum(one.along == "x" for one in dimensions))
-    beside = DIMENSION_STEP * (1 + sum(one.along == "y" for one in dimensions))
+    own_dimensions = [
+        dimension for dimension in drawing.dimensions if not any(_same(dimension, whole) for whole in overall)
+    ]
+    dimensions = [*own_dimensions, *overall]
+    below = DIMENSION_STEP * (1 + sum(dimension.along == "x" for dimension in dimensions))
+    beside = DIMENSION_STEP * (1 + sum(dimension.along == "y" for dimension in dimensions))
     room = PAPER_SIZE[0] - COLUMN_WIDTH - beside - 6.0, PAPER_SIZE[1] - below - 12.0
     scale = _scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
     width, height = scale * (x1 - x0), scale * (y1 - y0)
@@ -130,16 +132,16 @@ def drawing_figure(
     for contour in drawing.contours:
         if contour.layer != "reference":
             _contour(ax, contour)
-    found = list(holes(drawing))
-    for number, hole in enumerate(found[:MOST_HOLES], start=1):
+    drawn_holes = list(holes(drawing))
+    for number, hole in enumerate(drawn_holes[:MOST_HOLES], start=1):
         _hole(ax, hole, number, drawing, scale)
-    if found:
+    if drawn_holes:
         ax.plot(x0, y0, marker="+", markersize=9, color=LINE_VERMILLION, zorder=6, gid="datum")
     _dimensions(ax, dimensions, (x0, y0, x1, y1), scale, decimals)
     for section in thicknesses(drawing):
         _thickness(ax, section, scale, decimals)
     ratio = f"{scale:g} : 1" if scale >= 1 else f"1 : {1 / scale:g}"
-    _words(figure, drawing, found, (title, ratio), tolerances, block)
+    _words(figure, drawing, drawn_holes, (title, ratio), tolerances, block)
     return figure
 
 
@@ -195,14 +197,14 @@ def _thickness(ax: Axes, section: BeamSection, scale: float, decimals: int) -> N
 def holes(drawing: Drawing) -> Iterator[_Hole]:
     """Yield the round holes of a drawing, by diameter, then from the datum outwards."""
     x0, y0, _, _ = drawing.extents
-    found = [
+    round_holes = [
         _Hole(edge.center[0] - x0, edge.center[1] - y0, 2.0 * edge.radius)
         for contour in drawing.contours
         if contour.hole and len(contour.edges) == 1
         for edge in contour.edges
         if isinstance(edge, Arc) and edge.full
     ]
-    yield from sorted(found, key=lambda hole: (round(hole.diameter, 9), round(hole.y, 9), round(hole.x, 9)))
+    yield from sorted(round_holes, key=lambda hole: (round(hole.diameter, 9), round(hole.y, 9), round(hole.x, 9)))
 
 
 def _overall(drawing: Drawing) -> list[DrawnDimension]:
@@ -211,19 +213,19 @@ def _overall(drawing: Drawing) -> list[DrawnDimension]:
     return [DrawnDimension("overall", (x0, y0), (x1, y0), "x"), DrawnDimension("overall", (x0, y0), (x0, y1), "y")]
 
 
-def _same(one: DrawnDimension, other: DrawnDimension) -> bool:
+def _same(first: DrawnDimension, second: DrawnDimension) -> bool:
     """Return whether two dimensions along the same axis have the same ends."""
-    axis = "xy".find(one.along)
-    if one.along != other.along or axis < 0:
+    axis = "xy".find(first.along)
+    if first.along != second.along or axis < 0:
         return False
-    ends = [sorted((each.start[axis], each.end[axis])) for each in (one, other)]
+    ends = [sorted((dimension.start[axis], dimension.end[axis])) for dimension in (first, second)]
     return bool(np.allclose(ends[0], ends[1], rtol=0.0, atol=1e-9))
 
 
 def _scale(largest: float) -> float:
     """Return the largest scale of paper that fits [mm of print for 1 mm]."""
-    found = [one for one in (*PAPER_SCALES, *(1.0 / one for one in PAPER_SCALES)) if one <= largest]
-    return max(found, default=largest)
+    fitting = [scale for scale in (*PAPER_SCALES, *(1.0 / scale for scale in PAPER_SCALES)) if scale <= largest]
+    return max(fitting, default=largest)
 
 
 def _points(edge: Edge) -> FloatArray:
@@ -265,21 +267,28 @@ def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) ->
     # beside the hole, or beyond the line around it
     spots = [(side, share * arm) for share in (0.75, 1.1, 1.5, 2.0) for side in NUMBER_SIDES]
     clear = (spot for spot in spots if _is_clear(drawing, (x, y), spot[0], spot[1], text))
-    (right, up), near = next(clear, spots[0])
+    (right, up), distance = next(clear, spots[0])
     ha, va = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
     ax.text(
-        x + right * near, y + up * near, str(number), fontsize=SMALL_FONT, color=LINE_VERMILLION, ha=ha, va=va, zorder=6
+        x + right * distance,
+        y + up * distance,
+        str(number),
+        fontsize=SMALL_FONT,
+        color=LINE_VERMILLION,
+        ha=ha,
+        va=va,
+        zorder=6,
     )
 
 
 def _is_clear(
-    drawing: Drawing, centre: tuple[float, float], side: tuple[int, int], near: float, text: tuple[float, float]
+    drawing: Drawing, centre: tuple[float, float], side: tuple[int, int], distance: float, text: tuple[float, float]
 ) -> bool:
     """Return whether no line runs through the box of a text beside a point [mm]."""
     from matplotlib.path import Path
     from matplotlib.transforms import Bbox
 
-    begin = [at + direction * near for at, direction in zip(centre, side, strict=True)]
+    begin = [at + direction * distance for at, direction in zip(centre, side, strict=True)]
     end = [at + direction * size for at, direction, size in zip(begin, side, text, strict=True)]
     box = Bbox([begin, end])
     lines = (contour for contour in drawing.contours if contour.layer not in UNCUT_LAYERS)
@@ -290,26 +299,30 @@ def _dimensions(
     ax: Axes, dimensions: Sequence[DrawnDimension], box: tuple[float, float, float, float], scale: float, decimals: int
 ) -> None:
     """Draw dimensions: those along x below the part, those along y at its left, the short ones nearest to it."""
-    across = sorted((one for one in dimensions if one.along == "x"), key=lambda one: one.value)
-    up = sorted((one for one in dimensions if one.along == "y"), key=lambda one: one.value)
-    for number, one in enumerate(across, start=1):
+    across = sorted(
+        (dimension for dimension in dimensions if dimension.along == "x"), key=lambda dimension: dimension.value
+    )
+    up = sorted(
+        (dimension for dimension in dimensions if dimension.along == "y"), key=lambda dimension: dimension.value
+    )
+    for number, dimension in enumerate(across, start=1):
         y = box[1] - number * DIMENSION_STEP / scale
-        (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
-        _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(one, decimals), scale)
+        (xa, ya), (xb, yb) = mm([dimension.start, dimension.end]).tolist()
+        _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(dimension, decimals), scale)
         _extension(ax, [(xa, ya), (xa, y)], [(xb, yb), (xb, y)])
-    for number, one in enumerate(up, start=1):
+    for number, dimension in enumerate(up, start=1):
         x = box[0] - number * DIMENSION_STEP / scale
-        (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
-        _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(one, decimals), scale)
+        (xa, ya), (xb, yb) = mm([dimension.start, dimension.end]).tolist()
+        _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(dimension, decimals), scale)
         _extension(ax, [(xa, ya), (x, ya)], [(xb, yb), (x, yb)])
-    for one in dimensions:
-        if one.along == "line":
-            start, end = mm([one.start, one.end]).tolist()
-            _line(ax, (start[0], start[1]), (end[0], end[1]), _text(one, decimals), scale)
+    for dimension in dimensions:
+        if dimension.along == "line":
+            start, end = mm([dimension.start, dimension.end]).tolist()
+            _line(ax, (start[0], start[1]), (end[0], end[1]), _text(dimension, decimals), scale)
 
 
-def _text(one: DrawnDimension, decimals: int) -> str:
-    return f"{one.name} {length_in_words(one.value, decimals)}"
+def _text(dimension: DrawnDimension, decimals: int) -> str:
+    return f"{dimension.name} {length_in_words(dimension.value, decimals)}"
 
 
 def _extension(ax: Axes, *lines: list[tuple[float, float]]) -> None:
@@ -354,7 +367,7 @@ def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: 
 def _words(
     figure: Figure,
     drawing: Drawing,
-    found: Sequence[_Hole],
+    drawn_holes: Sequence[_Hole],
     about: tuple[str, str],
     tolerances: Sequence[str],
     block: TitleBlock | None,
@@ -375,18 +388,18 @@ def _words(
     for word, text in rows:
         ax.text(4.0, y, word, fontsize=SMALL_FONT, color=TEXT_GREY, va="top")
         y = _write_text(ax, 24.0, y, text) - 0.6
-    if found:
+    if drawn_holes:
         y = _write_text(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL_FONT)
-        for number, hole in enumerate(found[:MOST_HOLES], start=1):
+        for number, hole in enumerate(drawn_holes[:MOST_HOLES], start=1):
             x, up, across = (length_in_words(size, decimals) for size in (hole.x, hole.y, hole.diameter))
             screw = screw_through(hole.diameter)
             fits = f" ({screw.name})" if screw and math.isclose(screw.hole, hole.diameter, rel_tol=SIZE_RTOL) else ""
             y = _write_text(ax, 4.0, y, f"{number}   \u2300 {across}{fits}   x {x}, y {up}")
-        if len(found) > MOST_HOLES:
-            y = _write_text(ax, 4.0, y, f"and {len(found) - MOST_HOLES} more, in the DXF file")
+        if len(drawn_holes) > MOST_HOLES:
+            y = _write_text(ax, 4.0, y, f"and {len(drawn_holes) - MOST_HOLES} more, in the DXF file")
     for heading, lines in (
         ("tolerances", tolerances),
-        ("notes", (*drawing.notes, *(one.message for one in drawing.warnings))),
+        ("notes", (*drawing.notes, *(warning.message for warning in drawing.warnings))),
     ):
         if lines:
             y = _write_text(ax, 4.0, y - 2.0, heading, NORMAL_FONT)
@@ -426,9 +439,9 @@ def _sheet(drawing: Drawing, decimals: int) -> str:
     others = sorted({region.thickness for region in sheet.regions})
     if sheet.thickness is None:
         return "thickness not stated" + (f" ('{sheet.key}')" if sheet.key else "")
-    found = length_in_words(sheet.thickness, decimals)
-    more = [length_in_words(one, decimals) for one in others if one != sheet.thickness]
-    return found + (f"; in part {', '.join(more)}" if more else "")
+    text = length_in_words(sheet.thickness, decimals)
+    more = [length_in_words(thickness, decimals) for thickness in others if thickness != sheet.thickness]
+    return text + (f"; in part {', '.join(more)}" if more else "")
 
 
 LETTER_WIDTH = 0.235

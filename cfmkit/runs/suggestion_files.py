@@ -36,13 +36,18 @@ class Deadlines:
 
 
 def files(
-    found: Suggestions, block: SuggestBlock, run: Run, plots: bool, deadlines: Deadlines, command: str | None = None
+    suggestions: Suggestions,
+    block: SuggestBlock,
+    run: Run,
+    plots: bool,
+    deadlines: Deadlines,
+    command: str | None = None,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield every file of the run as (name below the folder, content).
 
     Parameters
     ----------
-    found, block : Suggestions and SuggestBlock
+    suggestions, block : Suggestions and SuggestBlock
         Proposals, and the block `suggest`.
     run : Run
         Its executor draws the proposals.
@@ -53,32 +58,40 @@ def files(
     command : str, optional
         How the search was started, for ``report.html``; None: no page is written, nor one of each proposal.
     """
-    yield "metrics.json", json_bytes(as_json(found, block))
-    yield "suggestions.csv", table(found)
+    yield "metrics.json", json_bytes(as_json(suggestions, block))
+    yield "suggestions.csv", table(suggestions)
     in_time = not deadlines.figures.late()
-    drawn = {"proposals": _picture(found)} if found.listed and in_time and (plots or command is not None) else {}
+    drawn = (
+        {"proposals": _picture(suggestions)}
+        if suggestions.listed and in_time and (plots or command is not None)
+        else {}
+    )
     if plots:
         from cfmkit.plots.style import png
 
         for name, figure in drawn.items():
             yield f"figures/{name}.png", png(figure)
     if command is not None:
-        texts = {folder_name(number, one): one.text for number, one in enumerate(found.listed, 1)}
-        yield html.REPORT_NAME, page(as_json(found, block), exit_code(found), texts, drawn, command)
-    work = partial(_make_files, (plots, command is not None), deadlines, found.listed)
-    made = dict(give_up_at(run.executor, deadlines.files.deadline)(work, iter(range(len(found.listed))), lambda: False))
-    for index, one in enumerate(found.listed):
+        texts = {folder_name(number, proposal): proposal.text for number, proposal in enumerate(suggestions.listed, 1)}
+        yield html.REPORT_NAME, page(as_json(suggestions, block), exit_code(suggestions), texts, drawn, command)
+    work = partial(_make_files, (plots, command is not None), deadlines, suggestions.listed)
+    made = dict(
+        give_up_at(run.executor, deadlines.files.deadline)(work, iter(range(len(suggestions.listed))), lambda: False)
+    )
+    for index, proposal in enumerate(suggestions.listed):
         files = made.get(index)
-        for name, data in files if isinstance(files, list) else [("design.yaml", one.text.encode())]:
-            yield f"{folder_name(index + 1, one)}/{name}", data
+        for name, data in files if isinstance(files, list) else [("design.yaml", proposal.text.encode())]:
+            yield f"{folder_name(index + 1, proposal)}/{name}", data
 
 
-def _picture(found: Suggestions) -> Figure:
+def _picture(suggestions: Suggestions) -> Figure:
     """Return all proposals to one scale; on a page each leads to its report."""
     from cfmkit.studies.suggest.figures import to_one_scale
 
-    links = [f"{folder_name(number, one)}/{html.REPORT_NAME}" for number, one in enumerate(found.listed, 1)]
-    return to_one_scale(found.listed, found.request, links)
+    links = [
+        f"{folder_name(number, proposal)}/{html.REPORT_NAME}" for number, proposal in enumerate(suggestions.listed, 1)
+    ]
+    return to_one_scale(suggestions.listed, suggestions.request, links)
 
 
 def _make_files(
@@ -104,8 +117,8 @@ def _make_files(
             *_draw_part(spec, plots=wanted[0] and not deadlines.figures.late()),
         ]
     plots, page = wanted
-    found = dict(files(report_on(api.analyze(spec), design), plots and not deadlines.figures.late(), page))
-    return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
+    made_files = dict(files(report_on(api.analyze(spec), design), plots and not deadlines.figures.late(), page))
+    return list(({"design.yaml": b""} | made_files | {"design.yaml": proposal.text.encode()}).items())
 
 
 MAX_SLOWDOWN = 2.0
@@ -127,29 +140,29 @@ def _draw_part(spec: Spec, plots: bool) -> Iterator[tuple[str, bytes]]:
         yield "figures/drawing.png", png(part_on_paper(drawing, spec))
 
 
-def table(found: Suggestions) -> bytes:
+def table(suggestions: Suggestions) -> bytes:
     """Return suggestions.csv: a row a proposal, then those that were not judged in full, then the near misses."""
     from cfmkit.tables import to_csv
     from cfmkit.tables.table import Table, TableColumn
 
-    rows = [*enumerate(found.listed, 1), *((None, one) for one in found.near)]
-    numbers = [with_force(found, one) for _, one in rows]
-    unit = "N" if found.request.kind == "force" else "N*mm"
+    rows = [*enumerate(suggestions.listed, 1), *((None, proposal) for proposal in suggestions.near)]
+    numbers = [with_force(suggestions, proposal) for _, proposal in rows]
+    unit = "N" if suggestions.request.kind == "force" else "N*mm"
     columns = [
         TableColumn("number", tuple(number for number, _ in rows)),
-        TableColumn("family", tuple(one.family for _, one in rows)),
-        TableColumn("variant", tuple(one.variant for _, one in rows)),
+        TableColumn("family", tuple(proposal.family for _, proposal in rows)),
+        TableColumn("variant", tuple(proposal.variant for _, proposal in rows)),
     ]
     for name, (dimension, border) in RECORD_COLUMNS.items():
-        head = f"{found.request.kind}_mean" if name == "mean" else name
-        values = tuple(each.get(name) for each in numbers)
+        head = f"{suggestions.request.kind}_mean" if name == "mean" else name
+        values = tuple(record.get(name) for record in numbers)
         columns.append(TableColumn(head, values, unit if name == "mean" else border if dimension != "count" else None))
-    columns.append(TableColumn("verdict", tuple(one.verdict for _, one in rows)))
-    columns.append(TableColumn("model", tuple(one.model for _, one in rows)))
-    columns.append(TableColumn("warnings", tuple("; ".join(one.warnings) for _, one in rows)))
-    columns.append(TableColumn("unjudged", tuple("; ".join(one.open) for _, one in rows)))
-    columns.append(TableColumn("misses", tuple("; ".join(one.missed) for _, one in rows)))
-    columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, one) for n, one in rows)))
+    columns.append(TableColumn("verdict", tuple(proposal.verdict for _, proposal in rows)))
+    columns.append(TableColumn("model", tuple(proposal.model for _, proposal in rows)))
+    columns.append(TableColumn("warnings", tuple("; ".join(proposal.warnings) for _, proposal in rows)))
+    columns.append(TableColumn("unjudged", tuple("; ".join(proposal.open) for _, proposal in rows)))
+    columns.append(TableColumn("misses", tuple("; ".join(proposal.missed) for _, proposal in rows)))
+    columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, proposal) for n, proposal in rows)))
     return to_csv(Table(tuple(columns)))
 
 
@@ -172,8 +185,8 @@ def page(
         How the search was started.
     """
     document = document_of(record, code)
-    found = (*record["proposals"], *record["unjudged"])
-    specs = [(f"Specification {one['folder']}", texts[one["folder"]]) for one in found]
+    proposals = (*record["proposals"], *record["unjudged"])
+    specs = [(f"Specification {proposal['folder']}", texts[proposal["folder"]]) for proposal in proposals]
     return html.page(document, drawn, subject=_list_in_words(record["suggest"]), command=command, texts=specs)
 
 
@@ -199,7 +212,7 @@ LIST_SEPARATORS = {"envelope": " x ", "material": " or ", "prefer": ", "}
 
 def _words(key: str, value: Any) -> str:
     if isinstance(value, list | tuple):
-        return LIST_SEPARATORS.get(key, " to ").join(_words(key, one) for one in value)
+        return LIST_SEPARATORS.get(key, " to ").join(_words(key, item) for item in value)
     if isinstance(value, dict):
         return str(value.get("name") or _list_in_words(value))
     return format_short(value, "ratio", 3) if key in SHARE_COLUMNS and isinstance(value, float | int) else str(value)

@@ -122,13 +122,15 @@ def mesh(
         corners = _triangles(region, points)
         missing = _missing(corners, laid)
         crossed = [_crossed_pieces(region, corners, points, seam, near) for seam in seams]
-        if not any(len(one) for one in (*missing, *crossed)):
+        if not any(len(pieces) for pieces in (*missing, *crossed)):
             return _six_nodes(points, corners, rings, laid)
         first = next(
             (ring.locate(arc[at[:1]])[0] for ring, arc, at in zip(rings, laid, missing, strict=True) if len(at)),
             next((middles[0] for middles in crossed if len(middles)), np.zeros(2)),
         )
-        on_seams = [np.concatenate([known, more]) for known, more in zip(on_seams, crossed, strict=True)]
+        on_seams = [
+            np.concatenate([points_on_seam, more]) for points_on_seam, more in zip(on_seams, crossed, strict=True)
+        ]
         laid = [_halve_pieces(ring, arc, at) for ring, arc, at in zip(rings, laid, missing, strict=True)]
     reason = "it touches itself, or is thinner than an element"
     raise GeometryError(f"the outline cannot be meshed at {place_text(first)}: {reason}")
@@ -175,21 +177,23 @@ MIN_CROSSING_SINE = 0.5
 """Sine of the angle at which a seam must cross an edge to begin at a node of it."""
 
 
-def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, near: float) -> FloatArray:
+def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, tolerance: float) -> FloatArray:
     """Return the arc lengths (k,) [m] at which a ring crosses or leaves seams, but for those next to its corners."""
     along = np.roll(ring.points, -1, axis=0) - ring.points
     found = []
     for start, end in seams:
-        seam, way = end - start, start - ring.points
+        seam, to_ring = end - start, start - ring.points
         det = along[:, 0] * seam[1] - along[:, 1] * seam[0]
         steep = np.abs(det) > MIN_CROSSING_SINE * ring.lengths * np.hypot(*seam)
         det = np.where(steep, det, 1.0)
-        share = (way[:, 0] * seam[1] - way[:, 1] * seam[0]) / det
-        on_seam = (way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0]) / det
-        slack = max(1e-6, near / float(np.hypot(*seam)))  # ends of seams stand on edges, as closely as those are drawn
+        share = (to_ring[:, 0] * seam[1] - to_ring[:, 1] * seam[0]) / det
+        on_seam = (to_ring[:, 0] * along[:, 1] - to_ring[:, 1] * along[:, 0]) / det
+        slack = max(
+            1e-6, tolerance / float(np.hypot(*seam))
+        )  # ends of seams stand on edges, as closely as those are drawn
         met = steep & (share >= 0) & (share < 1) & (on_seam >= -slack) & (on_seam <= 1 + slack)
         found.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
-        found.append(ring.places[:-1][_leaving(ring, start, end, near)])
+        found.append(ring.places[:-1][_leaving(ring, start, end, tolerance)])
     arcs = np.unique(np.concatenate([np.zeros(0), *found]))
     if not len(arcs):
         return arcs
@@ -200,15 +204,15 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, near: floa
     return np.asarray(arcs[(away > 0.2 * field(places)) & apart])
 
 
-def _leaving(ring: Ring, start: FloatArray, end: FloatArray, near: float) -> NDArray[np.bool_]:
-    """Return at which vertices (n,) of a ring it is within `near` [m] of a seam, but not at one of its neighbours.
+def _leaving(ring: Ring, start: FloatArray, end: FloatArray, tolerance: float) -> NDArray[np.bool_]:
+    """Return at which vertices (n,) of a ring it is within `tolerance` [m] of a seam, but not at one of its neighbours.
 
     A side of an element across such a place, where a fillet runs out on the face of a clamp, would be held at one end
     and in the middle: the spring of `vcfm_ding2022` with fillets of 1 mm was 1.9e-3 too soft or too stiff by chance.
     """
     from shapely import LineString, distance, points
 
-    close = np.asarray(distance(LineString([start, end]), points(ring.points)) <= near)
+    close = np.asarray(distance(LineString([start, end]), points(ring.points)) <= tolerance)
     return np.asarray(close & ~(np.roll(close, 1) & np.roll(close, -1)))
 
 
@@ -218,14 +222,14 @@ def _boundary_nodes(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArr
     stops = np.unique(np.concatenate([stops, _curvature_jumps(ring, stops, field)]))
     stops = stops if len(stops) else np.zeros(1)
     ends = np.append(stops[1:], stops[0] + ring.places[-1])
-    found = []
+    places = []
     for low, high in zip(stops, ends, strict=True):
         fine = np.linspace(low, high, max(64, int(8 * (high - low) / field.sizes.min()) + 1))
         density = 1.0 / field(ring.locate(fine))
         count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
         pieces = max(1 if len(stops) > 2 else 3, round(float(count[-1])))
-        found.append(np.interp(np.arange(pieces) * count[-1] / pieces, count, fine))
-    return np.concatenate(found)
+        places.append(np.interp(np.arange(pieces) * count[-1] / pieces, count, fine))
+    return np.concatenate(places)
 
 
 MAX_CURVATURE_JUMP = 0.05
@@ -238,15 +242,15 @@ def _curvature_jumps(ring: Ring, stops: FloatArray, field: Sizes) -> FloatArray:
     sizes = field(ring.points)
     jumps = sizes * ring.curvature_jumps
     taken = list(ring.locate(stops))
-    found = []
+    places = []
     for vertex in np.flatnonzero(jumps > MAX_CURVATURE_JUMP)[
         np.argsort(-jumps[jumps > MAX_CURVATURE_JUMP], kind="stable")
     ]:
         place = ring.points[vertex]
-        if all(np.hypot(*(place - other)) > MIN_STOP_DISTANCE * sizes[vertex] for other in taken):
+        if all(np.hypot(*(place - stop)) > MIN_STOP_DISTANCE * sizes[vertex] for stop in taken):
             taken.append(place)
-            found.append(ring.places[vertex])
-    return np.array(found)
+            places.append(ring.places[vertex])
+    return np.array(places)
 
 
 MIN_STOP_DISTANCE = 0.4
@@ -258,17 +262,17 @@ def _sample_interior(region: Any, field: Sizes, random: np.random.Generator) -> 
     from shapely import contains_xy
 
     least = float(field.sizes.min())
-    found = [np.zeros((0, 2))]
+    interior = [np.zeros((0, 2))]
     for size in least * 2.0 ** np.arange(int(np.ceil(np.log2(field.largest / least))) + 1):
         # one lattice for each octave of sizes, so that nothing is thinned to less than a quarter
         points = _lattice(region.bounds, field, size)
         points = points[contains_xy(region, points)]
         wanted = field(points)
         kept = (wanted >= size) & (wanted < 2 * size) & (random.random(len(points)) < (size / wanted) ** 2)
-        found.append(points[kept])
-        if 4 * sum(map(len, found)) > MOST_NODES:
-            raise _too_many(4 * sum(map(len, found)))
-    return np.concatenate(found)
+        interior.append(points[kept])
+        if 4 * sum(map(len, interior)) > MOST_NODES:
+            raise _too_many(4 * sum(map(len, interior)))
+    return np.concatenate(interior)
 
 
 CELL_SIZE = 16
@@ -287,8 +291,8 @@ def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: floa
     cells = np.zeros((1, 2), np.int64)
     while True:
         middles = np.array([x0, y0]) + side * (cells + 0.5 * times)
-        near = field(middles) - SIZE_GRADING * times * side  # sizes change by that within half a diagonal
-        cells = cells[near < 2 * size]
+        sizes = field(middles) - SIZE_GRADING * times * side  # sizes change by that within half a diagonal
+        cells = cells[sizes < 2 * size]
         if CELL_SIZE**2 * len(cells) > 20 * MOST_NODES:  # of them a few lie in the part
             raise _too_many(CELL_SIZE**2 * len(cells))
         if times == 1:
@@ -318,15 +322,15 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
 
     fine = seam[0] + np.linspace(0.0, 1.0, 2000)[:, None] * (seam[1] - seam[0])
     fine = fine[contains_xy(region, fine)]
-    way = np.hypot(*np.diff(fine, axis=0, prepend=fine[:1]).T)
-    jumps: list[int] = np.flatnonzero(way > 1.5 * np.median(way)).tolist() if len(fine) > 2 else []
-    found = [np.zeros((0, 2))]
+    step_lengths = np.hypot(*np.diff(fine, axis=0, prepend=fine[:1]).T)
+    jumps: list[int] = np.flatnonzero(step_lengths > 1.5 * np.median(step_lengths)).tolist() if len(fine) > 2 else []
+    sewn = [np.zeros((0, 2))]
     for piece in np.split(fine, jumps):
         if len(piece) > 2:
             count = np.cumsum(np.hypot(*np.diff(piece, axis=0, prepend=piece[:1]).T) / field(piece))
             places = np.linspace(0.0, count[-1], max(2, round(float(count[-1]))) + 1)
-            found.append(np.column_stack([np.interp(places, count, piece[:, k]) for k in (0, 1)]))
-    points = np.concatenate(found)
+            sewn.append(np.column_stack([np.interp(places, count, piece[:, k]) for k in (0, 1)]))
+    points = np.concatenate(sewn)
     # not to the nearest place where sizes are known: those are so far apart that a seam on the edge of small fillets
     # had points on that edge, which could then not be meshed
     clearance = distance(region.boundary, points_of(points))
@@ -364,10 +368,10 @@ def _relax_points(region: Any, room: Spacing, fixed: FloatArray, inside: FloatAr
         bars = np.column_stack([keys // len(points), keys % len(points)])
         sizes = field(0.5 * (points[bars[:, 0]] + points[bars[:, 1]]))
         for _ in range(MOVES_PER_ROUND):
-            way = points[bars[:, 0]] - points[bars[:, 1]]
-            length = np.hypot(*way.T)
+            bar_vectors = points[bars[:, 0]] - points[bars[:, 1]]
+            length = np.hypot(*bar_vectors.T)
             wanted = BAR_LENGTH_FACTOR * np.sqrt((length**2).sum() / (sizes**2).sum()) * sizes
-            push = (np.maximum(wanted - length, 0.0) / length)[:, None] * way
+            push = (np.maximum(wanted - length, 0.0) / length)[:, None] * bar_vectors
             force = np.column_stack(
                 [np.bincount(bars.ravel("F"), np.concatenate([push[:, k], -push[:, k]]), len(points)) for k in (0, 1)]
             )
@@ -381,24 +385,24 @@ def _triangles(region: Any, points: FloatArray) -> IntArray:
     """Return Delaunay's triangles (m, 3) in the part, counter-clockwise."""
     from shapely import contains_xy
 
-    found = Delaunay(points).simplices.astype(np.int64)
-    found = found[contains_xy(region, points[found].mean(axis=1))]
-    a, b, c = points[found].swapaxes(0, 1)
+    triangles = Delaunay(points).simplices.astype(np.int64)
+    triangles = triangles[contains_xy(region, points[triangles].mean(axis=1))]
+    a, b, c = points[triangles].swapaxes(0, 1)
     twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    found[twice < 0] = found[twice < 0][:, [0, 2, 1]]
+    triangles[twice < 0] = triangles[twice < 0][:, [0, 2, 1]]
     longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0)
     flat = np.abs(twice) <= 1e-6 * longest  # along straight edges of the boundary
-    return np.asarray(found[~flat])
+    return np.asarray(triangles[~flat])
 
 
 def _pieces(laid: list[FloatArray]) -> list[IntArray]:
     """Return the boundary pieces of each ring as pairs (k, 2) of points."""
-    found, first = [], 0
+    pieces_by_ring, first = [], 0
     for arc in laid:
         index = first + np.arange(len(arc))
-        found.append(np.column_stack([index, np.roll(index, -1)]))
+        pieces_by_ring.append(np.column_stack([index, np.roll(index, -1)]))
         first += len(arc)
-    return found
+    return pieces_by_ring
 
 
 def _missing(corners: IntArray, laid: list[FloatArray]) -> list[IntArray]:
@@ -410,13 +414,15 @@ def _missing(corners: IntArray, laid: list[FloatArray]) -> list[IntArray]:
     missing = []
     for pieces in _pieces(laid):
         key = pieces[:, 0] * size + pieces[:, 1]
-        there = keys[np.clip(np.searchsorted(keys, key), 0, len(keys) - 1)] == key
+        is_edge = keys[np.clip(np.searchsorted(keys, key), 0, len(keys) - 1)] == key
         double = back[np.clip(np.searchsorted(back, key), 0, len(back) - 1)] == key
-        missing.append(np.flatnonzero(~there | double))
+        missing.append(np.flatnonzero(~is_edge | double))
     return missing
 
 
-def _crossed_pieces(region: Any, corners: IntArray, points: FloatArray, seam: FloatArray, near: float) -> FloatArray:
+def _crossed_pieces(
+    region: Any, corners: IntArray, points: FloatArray, seam: FloatArray, tolerance: float
+) -> FloatArray:
     """Return the middles (k, 2) [m] of the pieces of a seam that triangles cross.
 
     Where a fillet runs out on the face of a clamp, seams have few points of their own beside the edge; a clamp whose
@@ -429,7 +435,7 @@ def _crossed_pieces(region: Any, corners: IntArray, points: FloatArray, seam: Fl
     along = along / length
     place = (points - seam[0]) @ along
     off = np.abs((points - seam[0]) @ np.array([-along[1], along[0]]))
-    slack = max(SEAM_DISTANCE_TOL, near)
+    slack = max(SEAM_DISTANCE_TOL, tolerance)
     chosen = np.flatnonzero((off <= slack) & (place >= -slack) & (place <= length + slack))
     chosen = chosen[np.argsort(place[chosen], kind="stable")]
     first, last = chosen[:-1], chosen[1:]
@@ -437,8 +443,8 @@ def _crossed_pieces(region: Any, corners: IntArray, points: FloatArray, seam: Fl
     sides = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     keys = np.sort(sides[:, 0] * count + sides[:, 1])
     wanted = np.minimum(first, last) * count + np.maximum(first, last)
-    there = keys[np.clip(np.searchsorted(keys, wanted), 0, len(keys) - 1)] == wanted
-    middles = 0.5 * (points[first] + points[last])[~there]
+    is_edge = keys[np.clip(np.searchsorted(keys, wanted), 0, len(keys) - 1)] == wanted
+    middles = 0.5 * (points[first] + points[last])[~is_edge]
     return np.asarray(middles[contains_xy(region, middles)])
 
 

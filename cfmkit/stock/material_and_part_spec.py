@@ -361,7 +361,7 @@ class RoundedCorners:
 
     @property
     def cut_part(self: Any) -> Any:
-        """How it is cut."""
+        """The block that says how it is cut."""
         return self.part or self.default_part()
 
     @property

@@ -62,12 +62,12 @@ class Entry:
     @property
     def missed(self) -> tuple[Mapping[str, Any], ...]:
         """The requirements that are not met."""
-        return tuple(one for one in self.requirements if not one["ok"])
+        return tuple(requirement for requirement in self.requirements if not requirement["ok"])
 
     @property
     def warned(self) -> str | None:
         """The names of the warnings, as tables say them."""
-        return WARNINGS_JOINT.join(sorted({one["name"] for one in self.warnings})) or None
+        return WARNINGS_JOINT.join(sorted({warning["name"] for warning in self.warnings})) or None
 
     def as_json(self) -> dict[str, Any]:
         """Return its part of metrics.json: nothing that differs from run to run."""
@@ -102,11 +102,11 @@ def sources(named: Iterable[str], out: str) -> tuple[str, ...]:
     cfmkit.errors.UsageError
         If a name stands for no file.
     """
-    found: dict[str, str] = {}
+    paths: dict[str, str] = {}
     for name in named:
         for path in _matches(name, out):
-            found.setdefault(os.path.realpath(path), path)
-    return tuple(found.values())
+            paths.setdefault(os.path.realpath(path), path)
+    return tuple(paths.values())
 
 
 def _matches(name: str, out: str) -> list[str]:
@@ -120,10 +120,10 @@ def _matches(name: str, out: str) -> list[str]:
         return [name]
     if not glob.has_magic(name):
         raise UsageError(f"{name}: there is no such file")
-    found = _search(name, out)
-    if not found:
+    paths = _search(name, out)
+    if not paths:
         raise UsageError(f"{name}: no file matches this pattern")
-    return found
+    return paths
 
 
 def files_below(folder: str, out: str = OUTPUT_FOLDER) -> list[str]:
@@ -141,22 +141,24 @@ def files_below(folder: str, out: str = OUTPUT_FOLDER) -> list[str]:
     cfmkit.errors.UsageError
         If there is none.
     """
-    found = [os.path.join(folder, one) for one in _search("**/*", out, folder) if one.lower().endswith(SPEC_SUFFIXES)]
-    if not found:
+    paths = [
+        os.path.join(folder, path) for path in _search("**/*", out, folder) if path.lower().endswith(SPEC_SUFFIXES)
+    ]
+    if not paths:
         raise UsageError(f"{folder}: there is no YAML file in this folder or below")
-    return found
+    return paths
 
 
 def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
     """Return the files that match a pattern, but those that a run wrote."""
     inside = os.path.realpath(out) + os.sep
-    found = []
+    paths = []
     for path in sorted(_paths(pattern, root or "")):
         whole = os.path.join(root, path) if root else path
         ours = OUTPUT_FOLDER in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
         if os.path.isfile(whole) and not ours:
-            found.append(path)
-    return found
+            paths.append(path)
+    return paths
 
 
 def _paths(pattern: str, root: str) -> set[str]:
@@ -192,10 +194,10 @@ def _folders_below(top: str, root: str) -> Iterator[str]:
         except OSError:  # as `glob` does: what cannot be read holds nothing
             continue
         yield folder
-        kept = (one for one in entries if not one.name.startswith(".") and one.name != OUTPUT_FOLDER)
-        below = [one for one in kept if os.path.isdir(one)]  # one.is_dir() fails where a link leads to itself
-        waiting.extendleft(os.path.join(folder, one.name, "") for one in reversed(below) if not one.is_symlink())
-        waiting.extend(os.path.join(folder, one.name, "") for one in below if one.is_symlink())
+        kept = (entry for entry in entries if not entry.name.startswith(".") and entry.name != OUTPUT_FOLDER)
+        below = [entry for entry in kept if os.path.isdir(entry)]  # one.is_dir() fails where a link leads to itself
+        waiting.extendleft(os.path.join(folder, entry.name, "") for entry in reversed(below) if not entry.is_symlink())
+        waiting.extend(os.path.join(folder, entry.name, "") for entry in below if entry.is_symlink())
 
 
 def folders(files: Sequence[str]) -> tuple[str, ...]:
@@ -242,35 +244,35 @@ def results_table(entries: Sequence[Entry]) -> Table:
     """Return results.csv: one row per specification."""
     return Table(
         (
-            text_column("spec", (one.spec for one in entries)),
-            text_column("folder", (one.folder for one in entries)),
-            text_column("verb", (one.verb for one in entries)),
-            text_column("family", (one.family for one in entries)),
-            text_column("name", (one.name for one in entries)),
-            text_column("status", (one.status for one in entries)),
-            TableColumn("exit_code", tuple(None if one.skipped else int(one.code) for one in entries)),
-            TableColumn("requirements", tuple(len(one.requirements) for one in entries)),
-            TableColumn("missed", tuple(len(one.missed) for one in entries)),
-            text_column("warnings", (one.warned for one in entries)),
-            text_column("message", (one.message for one in entries)),
+            text_column("spec", (entry.spec for entry in entries)),
+            text_column("folder", (entry.folder for entry in entries)),
+            text_column("verb", (entry.verb for entry in entries)),
+            text_column("family", (entry.family for entry in entries)),
+            text_column("name", (entry.name for entry in entries)),
+            text_column("status", (entry.status for entry in entries)),
+            TableColumn("exit_code", tuple(None if entry.skipped else int(entry.code) for entry in entries)),
+            TableColumn("requirements", tuple(len(entry.requirements) for entry in entries)),
+            TableColumn("missed", tuple(len(entry.missed) for entry in entries)),
+            text_column("warnings", (entry.warned for entry in entries)),
+            text_column("message", (entry.message for entry in entries)),
         )
     )
 
 
 def requirements_table(entries: Sequence[Entry]) -> Table:
     """Return requirements.csv: one row per requirement."""
-    rows = [(entry, one) for entry in entries for one in entry.requirements]
+    rows = [(entry, requirement) for entry in entries for requirement in entry.requirements]
 
     def column(key: str) -> TableColumn:
-        return TableColumn(key, tuple(one[key] for _, one in rows))
+        return TableColumn(key, tuple(requirement[key] for _, requirement in rows))
 
-    over = [one["over"] or (None, None) for _, one in rows]
+    over = [requirement["over"] or (None, None) for _, requirement in rows]
     return Table(
         (
             text_column("spec", (entry.spec for entry, _ in rows)),
-            text_column("metric", (one["metric"] for _, one in rows)),
+            text_column("metric", (requirement["metric"] for _, requirement in rows)),
             *(column(key) for key in ("value", "min", "max")),
-            text_column("unit", (one["unit"] for _, one in rows)),
+            text_column("unit", (requirement["unit"] for _, requirement in rows)),
             TableColumn("over_from", tuple(ends[0] for ends in over)),
             TableColumn("over_to", tuple(ends[1] for ends in over)),
             column("over_unit"),
@@ -287,7 +289,7 @@ def message(entries: Sequence[Entry]) -> str:
     >>> message([Entry("a.yaml", "a", status="complete"), Entry("b.yaml", "b")])
     '2 specs: 1 ok, 1 skipped'
     """
-    counts = Counter(outcome(one) for one in entries)
+    counts = Counter(outcome(entry) for entry in entries)
     reported = ", ".join(
         f"{counts[word]} {word}" for word in (*OUTCOME_WORDS.values(), TIMED_OUT, SKIPPED_STATUS) if counts[word]
     )
@@ -310,8 +312,8 @@ OUTCOME_WORDS = {
 TIMED_OUT = "timed out"
 
 
-def outcome(one: Entry) -> str:
+def outcome(entry: Entry) -> str:
     """Return in a word how a specification ended."""
-    if one.status == Status.TIMEOUT.key:
+    if entry.status == Status.TIMEOUT.key:
         return TIMED_OUT
-    return SKIPPED_STATUS if one.skipped else OUTCOME_WORDS.get(one.code, "failed")
+    return SKIPPED_STATUS if entry.skipped else OUTCOME_WORDS.get(entry.code, "failed")

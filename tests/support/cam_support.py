@@ -105,7 +105,7 @@ def message(result: Result, name: str) -> str:
 def take_gravity_of_the_note(monkeypatch):
     """Compute with the 9.81 m/s^2 for which the reference note's numbers hold, not with the standard value."""
     for module in ("machine_from_spec", "scalar_results"):
-        monkeypatch.setattr(f"cfmkit.families.cam.dynamics.{module}.GRAVITY", 9.81)
+        monkeypatch.setattr(f"cfmkit.families.cam.dynamics.{module}.STANDARD_GRAVITY", 9.81)
 
 
 def design_exactly(spec):

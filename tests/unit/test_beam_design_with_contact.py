@@ -57,7 +57,7 @@ def leaf_at_a_stop():
     ],
 )
 def test_forces_with_closed_contacts_have_the_derivatives_of_differences(spec, names):
-    assembly, x = assemble(spec), np.array([spec.at(name) for name in names])
+    assembly, x = assemble(spec), np.array([spec.get_value(name) for name in names])
     drive = Displacement(assembly.driven, assembly.direction, np.linspace(0.0, spec.extent, 4))
 
     def build(values):

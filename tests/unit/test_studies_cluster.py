@@ -134,7 +134,7 @@ class Killer:
 
     def total(self, points): ...
 
-    def done(self, points, failed, reused):
+    def add_finished(self, points, failed, reused):
         self.count += points
         if self.count >= self.after and not self.killed:
             self.killed = self.workers()[0] or True

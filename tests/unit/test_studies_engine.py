@@ -353,7 +353,7 @@ def test_a_stopped_study_has_the_rows_that_were_finished():
 
         def total(self, points): ...
 
-        def done(self, points, failed, reused):
+        def add_finished(self, points, failed, reused):
             self.count += points
 
         def stopping(self):

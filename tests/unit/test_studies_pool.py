@@ -152,7 +152,7 @@ def test_stopping_finishes_what_runs_and_starts_nothing_more(doer):
 
 
 def test_workers_that_cannot_begin_are_an_error_not_a_loop(doer, monkeypatch):
-    monkeypatch.setattr(pools.worker_process, "START", "raise SystemExit(9)")
+    monkeypatch.setattr(pools.worker_process, "WORKER_PROGRAM", "raise SystemExit(9)")
     with pytest.raises(CfmError, match=r"end before they begin \(exit code 9\)"):
         list(Pool(2)(doer, jobs(5)))
 

@@ -546,7 +546,7 @@ def test_the_example_of_the_page_is_a_kind_of_leaf():
     travel, kind = np.linspace(0.0, 2.0, 41) * LEAF.rise, names["TAPERED"]
     even = VBeam(replace(LEAF, thickness=1.1 * LEAF.thickness))
     law = kind.law(LEAF, None)
-    for read in ("force", "stress", "buckled"):
+    for read in ("force", "stress", "is_buckled"):
         assert getattr(law, read)(travel).tolist() == getattr(even, read)(travel).tolist()
     assert law.profile[1] == (LEAF.thickness, 1.2 * LEAF.thickness, LEAF.thickness)
 

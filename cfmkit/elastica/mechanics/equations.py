@@ -139,17 +139,17 @@ class NumpyEquations:
         """True if some load turns with its node: the tangent is unsymmetric."""
         return any(load.item.follows for load in self.mesh.loads)
 
-    def factors(self, way: Any) -> tuple[Any, Any]:
+    def factors(self, place: Any) -> tuple[Any, Any]:
         """Return drive and share at a place of the way."""
-        return (0.0, way) if self.ramp else (way, 1.0)
+        return (0.0, place) if self.ramp else (place, 1.0)
 
-    def values(self, free: Any, way: Any) -> Any:
+    def values(self, free: Any, place: Any) -> Any:
         """Return all unknowns, (size,)."""
-        return energy.values(self.mesh, free, *self.factors(way))
+        return energy.values(self.mesh, free, *self.factors(place))
 
-    def gradient(self, free: Any, way: Any) -> Any:
+    def gradient(self, free: Any, place: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
-        drive, share = self.factors(way)
+        drive, share = self.factors(place)
         return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
@@ -158,18 +158,18 @@ class NumpyEquations:
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size); what is constant is all there."""
-        each = [energy.gradient(self.mesh, *pair) for pair in zip(z, drive, strict=True)]
-        return np.array(each).reshape(z.shape)
+        gradients = [energy.gradient(self.mesh, *pair) for pair in zip(z, drive, strict=True)]
+        return np.array(gradients).reshape(z.shape)
 
-    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
-        drive, share = self.factors(way)
+        drive, share = self.factors(place)
         z, chosen = energy.values(self.mesh, free, drive, share), self.mesh.free
         tangent = energy.hessian(self.mesh, z, drive, share)[np.ix_(chosen, chosen)]
-        stepped = self.gradient(free, way + 1j * COMPLEX_STEP)[chosen]
+        stepped = self.gradient(free, place + 1j * COMPLEX_STEP)[chosen]
         return LinearEquations(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)
 
-    def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
+    def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
         """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
 
         Raises
@@ -177,7 +177,7 @@ class NumpyEquations:
         numpy.linalg.LinAlgError
             If the tangent is singular.
         """
-        at = self.linearise(free, way)
+        at = self.linearise(free, place)
         return np.asarray(np.linalg.solve(at.tangent, right.T).T, float), self.count_unstable(at)
 
     def count_unstable(self, at: LinearEquations) -> int:
@@ -187,7 +187,7 @@ class NumpyEquations:
     def solve(
         self,
         free: FloatArray,
-        way: float,
+        place: float,
         border: FloatArray | None = None,
         level: float = 0.0,
         push: FloatArray | None = None,
@@ -198,7 +198,7 @@ class NumpyEquations:
 
         Parameters
         ----------
-        free, way : (n,) array, float
+        free, place : (n,) array, float
             First guess.
         border, level : (n + 1,) array, float, optional
             What is held instead of the way, and where.
@@ -212,7 +212,7 @@ class NumpyEquations:
         free, last = np.array(free, float), np.inf
         moves, size = np.isinf(self.unit), np.zeros(len(free))
         for _ in range(MAX_ROUNDS):
-            at = self.linearise(free, way)
+            at = self.linearise(free, place)
             residual = at.residual if push is None else at.residual - push
             try:
                 step, rate = np.linalg.solve(at.tangent, -np.stack([residual, at.change], axis=1)).T
@@ -220,7 +220,7 @@ class NumpyEquations:
                 return None
             along = 0.0
             if border is not None:
-                left = level - border[:-1] @ (free + step) - border[-1] * way
+                left = level - border[:-1] @ (free + step) - border[-1] * place
                 along = float(left / (border[-1] + border[:-1] @ rate))
             change = step + along * rate
             if not (np.isfinite(change).all() and np.abs(change[moves]).max(initial=0.0) <= LARGEST_CORRECTION):
@@ -228,40 +228,40 @@ class NumpyEquations:
             size[moves], forces = np.abs(change[moves]), ~moves
             size[forces] = np.abs(change[forces]) / np.maximum(10 * self.unit[forces], np.abs(free[forces]))
             largest, moved = float(size.max(initial=0.0)), float(size[moves].max(initial=0.0))
-            old, old_way, free, way = free, way, free + change, way + along
+            old, old_way, free, place = free, place, free + change, place + along
             if quick and largest**2 < tolerance:
                 effort = self._effort(old, old_way) + float(at.change @ step)
-                return MarchState(free, way, rate, self.count_unstable(at), effort)
+                return MarchState(free, place, rate, self.count_unstable(at), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
             rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < MOTION_RTOL and largest < 1e-3)
             stands = rounds and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
                 unstable = self.count_unstable(at)
-                return MarchState(free, way, rate, unstable, self._effort(free, way))
+                return MarchState(free, place, rate, unstable, self._effort(free, place))
             last = largest
         return None
 
     def solve_each(
-        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+        self, free: FloatArray, places: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses (k, n) at places (k,) of the way; see `solve`."""
         return self.collect(
-            [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, way, strict=True)]
+            [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, places, strict=True)]
         )
 
-    def collect(self, each: Sequence[MarchState | None]) -> SolvedStates:
+    def collect(self, solved: Sequence[MarchState | None]) -> SolvedStates:
         """Return single equilibria, None where there is none, as arrays."""
         nothing = MarchState(np.full(self.n, np.nan), np.nan, np.full(self.n, np.nan), 0, np.nan)
-        states = [state or nothing for state in each]
+        states = [state or nothing for state in solved]
         return SolvedStates(
-            np.array([state is not None for state in each], bool),
-            np.array([state.free for state in states]).reshape(len(each), self.n),
-            np.array([state.rate for state in states]).reshape(len(each), self.n),
+            np.array([state is not None for state in solved], bool),
+            np.array([state.free for state in states]).reshape(len(solved), self.n),
+            np.array([state.rate for state in states]).reshape(len(solved), self.n),
             np.array([state.unstable for state in states], np.int64),
             np.array([state.effort for state in states]),
         )
 
-    def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode of the motions after some powers of their flexibility.
 
         The flexibility is 0 if the tangent is singular.
@@ -269,7 +269,7 @@ class NumpyEquations:
         moves, flexibility = self.mesh.free < self.mesh.n_motions, 0.0
         vector = np.array(vector, float)
         try:
-            inverse = np.linalg.inv(self.linearise(free, way).tangent)
+            inverse = np.linalg.inv(self.linearise(free, place).tangent)
         except np.linalg.LinAlgError:
             return 0.0, vector
         for _ in range(rounds):
@@ -278,9 +278,9 @@ class NumpyEquations:
             vector = moved / np.linalg.norm(moved[moves])
         return flexibility, vector
 
-    def _effort(self, free: FloatArray, way: float) -> float:
+    def _effort(self, free: FloatArray, place: float) -> float:
         moved = self.mesh.base if self.ramp else self.mesh.rate
-        return float(self.gradient(free, way) @ moved)
+        return float(self.gradient(free, place) @ moved)
 
     def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens.
@@ -318,22 +318,22 @@ def predict(states: Sequence[MarchState], goal: float) -> FloatArray:
     Of one it is the tangent, of two the cubic.
     """
     total: Any = 0.0
-    for own in states:
-        others = [other.way for other in states if other is not own]
-        share = float(np.prod([(goal - way) / (own.way - way) for way in others])) ** 2
-        slope = 2 * sum(1 / (own.way - way) for way in others)
-        ahead = goal - own.way
-        total = total + share * ((1 - slope * ahead) * own.free + ahead * own.rate)
+    for state in states:
+        others = [neighbour.way for neighbour in states if neighbour is not state]
+        share = float(np.prod([(goal - place) / (state.way - place) for place in others])) ** 2
+        slope = 2 * sum(1 / (state.way - place) for place in others)
+        ahead = goal - state.way
+        total = total + share * ((1 - slope * ahead) * state.free + ahead * state.rate)
     return np.asarray(total)
 
 
-def _judge(equations: NumpyEquations, here: MarchState, new: MarchState, guess: FloatArray) -> _Judgement:
+def _judge(equations: NumpyEquations, current: MarchState, new: MarchState, guess: FloatArray) -> _Judgement:
     moves = np.isinf(equations.unit)
-    chord = new.free - here.free
-    forces, ahead = ~moves, new.way - here.way
-    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(here.free[forces])
+    chord = new.free - current.free
+    forces, ahead = ~moves, new.way - current.way
+    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(current.free[forces])
     force = float((np.abs(chord[forces]) / allowed).max(initial=0.0))
-    chord, old, rate = chord[moves], here.rate[moves], new.rate[moves]
+    chord, old, rate = chord[moves], current.rate[moves], new.rate[moves]
     moved = float(np.abs(chord).max(initial=0.0))
     missed = float(np.abs(new.free - guess)[moves].max(initial=0.0))
     bend = float(np.abs(chord - 0.5 * ahead * (old + rate)).max(initial=0.0))
@@ -342,31 +342,33 @@ def _judge(equations: NumpyEquations, here: MarchState, new: MarchState, guess: 
     return _Judgement(moved, missed, force, bool(along and bend <= 0.25 * moved + SAME_EQUILIBRIUM))
 
 
-def _leads_back(equations: NumpyEquations, here: MarchState, new: MarchState, moved: float, tolerance: float) -> bool:
+def _leads_back(
+    equations: NumpyEquations, current: MarchState, new: MarchState, moved: float, tolerance: float
+) -> bool:
     """Return True if going back from a new state along its slope leads to the last one: else the branch has ended."""
-    guess = new.free - (new.way - here.way) * new.rate
-    back = equations.solve(guess, here.way, tolerance=tolerance, quick=True)
+    guess = new.free - (new.way - current.way) * new.rate
+    back = equations.solve(guess, current.way, tolerance=tolerance, quick=True)
     if back is None:
         return False
-    apart = np.abs(back.free - here.free)[np.isinf(equations.unit)].max(initial=0.0)
+    apart = np.abs(back.free - current.free)[np.isinf(equations.unit)].max(initial=0.0)
     return bool(apart < SAME_EQUILIBRIUM + 1e-3 * moved)
 
 
 def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
-    here, step = start, plan.step
+    current, step = start, plan.step
     earlier = [] if plan.before is None or plan.before.way == start.way else [plan.before]  # on this way, latest first
     states: list[MarchState] = []
     passed = rejected = 0
     while passed < len(targets) and len(states) < plan.room:
-        left = float(targets[passed] - here.way)
+        left = float(targets[passed] - current.way)
         sense, lands = np.sign(left), abs(left) <= LAND_FROM * step
-        goal = float(targets[passed]) if lands else here.way + sense * step
-        ahead = goal - here.way
-        if earlier and (here.way - earlier[0].way) * sense < 0:
+        goal = float(targets[passed]) if lands else current.way + sense * step
+        ahead = goal - current.way
+        if earlier and (current.way - earlier[0].way) * sense < 0:
             earlier = []
-        guess = predict((here, *earlier), goal)
+        guess = predict((current, *earlier), goal)
         new = equations.solve(guess, goal, tolerance=plan.tolerance, quick=True)
-        seen = _Judgement(0.0, 0.0, 0.0, True) if new is None else _judge(equations, here, new, guess)
+        seen = _Judgement(0.0, 0.0, 0.0, True) if new is None else _judge(equations, current, new, guess)
         same = new is not None and new.unstable == start.unstable
         wide = seen.moved > plan.largest_turn or seen.missed > 0.4 * seen.moved + SAME_EQUILIBRIUM
         if new is not None and seen.force > 1 and seen.moved <= plan.largest_turn:
@@ -377,11 +379,11 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
             rejected = max(0, rejected - 1)
             if not same:
                 return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, step)
-            if plan.on_branch and not _leads_back(equations, here, new, seen.moved, plan.tolerance):
+            if plan.on_branch and not _leads_back(equations, current, new, seen.moved, plan.tolerance):
                 return NaturalMarch(tuple(states), MarchCode.BRANCH_ENDS, step)
-            earlier = [here, *earlier[: N_PREDICTING - 2]]
-            here = new._replace(target=passed if lands else -1)
-            states.append(here)
+            earlier = [current, *earlier[: N_PREDICTING - 2]]
+            current = new._replace(target=passed if lands else -1)
+            states.append(current)
             passed += lands
             quality = seen.missed / (seen.moved + 1e-8)
             if quality < 0.1:
@@ -389,13 +391,13 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
             elif quality > 0.25:
                 step = 0.8 * abs(ahead)
             continue
-        if earlier and step < 0.25 * abs(here.way - earlier[0].way):
+        if earlier and step < 0.25 * abs(current.way - earlier[0].way):
             earlier = []
         if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
             return NaturalMarch(tuple(states), MarchCode.STEPS_FAIL, step)
     return NaturalMarch(tuple(states), MarchCode.DONE if passed == len(targets) else MarchCode.FULL, step)
 
 
-def begin(equations: NumpyEquations, free: FloatArray | None = None, way: float = 0.0) -> MarchState | None:
+def begin(equations: NumpyEquations, free: FloatArray | None = None, place: float = 0.0) -> MarchState | None:
     """Return the equilibrium at the start of a way: at rest, unless near some free unknowns."""
-    return equations.solve(np.zeros(equations.n) if free is None else free, way)
+    return equations.solve(np.zeros(equations.n) if free is None else free, place)

@@ -137,12 +137,12 @@ class CompiledEquations(NumpyEquations):
 
     def _exchange(self, mesh: Discretisation, name: str, values: FloatArray) -> CompiledEquations:
         """Return the equations of a mesh that differs in one array."""
-        other, array = copy(self), np.ascontiguousarray(values, float)
-        object.__setattr__(other, "mesh", mesh)
-        object.__setattr__(other, "arrays", {**self.arrays, name: array})
-        object.__setattr__(other, "row", self.row.copy())
-        self.code.place(other.row, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name), (array,))
-        return other
+        exchanged, array = copy(self), np.ascontiguousarray(values, float)
+        object.__setattr__(exchanged, "mesh", mesh)
+        object.__setattr__(exchanged, "arrays", {**self.arrays, name: array})
+        object.__setattr__(exchanged, "row", self.row.copy())
+        self.code.place(exchanged.row, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name), (array,))
+        return exchanged
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -152,18 +152,18 @@ class CompiledEquations(NumpyEquations):
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
-        found = np.empty(z.shape)
-        given = np.ascontiguousarray(z, float), np.ascontiguousarray(drive, float)
-        self.code.evaluate(self.row, *given, found, np.empty(0), 1.0)
-        return found
+        gradients = np.empty(z.shape)
+        inputs = np.ascontiguousarray(z, float), np.ascontiguousarray(drive, float)
+        self.code.evaluate(self.row, *inputs, gradients, np.empty(0), 1.0)
+        return gradients
 
-    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
-        self.code.linearise(self.row, np.ascontiguousarray(free, float), *out, way)
+        self.code.linearise(self.row, np.ascontiguousarray(free, float), *out, place)
         return out
 
-    def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
+    def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
         """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
 
         Raises
@@ -171,14 +171,14 @@ class CompiledEquations(NumpyEquations):
         numpy.linalg.LinAlgError
             If the tangent is singular.
         """
-        found, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
-        if self.code.resolve(self.row, np.ascontiguousarray(free, float), found, count, way):
+        solutions, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
+        if self.code.resolve(self.row, np.ascontiguousarray(free, float), solutions, count, place):
             raise np.linalg.LinAlgError("the tangent is singular")
-        return found, self._unstable(free, way, int(count[0]))
+        return solutions, self._unstable(free, place, int(count[0]))
 
-    def _unstable(self, free: FloatArray, way: float, told: int) -> int:
+    def _unstable(self, free: FloatArray, place: float, told: int) -> int:
         """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
-        return told if told >= 0 else energy.count_unstable(self.mesh, self.linearise(free, way).tangent)
+        return told if told >= 0 else energy.count_unstable(self.mesh, self.linearise(free, place).tangent)
 
     def solve(
         self,
@@ -191,47 +191,49 @@ class CompiledEquations(NumpyEquations):
         quick: bool = False,
     ) -> MarchState | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        x, at, rate, found = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
+        x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
         nothing = np.empty(0)
-        given = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
-        if self.code.solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
+        inputs = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
+        if self.code.solve(self.row, x, at, *inputs, rate, outcome, level, tolerance, quick):
             return None
         way = float(at[0])
-        return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
+        return MarchState(x, way, rate, self._unstable(x, way, int(outcome[0])), float(outcome[1]))
 
     def solve_each(
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
-        rate, found = np.empty(x.shape), np.zeros((len(x), 3))
-        if self.code.solve_many(self.row, x, ways, rate, found, tolerance, quick):
+        rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
+        if self.code.solve_many(self.row, x, ways, rate, outcomes, tolerance, quick):
             raise MemoryError
-        converged, unstable = found[:, 0] == 0, found[:, 1].astype(np.int64)
+        converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
             unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
-        return SolvedStates(converged, x, rate, unstable, found[:, 2])
+        return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
-    def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
         shape = np.array(vector, float)
-        return self.code.soften(self.row, np.ascontiguousarray(free, float), shape, way, rounds), shape
+        return self.code.soften(self.row, np.ascontiguousarray(free, float), shape, place, rounds), shape
 
     def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
         rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
         parity = start.unstable % 2 if self.follows else start.unstable
-        given = _plan_row(plan, parity, False)
+        plan_row = _plan_row(plan, parity, False)
         before = plan.before
-        known = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
-        here = np.concatenate([start.free, start.rate, [start.way]])
-        code = self.code.march(self.row, given, here, known, goals, rows, stored)
+        previous_row = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
+        start_row = np.concatenate([start.free, start.rate, [start.way]])
+        code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored)
         rows = rows[: stored[0]].copy()
-        way, effort, told, target = rows[:, 2 * n :].T.tolist()
-        given_states = zip(rows[:, :n], way, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True)
+        places, effort, told, target = rows[:, 2 * n :].T.tolist()
+        given_states = zip(
+            rows[:, :n], places, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True
+        )
         states = tuple(itertools.starmap(MarchState, given_states))
-        march = NaturalMarch(states, MarchCode(code), float(given[0]))
+        march = NaturalMarch(states, MarchCode(code), float(plan_row[0]))
         return self._cut_at_stability_change(march, start.unstable) if self.follows else march
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
@@ -285,16 +287,20 @@ def march_many(
     states : (d, chosen, n) array
         Free unknowns.
     """
-    own = equations(designs.template)
+    template_equations = equations(designs.template)
     goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
     span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
     plan = MarchPlan(first_step * span, span, largest_turn=largest_turn, tolerance=tolerance)
     efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
-    states = np.full((designs.count, len(chosen), own.n), np.nan)
-    if isinstance(own, CompiledEquations) and not own.follows:
-        kept, given, some = design_arrays(own, designs), _plan_row(plan, 0, True), np.array(chosen, np.int64)
-        rows = _rows(own, kept, designs.count)
-        if not load_compiled().march_many(rows, given, goals, efforts, codes, some, states, plan.room):
+    states = np.full((designs.count, len(chosen), template_equations.n), np.nan)
+    if isinstance(template_equations, CompiledEquations) and not template_equations.follows:
+        kept, plan_row, some = (
+            design_arrays(template_equations, designs),
+            _plan_row(plan, 0, True),
+            np.array(chosen, np.int64),
+        )
+        rows = _rows(template_equations, kept, designs.count)
+        if not load_compiled().march_many(rows, plan_row, goals, efforts, codes, some, states, plan.room):
             raise MemoryError
     else:
         for number in range(designs.count):
@@ -304,13 +310,13 @@ def march_many(
                 if state.target >= 0:
                     efforts[number, state.target] = state.effort
                     states[number, [k for k, target in enumerate(chosen) if target == state.target]] = state.free
-    return efforts * own.effort_unit, codes, states
+    return efforts * template_equations.effort_unit, codes, states
 
 
-def _march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan) -> NaturalMarch:
+def _march_one(network_equations: NumpyEquations, goals: FloatArray, plan: MarchPlan) -> NaturalMarch:
     """Return the march of one network from rest."""
-    start = begin(own)
-    return NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
+    start = begin(network_equations)
+    return NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else network_equations.march(start, goals, plan)
 
 
 def solve_designs(designs: NetworkDesigns, free: FloatArray, drives: FloatArray, tolerance: float) -> FloatArray:
@@ -332,43 +338,49 @@ def solve_designs(designs: NetworkDesigns, free: FloatArray, drives: FloatArray,
     (d, k) array
         Also not a number where an equilibrium is unstable.
     """
-    own = equations(designs.template)
+    template_equations = equations(designs.template)
     ways = np.ascontiguousarray(drives, float) / designs.template.scales.drive
-    found = np.zeros((*free.shape[:2], 3))
-    if isinstance(own, CompiledEquations) and not own.follows:
-        kept = design_arrays(own, designs)
-        rows = _rows(own, kept, designs.count)
+    outcomes = np.zeros((*free.shape[:2], 3))
+    if isinstance(template_equations, CompiledEquations) and not template_equations.follows:
+        kept = design_arrays(template_equations, designs)
+        rows = _rows(template_equations, kept, designs.count)
         if load_compiled().solve_many(
-            rows, np.array(free, float, order="C"), ways, np.empty(0), found, tolerance, True
+            rows, np.array(free, float, order="C"), ways, np.empty(0), outcomes, tolerance, True
         ):
             raise MemoryError
     else:
         for number in range(designs.count):
             solved = equations(design_of(designs, number)).solve_each(free[number], ways, tolerance, quick=True)
-            found[number] = np.stack([~solved.converged, solved.unstable, solved.effort], axis=1)
-    stable = (found[..., 0] == 0) & (found[..., 1] == 0)
-    return np.where(stable, found[..., 2] * own.effort_unit, np.nan)
+            outcomes[number] = np.stack([~solved.converged, solved.unstable, solved.effort], axis=1)
+    stable = (outcomes[..., 0] == 0) & (outcomes[..., 1] == 0)
+    return np.where(stable, outcomes[..., 2] * template_equations.effort_unit, np.nan)
 
 
-def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
+def design_arrays(template_equations: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
-    rule, tables, products = basis(own.mesh.degree), designs.tables, slope_products(own.mesh.degree)
-    found = tables | designs.places
+    rule, tables, products = (
+        basis(template_equations.mesh.degree),
+        designs.tables,
+        slope_products(template_equations.mesh.degree),
+    )
+    arrays = tables | designs.places
     bend = tables["weight"] * tables["rigidity"]
     if designs.each:
-        found["bend"] = bend @ products
-        found["spring"] = np.array([[_spring(one, spring)[1] for spring in one.springs] for one in designs.each])
-        found["load"] = np.array([[_load(one, load)[1] for load in one.loads] for one in designs.each])
+        arrays["bend"] = bend @ products
+        arrays["spring"] = np.array(
+            [[_spring(network, spring)[1] for spring in network.springs] for network in designs.each]
+        )
+        arrays["load"] = np.array([[_load(network, load)[1] for load in network.loads] for network in designs.each])
     else:  # the same along an element, but for the weights
-        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None] * (rule.weights @ products)
+        arrays["bend"] = (bend[..., 0] / rule.weights[0])[..., None] * (rule.weights @ products)
     if designs.base is not None:
-        found["base"] = designs.base
-    return {name: np.ascontiguousarray(array, float) for name, array in found.items()}
+        arrays["base"] = designs.base
+    return {name: np.ascontiguousarray(array, float) for name, array in arrays.items()}
 
 
-def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
+def _rows(template_equations: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
     """Return a `Model` for each design: the template's, with addresses of its own, good as long as `kept` is."""
-    rows = np.tile(own.row, (count, 1))
+    rows = np.tile(template_equations.row, (count, 1))
     for name, array in kept.items():
         rows[:, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name)] = array.ctypes.data + array.strides[0] * np.arange(
             count
@@ -393,15 +405,15 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     slot[mesh.free] = np.arange(len(mesh.free))
     bend = (e.weight * e.rigidity) @ slope_products(mesh.degree)
     springs, loads = [_spring(mesh, s) for s in mesh.springs], [_load(mesh, load) for load in mesh.loads]
-    given: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
-    given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
-    given |= _shape_tables(mesh.degree) | {"base": mesh.base, "rate": mesh.rate}
-    given |= {"bend": bend, "slot": slot, "leaves": _leaves(mesh), "unit": of.unit}
-    given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
-    given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
+    arrays: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
+    arrays |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
+    arrays |= _shape_tables(mesh.degree) | {"base": mesh.base, "rate": mesh.rate}
+    arrays |= {"bend": bend, "slot": slot, "leaves": _leaves(mesh), "unit": of.unit}
+    arrays |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
+    arrays |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
     return {
         name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
-        for name, values in given.items()
+        for name, values in arrays.items()
         if values is not None
     }
 

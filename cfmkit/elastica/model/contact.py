@@ -44,14 +44,14 @@ class Stop:
 
 
 class FrictionState(NamedTuple):
-    """What friction does at a contact: in which sense it slips, 0 where it sticks, 2 where there is none; and where."""
+    """Friction at a contact: in which sense it slips, 0 where it sticks, 2 where there is none; and where."""
 
     sense: float
     anchor: float = 0.0  # place along the obstacle at which it sticks, in mean beam lengths
 
 
 class WayAlong(NamedTuple):
-    """How far places are along a line at one distance from an outline, with its derivatives by the place."""
+    """Distances of places along a line at one distance from an outline, with its derivatives by the place."""
 
     value: Any  # (...) [m]
     gradient: Any  # (..., 2)

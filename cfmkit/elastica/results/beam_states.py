@@ -88,16 +88,16 @@ def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamState
 
 def states_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
     """Return states at the same fractions (k,) of each of m elements, one after the other: (p, m k)."""
-    given = np.asarray(fractions, float)
-    by_element = _states(at, list(elements), given, _rest(net, at.mesh, elements, given))
+    places = np.asarray(fractions, float)
+    by_element = _states(at, list(elements), places, _rest(net, at.mesh, elements, places))
     return BeamStates(*map(_join_elements, by_element))
 
 
 def forces_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
     """Return the same without x and y: stresses need none."""
-    given = np.asarray(fractions, float)
-    found = _forces(at, list(elements), given, _rest(net, at.mesh, elements, given)).states
-    return BeamStates(*map(_join_elements, found))
+    places = np.asarray(fractions, float)
+    states = _forces(at, list(elements), places, _rest(net, at.mesh, elements, places)).states
+    return BeamStates(*map(_join_elements, states))
 
 
 def forces_of_designs(
@@ -121,16 +121,16 @@ def forces_of_designs(
     states, widths : BeamStates, (p, e k) array
         Without x and y; all of e elements one after the other.
     """
-    given, elements = np.asarray(fractions, float), list(range(len(at.mesh.elements.length)))
+    places, elements = np.asarray(fractions, float), list(range(len(at.mesh.elements.length)))
     names = ("length", "line", *(name for name in ON_POINTS if getattr(at.mesh.elements, name) is not None))
     tables = {name: np.array([getattr(mesh.elements, name) for mesh in meshes])[row] for name in names}
     units = np.array([mesh.scales for mesh in meshes]).T[:, row, None, None]
     mesh = replace(at.mesh, elements=at.mesh.elements._replace(**tables), scales=MechanicsUnits(*units))
-    at_rest = zip(*(_rest(*pair, elements, given) for pair in zip(networks, meshes, strict=True)), strict=True)
+    at_rest = zip(*(_rest(*pair, elements, places) for pair in zip(networks, meshes, strict=True)), strict=True)
     rest = _BeamAtRest(*(np.array(column)[row] for column in at_rest))
-    found = _forces(replace(at, mesh=mesh), elements, given, rest).states
+    states = _forces(replace(at, mesh=mesh), elements, places, rest).states
     widths = np.array([[net.beams[name].section.width for name in at.mesh.elements.beam] for net in networks])
-    return BeamStates(*map(_join_elements, found)), np.repeat(widths, len(given), axis=1)[row]
+    return BeamStates(*map(_join_elements, states)), np.repeat(widths, len(places), axis=1)[row]
 
 
 def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
@@ -145,8 +145,8 @@ def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequenc
     elements, fractions : (m,), (k,) arrays
         As of `states_of_elements`.
     """
-    given, numbers = np.asarray(fractions, float), list(elements)
-    by_element = _states(at, numbers, given, _rest_of_designs(designs, at.mesh, numbers, given))
+    places, numbers = np.asarray(fractions, float), list(elements)
+    by_element = _states(at, numbers, places, _rest_of_designs(designs, at.mesh, numbers, places))
     return BeamStates(*map(_join_elements, by_element))
 
 
@@ -167,17 +167,17 @@ class _BeamAtRest(NamedTuple):
     thickness: Any
 
 
-def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], given: FloatArray) -> _BeamAtRest:
+def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], places: FloatArray) -> _BeamAtRest:
     """Return beams at fractions of elements before any load."""
     rule, e = basis(mesh.degree), mesh.elements
-    through = _matrices(mesh.degree, tuple(given.tolist())).interpolation
+    through = _matrices(mesh.degree, tuple(places.tolist())).interpolation
     rows = []
     for element in elements:
         cuts = e.cuts[element] if e.moved_cuts is None else e.moved_cuts[..., element, :]
         beam, left, right = e.beam[element], cuts[..., :1], cuts[..., 1:]
         fitted, middle = mesh.fits[beam], 0.5 * float(e.cuts[element].sum())
-        t, known = left + (right - left) * given, left + (right - left) * rule.places
-        added = e.angle[..., element, :] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
+        t, known_places = left + (right - left) * places, left + (right - left) * rule.places
+        added = e.angle[..., element, :] - (fitted.angle(known_places, middle) + 0.0 * known_places)  # an imperfection
         place = fitted.arc(t)
         thickness = net.beams[beam].section.thickness_at(place, float(np.real(fitted.arc(middle)))) + 0.0 * t
         rows.append(
@@ -191,32 +191,34 @@ def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], given: Fl
 
 
 def _rest_of_designs(
-    designs: NetworkDesigns, mesh: Discretisation, elements: list[int], given: FloatArray
+    designs: NetworkDesigns, mesh: Discretisation, elements: list[int], places: FloatArray
 ) -> _BeamAtRest:
     """Return beams at fractions of elements before any load with their derivatives, dual where they have some."""
     template, names = designs.template, [designs.template.elements.beam[element] for element in elements]
     if designs.each:
-        own = _rest(template.fits.network, template, elements, given)
-        each = [_rest(net, design_of(designs, d), elements, given) for d, (net, _) in enumerate(designs.networks)]
-        angle = np.imag([one.angle for one in each]) / COMPLEX_STEP
-        thickness = np.imag([one.thickness for one in each]) / COMPLEX_STEP
-        return _BeamAtRest(own.place, DualArray(own.angle, angle), DualArray(own.thickness, thickness))
+        template_beam = _rest(template.fits.network, template, elements, places)
+        beams = [_rest(net, design_of(designs, d), elements, places) for d, (net, _) in enumerate(designs.networks)]
+        angle = np.imag([beam.angle for beam in beams]) / COMPLEX_STEP
+        thickness = np.imag([beam.thickness for beam in beams]) / COMPLEX_STEP
+        return _BeamAtRest(
+            template_beam.place, DualArray(template_beam.angle, angle), DualArray(template_beam.thickness, thickness)
+        )
     # plain beams: their angle is a polynomial, their speed and thickness are even
     cuts = template.elements.cuts[elements]
-    angle = mesh.elements.angle[elements] @ _matrices(template.degree, tuple(given.tolist())).interpolation.T
+    angle = mesh.elements.angle[elements] @ _matrices(template.degree, tuple(places.tolist())).interpolation.T
     steps: Any = np.array([[net.beams[name].section.thickness for name in names] for net, _ in designs.networks])
     first: Any = np.array([template.fits.network.beams[name].section.thickness for name in names])
     even = DualArray(first[:, None], np.imag(steps)[..., None] / COMPLEX_STEP)
-    return _BeamAtRest(cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * given, angle, even + 0.0 * given)
+    return _BeamAtRest(cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * places, angle, even + 0.0 * places)
 
 
-def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> BeamStates:
+def _states(at: Equilibria, elements: list[int], places: FloatArray, rest: _BeamAtRest) -> BeamStates:
     """Return states at k fractions of m elements, (p, m, k); dual if the equilibria are."""
-    found, fields, speed, upto = _forces(at, elements, given, rest)
+    states, fields, speed, upto = _forces(at, elements, places, rest)
     start = poses(at.mesh.attachments, at.z, at.mesh.elements.ends[elements, 0]).place
     x = (start[..., :1] + (fields.slope_x * speed) @ upto) * at.mesh.scales.length
     y = (start[..., 1:] + (fields.slope_y * speed) @ upto) * at.mesh.scales.length
-    return found._replace(x=x, y=y)
+    return states._replace(x=x, y=y)
 
 
 class _Forces(NamedTuple):
@@ -228,17 +230,17 @@ class _Forces(NamedTuple):
     upto: Any  # (q, k) integrals up to each place
 
 
-def _forces(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> _Forces:
+def _forces(at: Equilibria, elements: list[int], places: FloatArray, rest: _BeamAtRest) -> _Forces:
     """Return section forces and rotations at k fractions of m elements; tables may differ from point to point."""
     mesh, scales, whole = at.mesh, at.mesh.scales, at.mesh.elements
-    rule, own = basis(mesh.degree), at.z[..., whole.unknowns[elements]]
+    rule, unknowns = basis(mesh.degree), at.z[..., whole.unknowns[elements]]
     tables = {name: getattr(whole, name) for name in ON_POINTS}
     picked = {name: table[..., elements, :] for name, table in tables.items() if table is not None}
     laid = None if whole.laid is None else whole.laid[..., elements]
     e = whole._replace(**picked, length=whole.length[..., elements], laid=laid)
     load = energy.line_load(mesh, at.drive)[..., elements, :]
-    rotation, end = own[..., energy.rotation_columns(mesh.degree)], own[..., -2:]
-    speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(given.tolist()))
+    rotation, end = unknowns[..., energy.rotation_columns(mesh.degree)], unknowns[..., -2:]
+    speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(places.tolist()))
     upto = reached.integrals.T
     fields = _fields(e, end, load, rotation @ rule.values.T)
     first = e.weight * bending(e, rotation @ rule.slopes.T).moment
@@ -248,7 +250,7 @@ def _forces(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
         curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
         fields = _fields(e, end, load, rotation[..., :1] + curvature @ inside + missed * rule.places)
         curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
-        turn = rotation[..., :1] + curvature @ upto + missed * given
+        turn = rotation[..., :1] + curvature @ upto + missed * places
     else:
         turn = rotation @ reached.values.T
     ahead = e.length[..., None] - speed @ upto
@@ -264,17 +266,17 @@ def _forces(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
         rest.thickness,
     )
     if e.laid is not None:
-        states, fields = _lie_down(e, rotation, end[..., 0], given, states, fields, scales)
+        states, fields = _lie_down(e, rotation, end[..., 0], places, states, fields, scales)
     return _Forces(states, fields, speed, upto)
 
 
 def _lie_down(
-    e: BeamElements, rotation: Any, tension: Any, given: FloatArray, states: BeamStates, fields: _Fields, scales: Any
+    e: BeamElements, rotation: Any, tension: Any, places: FloatArray, states: BeamStates, fields: _Fields, scales: Any
 ) -> tuple[BeamStates, _Fields]:
     """Return states with those of elements that lie on an obstacle: even tension and moment, rotations in a line."""
     rule, lies = basis(rotation.shape[-1] - 1), e.laid[..., None]
     change = (rotation[..., 1] - rotation[..., 0])[..., None]
-    turn = rotation[..., :1] + change * given
+    turn = rotation[..., :1] + change * places
     angle = states.angle + turn
     moment = (e.rigidity * e.weight / rule.weights)[..., :1] * change * scales.moment
     force = tension[..., None] * scales.force
@@ -338,8 +340,8 @@ def unloaded_places(net: Network, at: Equilibria, beam: str, fractions: Any) -> 
 
         bare = at.mesh.elements._replace(line=0.0 * at.mesh.elements.line)
         rest = Equilibria(replace(at.mesh, elements=bare), rest.z, rest.drive)
-    found = states(net, rest, beam, fractions)
-    return np.stack([found.x[0], found.y[0]], axis=-1)
+    unloaded = states(net, rest, beam, fractions)
+    return np.stack([unloaded.x[0], unloaded.y[0]], axis=-1)
 
 
 class BeamSections(NamedTuple):
@@ -358,15 +360,17 @@ class BeamSections(NamedTuple):
         return bending + np.abs(self.axial_stress) if axial else bending
 
 
-def sections(net: Network, beam: str, found: BeamStates) -> BeamSections:
+def sections(net: Network, beam: str, beam_states: BeamStates) -> BeamSections:
     """Return section forces and stresses from states of a beam."""
-    return sections_of_width(net.beams[beam].section.width, found)
+    return sections_of_width(net.beams[beam].section.width, beam_states)
 
 
-def sections_of_width(width: Any, found: BeamStates) -> BeamSections:
+def sections_of_width(width: Any, beam_states: BeamStates) -> BeamSections:
     """Return section forces and stresses from states of a beam of a width [m], or of widths at all places."""
-    cos, sin = cos_sin(found.angle + found.turn)
-    normal, shear = found.h * cos + found.v * sin, found.v * cos - found.h * sin
-    area = width * found.thickness
-    bending = 6 * found.moment / (area * found.thickness)
-    return BeamSections(found.place + 0.0 * found.moment, found.moment, normal, shear, bending, normal / area)
+    cos, sin = cos_sin(beam_states.angle + beam_states.turn)
+    normal, shear = beam_states.h * cos + beam_states.v * sin, beam_states.v * cos - beam_states.h * sin
+    area = width * beam_states.thickness
+    bending = 6 * beam_states.moment / (area * beam_states.thickness)
+    return BeamSections(
+        beam_states.place + 0.0 * beam_states.moment, beam_states.moment, normal, shear, bending, normal / area
+    )

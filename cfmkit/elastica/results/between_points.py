@@ -131,13 +131,13 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def beside_corners(self) -> FloatArray:
         """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
-        found, points = np.empty((len(self.corners), 3)), self.own_points
+        places, points = np.empty((len(self.corners), 3)), self.own_points
         for number, corner in enumerate(self.corners):
             before, behind = points[points < corner][-1:], points[points > corner][:1]
             room = 0.5 * float(np.abs(np.concatenate([before, behind]) - corner).min())
             aside = min(CORNER_OFFSET * (points[-1] - points[0]), room)
-            found[number] = corner - aside * len(before), corner, corner + aside * len(behind)
-        return found
+            places[number] = corner - aside * len(before), corner, corner + aside * len(behind)
+        return places
 
     @cached_property
     def knots(self) -> Several[FloatArray]:
@@ -163,12 +163,12 @@ class BetweenPoints(ShortRepr):
         """
         if self.allowed is None:
             return self._extremes
-        numbers, found = self._stretch_numbers, []
+        numbers, stretches = self._stretch_numbers, []
         for number, (stretch, knots) in enumerate(self._extremes):
             points = stretch.smooth(self.own_drive[numbers == number])
             solve = partial(self._solved_stress, stretch)
-            found.append((stretch, solve_passes(knots, points, solve, self.allowed)))
-        return tuple(found)
+            stretches.append((stretch, solve_passes(knots, points, solve, self.allowed)))
+        return tuple(stretches)
 
     @cached_property
     def _stretch_numbers(self) -> Any:
@@ -182,31 +182,31 @@ class BetweenPoints(ShortRepr):
         at_points = self.path.beam_stresses(self.axial)[0][:, self._order]
         at_corners = np.empty((0, len(at_points)))
         if corners:
-            there = self.solve_at(self.corners)
-            at_corners = there.beam_stresses(self.axial)[0].T
-        found = []
+            corner_path = self.solve_at(self.corners)
+            at_corners = corner_path.beam_stresses(self.axial)[0].T
+        extremes = []
         for number in range(len(corners) + 1):
             low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
-            stretch, own = SmoothStretch(low, high), numbers == number
+            stretch, of_stretch = SmoothStretch(low, high), numbers == number
             ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
-            x, rows = stretch.with_ends(self.own_drive[own], at_points[:, own].T, *ends)
+            x, rows = stretch.with_ends(self.own_drive[of_stretch], at_points[:, of_stretch].T, *ends)
             solve = partial(self._solved_stress, stretch)
-            found.append((stretch, solve_extremes(stretch.smooth(x), rows.T, solve)))
-        return tuple(found)
+            extremes.append((stretch, solve_extremes(stretch.smooth(x), rows.T, solve)))
+        return tuple(extremes)
 
     def _solved_stress(self, stretch: SmoothStretch, t: FloatArray) -> tuple[FloatArray, Any]:
         """Return the stress of each beam where the smooth variable has some values, and where it was solved."""
-        there = self.solve_at(self._scale * stretch.drive(t))
-        return there.beam_stresses(self.axial)[0], there.accurate
+        solved = self.solve_at(self._scale * stretch.drive(t))
+        return solved.beam_stresses(self.axial)[0], solved.accurate
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the effort at places of any shape [N or N m]; next to a bifurcation between the points beside it."""
         flat = np.ravel(places)
         solved = self._solved.get(flat.tobytes())
         if solved is None:
-            there = self.solve_at(flat)
-            effort = self._effort_on(there)
-            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self.own_points, self.point_efforts))
+            states = self.solve_at(flat)
+            effort = self._effort_on(states)
+            solved = np.where(states.accurate, self.unit * effort, np.interp(flat, self.own_points, self.point_efforts))
             self._solved[flat.tobytes()] = solved
         return np.array(solved.reshape(np.shape(places)))
 
@@ -221,17 +221,17 @@ class BetweenPoints(ShortRepr):
         wanted, largest = flat / self._scale, np.full(len(flat), np.nan)
         number = np.searchsorted([corner.drive for corner in self._corners.values()], wanted)
         for index, (stretch, beams) in enumerate(self._stresses):
-            own = number == index
-            t = stretch.smooth(wanted[own])
-            largest[own] = np.max([values_at(x, stress, t) for x, stress in beams], axis=0)
+            of_stretch = number == index
+            t = stretch.smooth(wanted[of_stretch])
+            largest[of_stretch] = np.max([values_at(x, stress, t) for x, stress in beams], axis=0)
         return np.asarray(largest.reshape(np.shape(places)))
 
     def stress_reaches(self, level: float, sense: float = 1.0) -> float | None:
         """Return the first place, in the sense of travel (1 or -1), at which a beam's stress is a level [m or rad]."""
         stretches = self._stresses if sense > 0 else self._stresses[::-1]
         for stretch, beams in stretches:
-            found = [crossing(*(pair if sense > 0 else (-pair[0][::-1], pair[1][::-1])), level) for pair in beams]
-            if reached := [sense * place for place in found if place is not None]:
+            crossings = [crossing(*(pair if sense > 0 else (-pair[0][::-1], pair[1][::-1])), level) for pair in beams]
+            if reached := [sense * place for place in crossings if place is not None]:
                 places = self._scale * stretch.drive(np.array(reached))
                 return float(sense * (sense * places).min())
         return None
@@ -241,19 +241,19 @@ class BetweenPoints(ShortRepr):
         if len(self.corners):
             return None
         ends = np.array([low, high])
-        there = self.solve_at(ends)
-        solved = there.beam_stresses(self.axial)[0].max(axis=0)
-        if not there.accurate.all():
-            solved = np.where(there.accurate, solved, self.stress(branch, ends))
+        end_states = self.solve_at(ends)
+        solved = end_states.beam_stresses(self.axial)[0].max(axis=0)
+        if not end_states.accurate.all():
+            solved = np.where(end_states.accurate, solved, self.stress(branch, ends))
         inner = largest_inside(self.own_drive, self._point_stresses, self.solve_stress, ends / self._scale)
         return float(max(inner, *solved))
 
     def _point_stresses(self, points: Any) -> FloatArray:
         """Return the stress of each beam at some of the points in their order, (b, n) [Pa]."""
-        known = self.path.known_beam_stresses(self.axial)
-        if known is None:
+        known_stresses = self.path.known_beam_stresses(self.axial)
+        if known_stresses is None:
             return self.path.take(self._numbers[points]).beam_stresses(self.axial)[0]
-        return known[:, self._order][:, points]
+        return known_stresses[:, self._order][:, points]
 
     def solve_stress(self, drive: FloatArray) -> tuple[FloatArray, Any]:
         """Return the stress of each beam at dimensionless places of a path without corners, and where it was solved."""
@@ -264,29 +264,29 @@ class BetweenPoints(ShortRepr):
         drive = self.own_drive
         wanted = np.clip(places / self._scale, drive[0], drive[-1])
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
-        near = self._nearest(wanted, left)
-        y = self._guesses(wanted, near)
+        nearest = self._nearest(wanted, left)
+        y = self._guesses(wanted, nearest)
         # what friction does between two points is what it does at the later one: it changes at the earlier one, if any
         later = left + (self._numbers[left + 1] > self._numbers[left])
         y[:, self._friction_slots] = self.own_unknowns[later][:, self._friction_slots]
-        loads = self._loads[near]
-        known = np.abs(wanted - drive[near]) <= PLACE_RTOL * (drive[-1] - drive[0])
-        y[known] = self.own_unknowns[near[known]]
+        loads = self._loads[nearest]
+        is_known = np.abs(wanted - drive[nearest]) <= PLACE_RTOL * (drive[-1] - drive[0])
+        y[is_known] = self.own_unknowns[nearest[is_known]]
         for corner in self._corners.values():
-            here = np.abs(wanted - corner.drive) <= PLACE_RTOL * (drive[-1] - drive[0])
-            y[here], loads[here], known = corner.y, corner.drive, known | here
-        found, changes = known.copy(), self._poses(self.own_unknowns[left + 1] - self.own_unknowns[left])
-        asked = np.flatnonzero(~known)
+            at_corner = np.abs(wanted - corner.drive) <= PLACE_RTOL * (drive[-1] - drive[0])
+            y[at_corner], loads[at_corner], is_known = corner.y, corner.drive, is_known | at_corner
+        is_solved, changes = is_known.copy(), self._poses(self.own_unknowns[left + 1] - self.own_unknowns[left])
+        asked = np.flatnonzero(~is_known)
         if len(asked):
             spots, ways = self._spots(y[asked], wanted[asked], loads[asked])
-            alike = (spots.unstable[:, None] == self._counts(near[asked], left[asked])).any(axis=1)
+            alike = (spots.unstable[:, None] == self._counts(nearest[asked], left[asked])).any(axis=1)
             moved = self._poses(spots.free - y[asked])
             good = (
                 spots.converged & alike & (moved <= np.maximum(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * changes[asked]))
             )
             chosen = asked[good]
-            y[chosen], loads[chosen], found[chosen] = spots.free[good], ways[good], True
-        return self.path.with_states(self._numbers[near], y, loads, found)
+            y[chosen], loads[chosen], is_solved[chosen] = spots.free[good], ways[good], True
+        return self.path.with_states(self._numbers[nearest], y, loads, is_solved)
 
     def _spots(self, y: FloatArray, wanted: FloatArray, _near: FloatArray) -> tuple[SolvedStates, FloatArray]:
         """Return the equilibria at dimensionless places and their drives; `_near`: the drive at the nearest points."""
@@ -308,9 +308,9 @@ class BetweenPoints(ShortRepr):
         mesh = self.path.mesh
         return np.asarray(np.abs(changes[:, mesh.free < mesh.n_motions]).max(axis=1, initial=0.0))
 
-    def _counts(self, near: Any, _left: Any) -> Any:
+    def _counts(self, nearest: Any, _left: Any) -> Any:
         """Return how many unstable directions equilibria may have, (n, k); `_left`: the points before them."""
-        return self._unstable[near][:, None]
+        return self._unstable[nearest][:, None]
 
     @cached_property
     def _numbers(self) -> Any:
@@ -348,76 +348,76 @@ class BetweenPoints(ShortRepr):
     @cached_property
     def _contacts(self) -> Any:
         """Numbers of the points at which a contact begins or ends, but for both ends of the path."""
-        found = np.flatnonzero(self.path.changes_contact[self._order])
-        return found[(found > 0) & (found < len(self.path) - 1)]
+        changes = np.flatnonzero(self.path.changes_contact[self._order])
+        return changes[(changes > 0) & (changes < len(self.path) - 1)]
 
     @cached_property
     def _events(self) -> FloatArray:
         """Bifurcations of the path and changes of contacts, dimensionless, increasing."""
-        places = [one.drive / self._scale for one in self.path.events if one.kind == "bifurcation"]
+        places = [event.drive / self._scale for event in self.path.events if event.kind == "bifurcation"]
         return np.sort([*places, *self.own_drive[self._contacts].tolist()])
 
     def _nearest(self, wanted: FloatArray, left: Any) -> Any:
         """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
         drive, events = self.own_drive, self._events
-        near = left + (wanted - drive[left] > drive[left + 1] - wanted)
+        nearest = left + (wanted - drive[left] > drive[left + 1] - wanted)
         for number in np.flatnonzero(self._stretch[left] != self._stretch[left + 1]).tolist():
-            here = events[(events >= drive[left[number]]) & (events <= drive[left[number] + 1])]
-            if len(here):
-                near[number] = left[number] + bool(wanted[number] > here[0])
-        return near
+            inner_events = events[(events >= drive[left[number]]) & (events <= drive[left[number] + 1])]
+            if len(inner_events):
+                nearest[number] = left[number] + bool(wanted[number] > inner_events[0])
+        return nearest
 
     @cached_property
     def _corners(self) -> dict[int, Corner]:
         """The corners of the path by the number of the stretch behind each, increasing."""
         branch, stretches, drive = self.path.branch[self._order], self._stretch, self.own_drive
-        names, found = list(dict.fromkeys(self.path.branch.tolist())), {}
+        names, corners = list(dict.fromkeys(self.path.branch.tolist())), {}
         rounding = AT_POINT * (drive[-1] - drive[0])
         for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
             if right in self._contacts:
-                found[int(stretches[right])] = Corner(
+                corners[int(stretches[right])] = Corner(
                     float(drive[right]), np.asarray(self.own_unknowns[right]), False, False
                 )
                 continue
             before, behind = drive[right - 1], drive[right]
-            here = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
-            if len(here) != 1:
+            inner_events = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
+            if len(inner_events) != 1:
                 continue
             ranks = [names.index(branch[right - 1]), names.index(branch[right])]
             below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
-            at = next((k for k in (right - 1, right) if abs(drive[k] - here[0]) <= rounding), None)
-            place = float(here[0] if at is None else drive[at])
+            at = next((k for k in (right - 1, right) if abs(drive[k] - inner_events[0]) <= rounding), None)
+            place = float(inner_events[0] if at is None else drive[at])
             y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self.own_unknowns[at])
             if y is not None:
-                found[int(stretches[right])] = Corner(place, y, below, above)
-        return found
+                corners[int(stretches[right])] = Corner(place, y, below, above)
+        return corners
 
     def _corner(self, place: float, point: int) -> FloatArray | None:
         """Return the equilibrium at a bifurcation from the stretch that a point next to it is on, which goes through.
 
         It is singular: ever nearer ones are solved for, and the polynomial taken on from there.
         """
-        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self.own_drive
-        x, y = drive[own], self.own_unknowns[own]
+        of_stretch, drive = np.flatnonzero(self._stretch == self._stretch[point]), self.own_drive
+        x, y = drive[of_stretch], self.own_unknowns[of_stretch]
         for share in CORNER_SHARES:
-            near = place + share * (drive[point] - place)
-            spots, _ = self._spots(values_at(x, y, np.array([near])), np.array([near]), np.array([near]))
+            nearby = place + share * (drive[point] - place)
+            spots, _ = self._spots(values_at(x, y, np.array([nearby])), np.array([nearby]), np.array([nearby]))
             beside = np.array([point])
             if not spots.converged[0] or spots.unstable[0] not in self._counts(beside, beside):
                 if share == CORNER_SHARES[0]:
                     return None
                 break  # of a bifurcation just behind the rest, the place is known less closely
-            at = int(np.searchsorted(x, near))
-            x, y = np.insert(x, at, near), np.insert(y, at, spots.free[0], axis=0)
+            at = int(np.searchsorted(x, nearby))
+            x, y = np.insert(x, at, nearby), np.insert(y, at, spots.free[0], axis=0)
         return np.asarray(values_at(x, y, np.array([place]))[0])
 
-    def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
+    def _guesses(self, wanted: FloatArray, nearest: Any) -> FloatArray:
         """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
-        found = np.empty((len(wanted), self.own_unknowns.shape[1]))
-        for number in distinct(self._stretch[near]).tolist():
-            own, here = self._stretch == number, self._stretch[near] == number
+        guesses = np.empty((len(wanted), self.own_unknowns.shape[1]))
+        for number in distinct(self._stretch[nearest]).tolist():
+            of_stretch, requested = self._stretch == number, self._stretch[nearest] == number
             stretch = SmoothStretch(self._corners.get(number), self._corners.get(number + 1))
             ends = (None if corner is None else corner.y for corner in (stretch.low, stretch.high))
-            x, y = stretch.with_ends(self.own_drive[own], self.own_unknowns[own], *ends)
-            found[here] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[here]))
-        return found
+            x, y = stretch.with_ends(self.own_drive[of_stretch], self.own_unknowns[of_stretch], *ends)
+            guesses[requested] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[requested]))
+        return guesses

@@ -52,26 +52,29 @@ def solve_all_extremes(
     solve: Callable[[list[FloatArray]], list[tuple[FloatArray, Any]]],
 ) -> list[tuple[Knots, ...]]:
     """Return the same of several curves; `solve` takes places of each of them, by chance none, in one call."""
-    found = [[(t, row) for row in rows] for t, rows, _ in curves]
+    knots_by_curve = [[(t, row) for row in rows] for t, rows, _ in curves]
     largest = [rows.max(axis=0) for _, rows, _ in curves]
     for _ in range(N_EXTREME_ROUNDS):
         stressed = [
-            [own if own[1].max() >= bound else (own[0][:0], own[1][:0]) for own in knots]
-            for knots, (_, _, bound) in zip(found, curves, strict=True)
+            [
+                beam_knots if beam_knots[1].max() >= bound else (beam_knots[0][:0], beam_knots[1][:0])
+                for beam_knots in knots
+            ]
+            for knots, (_, _, bound) in zip(knots_by_curve, curves, strict=True)
         ]
-        places = iter(inner_extremes_of_rows([own for knots in stressed for own in knots]))
+        places = iter(inner_extremes_of_rows([beam_knots for knots in stressed for beam_knots in knots]))
         more = [
-            [_keep_tops(own, next(places), t, top) for own in knots]
-            for knots, (t, _, _), top in zip(found, curves, largest, strict=True)
+            [_keep_tops(beam_knots, next(places), t, top) for beam_knots in knots]
+            for knots, (t, _, _), top in zip(knots_by_curve, curves, largest, strict=True)
         ]
-        if not any(len(places) for each in more for places in each):
+        if not any(len(places) for places_by_beam in more for places in places_by_beam):
             break
-        solved = solve([np.concatenate(each) for each in more])
-        found = [
-            _add_solved(knots, knots, each, *answer) if any(map(len, each)) else knots
-            for knots, each, answer in zip(found, more, solved, strict=True)
+        solved = solve([np.concatenate(places_by_beam) for places_by_beam in more])
+        knots_by_curve = [
+            _add_solved(knots, knots, places_by_beam, *answer) if any(map(len, places_by_beam)) else knots
+            for knots, places_by_beam, answer in zip(knots_by_curve, more, solved, strict=True)
         ]
-    return [tuple(knots) for knots in found]
+    return [tuple(knots) for knots in knots_by_curve]
 
 
 def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: Solve, window: FloatArray) -> float:
@@ -91,14 +94,14 @@ def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: 
         Minus infinity is returned if no point and no extreme between two is inside.
     """
     few = few_points(x, *window)
-    known = stresses(few)
-    more = near_largest(x, few, known, *window)
+    known_stresses = stresses(few)
+    more = near_largest(x, few, known_stresses, *window)
     if len(more):
         few = np.concatenate([few, more])
-        known = np.concatenate([known, stresses(more)], axis=1)
+        known_stresses = np.concatenate([known_stresses, stresses(more)], axis=1)
         order = np.argsort(few, kind="stable")
-        few, known = few[order], known[:, order]
-    return largest_between(x, few, known, solve, window)
+        few, known_stresses = few[order], known_stresses[:, order]
+    return largest_between(x, few, known_stresses, solve, window)
 
 
 def few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
@@ -116,10 +119,10 @@ def near_largest(
     inside = (x[few] >= low) & (x[few] <= high)
     top = stresses[:, inside].max(initial=0.0)
     guess = values_at(x[few], stresses.T, x[first : last + 1]).max(axis=1)
-    near = first + np.flatnonzero(guess >= NEIGHBOUR_SHARE * top)
+    nearby = first + np.flatnonzero(guess >= NEIGHBOUR_SHARE * top)
     wanted = np.zeros(len(x), dtype=bool)
     for step in range(-STENCIL_REACH, STENCIL_REACH + 1):
-        wanted[np.clip(near + step, first, last)] = True
+        wanted[np.clip(nearby + step, first, last)] = True
     wanted[few] = False
     return np.flatnonzero(wanted)
 
@@ -141,7 +144,7 @@ def runs_of_points(
     inside = (x[points] >= window[0]) & (x[points] <= window[1])
     bound = NEIGHBOUR_SHARE * stresses[:, inside].max(initial=-np.inf)
     parts = np.split(np.arange(len(points)), np.flatnonzero(np.diff(points) > 1) + 1)
-    runs = [(x[points[own]], stresses[:, own], bound) for own in parts if len(own) > 3]
+    runs = [(x[points[part]], stresses[:, part], bound) for part in parts if len(part) > 3]
     return [run for run in runs if run[1].max() >= bound]
 
 

@@ -100,7 +100,7 @@ def both_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[s
     """Return beams by name, those of a mirrored half with a prime."""
     if (axis := mirror_axis(assembly)) is None:
         return beams
-    return {**beams, **{f"{name}'": [strip.mirror(*axis) for strip in found] for name, found in beams.items()}}
+    return {**beams, **{f"{name}'": [strip.mirror(*axis) for strip in strips] for name, strips in beams.items()}}
 
 
 def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float) -> DrawnParts:
@@ -109,10 +109,10 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: fl
     Nothing else is added: pieces that continue each other share their end, however thick each is there.
     """
     halves, axis = both_halves(assembly, beams), mirror_axis(assembly)
-    pieces = [strip.piece for found in halves.values() for strip in found]
-    for name, found in halves.items():
-        for one, two in itertools.pairwise(found):
-            pieces += _close_ends([BeamEnd(name, one, True), BeamEnd(name, two, False)])
+    pieces = [strip.piece for strips in halves.values() for strip in strips]
+    for name, strips in halves.items():
+        for first, two in itertools.pairwise(strips):
+            pieces += _close_ends([BeamEnd(name, first, True), BeamEnd(name, two, False)])
     for ends in meeting_ends(assembly, halves).values():
         pieces += _close_ends(ends)
     blocks = list(_blocks(assembly, beams))
@@ -145,12 +145,12 @@ def _is_pinned(assembly: Assembly, node: str) -> bool:
 
 def meeting_ends(assembly: Assembly, halves: dict[str, list[BeamStrip]]) -> dict[str, list[BeamEnd]]:
     """Return the ends of beams by node; nodes of a mirrored half have a prime, unless they are on the axis."""
-    found: dict[str, list[BeamEnd]] = {}
-    for name, own in halves.items():
+    ends_by_node: dict[str, list[BeamEnd]] = {}
+    for name, strips in halves.items():
         beam, image = assembly.network.beams[name.rstrip("'")], name.endswith("'")
-        for node, end in ((beam.start, BeamEnd(name, own[0], False)), (beam.end, BeamEnd(name, own[-1], True))):
-            found.setdefault(f"{node}'" if image and not is_on_axis(assembly, node) else node, []).append(end)
-    return found
+        for node, end in ((beam.start, BeamEnd(name, strips[0], False)), (beam.end, BeamEnd(name, strips[-1], True))):
+            ends_by_node.setdefault(f"{node}'" if image and not is_on_axis(assembly, node) else node, []).append(end)
+    return ends_by_node
 
 
 def _close_ends(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
@@ -162,31 +162,31 @@ def _close_ends(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
     """
     away = [float(np.hypot(*(end.at - ends[0].at))) for end in ends]
     if max(away) > STANDING_DISTANCE * ends[0].thickness:
-        near = [end.cap for end, apart in zip(ends, away, strict=True) if apart < end.thickness]
-        yield from OutlinePiece.from_convex_hull(np.concatenate(near)) if len(near) > 1 else ()
+        caps = [end.cap for end, apart in zip(ends, away, strict=True) if apart < end.thickness]
+        yield from OutlinePiece.from_convex_hull(np.concatenate(caps)) if len(caps) > 1 else ()
         return
     ordered = sorted(ends, key=lambda end: end.angle % math.tau)
-    for one, other in zip(ordered, [*ordered[1:], ordered[0]], strict=True):
-        gap = (other.angle - one.angle) % math.tau
+    for first, second in zip(ordered, [*ordered[1:], ordered[0]], strict=True):
+        gap = (second.angle - first.angle) % math.tau
         if math.pi + CONTINUATION_ANGLE < gap < math.tau - CONTINUATION_ANGLE:
-            yield OutlinePiece.polygon(np.array([one.at, one.cap[0], other.cap[1]]))
+            yield OutlinePiece.polygon(np.array([first.at, first.cap[0], second.cap[1]]))
 
 
 def _blocks(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Iterator[DrawnBlock]:
     """Yield pads, arms and bars of the described half, all behind the beams that end there."""
     network, ends = assembly.network, meeting_ends(assembly, beams)
-    for node, own in ends.items():
-        for pad, end in pads_behind(assembly, node, own) if is_padded(assembly, node) else ():
+    for node, beam_ends in ends.items():
+        for pad, end in pads_behind(assembly, node, beam_ends) if is_padded(assembly, node) else ():
             yield DrawnBlock(f"the pad of {end.beam} at {node}", (node,), pad)
         place = np.array([network.nodes[node].x, network.nodes[node].y])
-        for end in own:
+        for end in beam_ends:
             breadth = PAD_DEPTH * end.thickness
             if np.hypot(*(end.at - place)) > STANDING_DISTANCE * breadth:
-                arm = _bar(place, end.at, breadth, own)
+                arm = _bar(place, end.at, breadth, beam_ends)
                 yield DrawnBlock(f"the arm of {end.beam} at {node}", (node,), arm)
-    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
+    thick = max(float(strip.thickness.max()) for strips in beams.values() for strip in strips)
     for link in network.links:
-        a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
+        a, b = (_anchor(assembly, beams, end_node) for end_node in (link.master, link.node))
         if np.hypot(*(b - a)) > 0:
             bar = _bar(a, b, PAD_DEPTH * thick, [*ends.get(link.master, []), *ends.get(link.node, [])])
             yield DrawnBlock(f"the bar from {link.master} to {link.node}", (link.master, link.node), bar)
@@ -199,9 +199,9 @@ def is_padded(assembly: Assembly, node: str) -> bool:
     """
     if is_on_axis(assembly, node):
         return False
-    found = assembly.network.nodes[node]
+    place = assembly.network.nodes[node]
     linked = {link.node for link in assembly.network.links}
-    return (found.support.rotation and found.support.across) or node in linked
+    return (place.support.rotation and place.support.across) or node in linked
 
 
 def moves(assembly: Assembly, node: str) -> bool:
@@ -217,8 +217,8 @@ def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) ->
         for pad, _ in pads_behind(assembly, node, ends):
             middle: FloatArray = pad.mean(axis=0)
             return middle
-    found = assembly.network.nodes[node]
-    return np.array([found.x, found.y])
+    place = assembly.network.nodes[node]
+    return np.array([place.x, place.y])
 
 
 def ends_at(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> list[BeamEnd]:
@@ -281,8 +281,8 @@ def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[
             depth = (part.frame.shuttle if moving else part.frame.wall) or depth
         side, out = half * np.array([end.along[1], -end.along[0]]), -depth * end.along
         pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
-        for other in ends:
-            pad = _part_behind_end(pad, other) if other is not end else pad
+        for neighbour in ends:
+            pad = _part_behind_end(pad, neighbour) if neighbour is not end else pad
         if len(pad) > 2 and abs(signed_area(pad)) > MIN_PAD_SHARE * depth * half:
             yield pad, end
 
@@ -291,13 +291,13 @@ def _part_behind_end(shape: FloatArray, end: BeamEnd) -> FloatArray:
     """Return what of a convex polygon (n, 2) lies behind the end of a beam [m]; nothing may be left."""
     ahead = (shape - end.at) @ end.along
     ahead = np.where(np.abs(ahead) <= STANDING_DISTANCE * end.thickness, 0.0, ahead)
-    found = []
-    for a, b, one, other in zip(shape, np.roll(shape, -1, axis=0), ahead, np.roll(ahead, -1), strict=True):
-        if one <= 0:
-            found.append(a)
-        if one * other < 0:
-            found.append(a + one / (one - other) * (b - a))
-    return np.array(found).reshape(-1, 2)
+    corners = []
+    for a, b, ahead_here, ahead_next in zip(shape, np.roll(shape, -1, axis=0), ahead, np.roll(ahead, -1), strict=True):
+        if ahead_here <= 0:
+            corners.append(a)
+        if ahead_here * ahead_next < 0:
+            corners.append(a + ahead_here / (ahead_here - ahead_next) * (b - a))
+    return np.array(corners).reshape(-1, 2)
 
 
 def _bar(a: FloatArray, b: FloatArray, width: float, ends: Sequence[BeamEnd] = ()) -> FloatArray:
@@ -319,19 +319,19 @@ def bars_between_halves(
 ) -> dict[str, FloatArray]:
     """Return the bars that join the moving parts of two halves, behind the pads, by their nodes."""
     halves = both_halves(assembly, beams)
-    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
-    found: dict[str, FloatArray] = {}
+    thick = max(float(strip.thickness.max()) for strips in beams.values() for strip in strips)
+    bars: dict[str, FloatArray] = {}
     for node in sorted(moving_nodes(assembly)):
         ends = ends_at(assembly, halves, node)
         if not ends or is_on_axis(assembly, node):
             continue
         pads = list(pads_behind(assembly, node, ends)) if is_padded(assembly, node) else []
         middle = _far_side(pads[0][0], pads[0][1]) if pads else _anchor(assembly, beams, node)
-        other = mirror_points(middle[None], at, direction)[0]
-        if np.hypot(*(other - middle)) > 0:
+        mirrored = mirror_points(middle[None], at, direction)[0]
+        if np.hypot(*(mirrored - middle)) > 0:
             images = ends_at(assembly, halves, f"{node}'")
-            found[node] = _bar(middle, other, _shuttle(assembly) or PAD_DEPTH * thick, [*ends, *images])
-    return found
+            bars[node] = _bar(middle, mirrored, _shuttle(assembly) or PAD_DEPTH * thick, [*ends, *images])
+    return bars
 
 
 def _far_side(pad: FloatArray, end: BeamEnd) -> FloatArray:

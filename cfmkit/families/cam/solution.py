@@ -49,15 +49,15 @@ class ForceBand:
 
     def quantile(self, share: float) -> FloatArray:
         """Return the force that a share of the cams stays below at each travel [N]; NaN where not all have a flank."""
-        found, all_there = np.full(len(self.travel), np.nan), np.isfinite(self.forces).all(axis=0)
-        found[all_there] = np.quantile(self.forces[:, all_there], share, axis=0)
-        return found
+        forces, all_there = np.full(len(self.travel), np.nan), np.isfinite(self.forces).all(axis=0)
+        forces[all_there] = np.quantile(self.forces[:, all_there], share, axis=0)
+        return forces
 
     def deviations(self) -> FloatArray:
         """Return every cam's standard deviation of the error along the travel, over the mean force [SS, fig. 13]."""
         errors = self.forces - self.design
-        found: FloatArray = np.nanstd(errors, axis=1, ddof=1) / float(np.nanmean(self.design))
-        return found
+        deviations: FloatArray = np.nanstd(errors, axis=1, ddof=1) / float(np.nanmean(self.design))
+        return deviations
 
 
 def pressure_angle(states: TrackStates, brace_length: Any) -> FloatArray:
@@ -98,7 +98,7 @@ class Solution(ShortRepr):
 
     def of_each_cam(self, read: Callable[[Assembly], float]) -> FloatArray:
         """Return a number of each different cam, (m, 1), or (1, 1) where all are alike."""
-        return np.array([[read(one)] for one in self.cams or (self.assembly,)])
+        return np.array([[read(cam)] for cam in self.cams or (self.assembly,)])
 
     def column(self, value: Any) -> FloatArray:
         """Return a number of each mechanism, (m,)."""
@@ -124,7 +124,9 @@ class Solution(ShortRepr):
     def effort_error(self) -> Any:
         """Rounding of the sum of springs and weights on the slider [N]."""
         weight = self.assembly.loads.slider_weight
-        most = reduce(np.maximum, (largest_of_each(np.abs(one.slider - weight)) for one in self._ways)) + np.abs(weight)
+        most = reduce(
+            np.maximum, (largest_of_each(np.abs(way_forces.slider - weight)) for way_forces in self._ways)
+        ) + np.abs(weight)
         return ROUND_OFF * (np.nan_to_num(most) if self.count > 1 else float(np.nan_to_num(most)[0]))
 
     @cached_property
@@ -132,8 +134,8 @@ class Solution(ShortRepr):
         """Travel at which the roller leaves the corner [m]; 0 if there is none."""
         track = self.assembly.track
         corner = np.maximum(track.corner_end - track.start, 0.0)
-        found = np.where(corner > self.travel[..., :1], corner, 0.0)
-        return found if self.count > 1 else float(found[0])
+        corner_travel = np.where(corner > self.travel[..., :1], corner, 0.0)
+        return corner_travel if self.count > 1 else float(corner_travel[0])
 
     @cached_property
     def flank(self) -> FlankSamples:
@@ -143,7 +145,7 @@ class Solution(ShortRepr):
     # --- at any travel ----------------------------------------------------------------------------------------------
 
     def evaluate_travel(
-        self, travel: FloatArray, way: float, rows: Any = None, flank: bool = False
+        self, travel: FloatArray, sign: float, rows: Any = None, flank: bool = False
     ) -> tuple[TrackStates, Forces]:
         """Return where the rollers are, and the forces on the way up (1) or down (-1), at travels [m].
 
@@ -151,7 +153,7 @@ class Solution(ShortRepr):
         ----------
         travel : (k, m) array, or of any shape for one mechanism
             Travels of each mechanism, or of some.
-        way : float
+        sign : float
             1 or -1.
         rows : (k,) array of int, optional
             Which mechanisms; default: all.
@@ -163,16 +165,16 @@ class Solution(ShortRepr):
             track, loads, friction = track.of_rows(rows), rows_of(loads, rows), rows_of(friction, rows)
         slider = track.start + travel
         states = track.states(np.maximum(slider, track.corner_end) if flank else slider)
-        return states, forces(states, loads, way * friction, way)
+        return states, forces(states, loads, sign * friction, sign)
 
-    def evaluate_places(self, places: FloatArray, way: float, rows: Any = None) -> tuple[TrackStates, Forces]:
+    def evaluate_places(self, places: FloatArray, sign: float, rows: Any = None) -> tuple[TrackStates, Forces]:
         """Return the same at displacements, which end with the travel [m]; what is alike for all is computed once."""
         shared = rows is None and places.ndim == 2 and not isinstance(self.assembly.track, TrackRows)
         places = places[:1] if shared and places.strides[0] == 0 else places
         origin, last = self.origin, self.travel[..., -1:]
         if rows is not None:
             origin, last = rows_of((origin, last), rows)
-        return self.evaluate_travel(np.clip(places - origin, 0.0, last), way, rows)
+        return self.evaluate_travel(np.clip(places - origin, 0.0, last), sign, rows)
 
     # --- jams -------------------------------------------------------------------------------------------------------
 
@@ -185,9 +187,9 @@ class Solution(ShortRepr):
     def all_jams(self) -> list[tuple[tuple[float, float], ...]]:
         """Intervals of travel in which no force moves the slider up, of each mechanism [m]."""
         friction, losses = self.mechanism.rolling_friction, self.assembly.loads.losses
-        found: list[tuple[tuple[float, float], ...]] = [()] * self.count
+        intervals: list[tuple[tuple[float, float], ...]] = [()] * self.count
         if not np.any(friction) and losses is None:
-            return found
+            return intervals
         is_looked_at = np.isnan(self.up.slider).any(axis=-1) | (self.travel.shape[-1] < FEW_SAMPLES)
         is_looked_at = np.broadcast_to(is_looked_at, self.count)
         total = self.column(self.travel[..., -1:])
@@ -197,27 +199,29 @@ class Solution(ShortRepr):
                 continue
             if losses is None and not np.ndim(friction) and not isinstance(track, TrackRows):
                 # springs and weights do not change leverage
-                (own,) = jams(track, friction, states)
-                known = [_clip_intervals(own, float(total[0]))] * len(rows)
+                (jam,) = jams(track, friction, states)
+                clipped = [_clip_intervals(jam, float(total[0]))] * len(rows)
             else:
                 if len(rows) < self.count:
                     track, parts = track.of_rows(rows), rows_of(parts, rows)
-                each = zip(jams(track, *parts, len(rows)), total[rows].tolist(), strict=True)
-                known = [_clip_intervals(own, end) for own, end in each]
-            for row, own in zip(rows.tolist(), known, strict=True):
-                found[row] = own
-        return found
+                jams_and_ends = zip(jams(track, *parts, len(rows)), total[rows].tolist(), strict=True)
+                clipped = [_clip_intervals(jam, end) for jam, end in jams_and_ends]
+            for row, jam in zip(rows.tolist(), clipped, strict=True):
+                intervals[row] = jam
+        return intervals
 
     @property
     def jam_travel(self) -> FloatArray:
         """Travel at the start over which no force moves the slider up [m], (m,)."""
-        return np.array([next((high for low, high in own if low == 0), 0.0) for own in self.all_jams])
+        return np.array([next((high for low, high in intervals if low == 0), 0.0) for intervals in self.all_jams])
 
     @property
     def is_held_on_corner(self) -> NDArray[np.bool_]:
         """Whether no force moves the slider up somewhere on the corner, (m, 1)."""
         corner = self.column(self.corner_travel).tolist()
-        return np.array([[any(low < end for low, _ in own)] for own, end in zip(self.all_jams, corner, strict=True)])
+        return np.array(
+            [[any(low < end for low, _ in intervals)] for intervals, end in zip(self.all_jams, corner, strict=True)]
+        )
 
     # --- as metrics see it ------------------------------------------------------------------------------------------
 
@@ -239,8 +243,8 @@ class Solution(ShortRepr):
             return analysis.travel
         # the whole stroke but for rounding is the stroke: shares of the travel are then the same places in every run
         is_whole = np.abs(last - stroke) <= TRAVEL_RTOL * np.maximum(np.abs(last), np.abs(stroke))
-        found = np.where(is_whole, stroke, last)
-        return found if self.count > 1 else float(found[0])
+        requested = np.where(is_whole, stroke, last)
+        return requested if self.count > 1 else float(requested[0])
 
     @cached_property
     def places(self) -> FloatArray:
@@ -262,8 +266,8 @@ class Solution(ShortRepr):
 
     def stress(self, branch: str, places: FloatArray, rows: Any = None) -> FloatArray:
         """Return the stress below the contact at displacements, likewise [Pa]; NaN on the corner."""
-        states, found = self.evaluate_places(places, BRANCH_DIRECTIONS[branch], rows)
-        return stress(flank_pressure(self.assembly, states, found.contact, rows))
+        states, contact_forces = self.evaluate_places(places, BRANCH_DIRECTIONS[branch], rows)
+        return stress(flank_pressure(self.assembly, states, contact_forces.contact, rows))
 
     def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
@@ -279,7 +283,7 @@ class Solution(ShortRepr):
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch, up and down."""
-        motion, dense = (self._of_each(one) for one in (self.travel + self.origin, self.places))
+        motion, dense = (self._of_each(places) for places in (self.travel + self.origin, self.places))
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
         design = self.assembly.spec.design  # forces that follow a curve are no rows
@@ -305,8 +309,8 @@ class Solution(ShortRepr):
         return np.broadcast_to(values, (self.count, values.shape[-1]))
 
     def _effort_in_rows(self, name: str, places: FloatArray, rows: Any) -> FloatArray:
-        found = self.effort(name, places, rows)
-        return np.broadcast_to(found, (len(places), places.shape[1]))
+        effort = self.effort(name, places, rows)
+        return np.broadcast_to(effort, (len(places), places.shape[1]))
 
     def _part_efforts_in_rows(self, name: str, places: FloatArray) -> FloatArray:
         return np.broadcast_to(self.part_efforts(name, places), places.shape)
@@ -344,14 +348,14 @@ class FlankSamples(ShortRepr):
         """Return those of solved mechanisms."""
         corner, travel, states = np.atleast_1d(solution.corner_travel), solution.travel, solution.states
         leaves = (corner > 0) & (corner <= travel[..., -1:])
-        there = ~states.on_corner & (~leaves | (travel > corner))
+        on_flank = ~states.on_corner & (~leaves | (travel > corner))
         if not leaves.any():
-            return cls(solution, travel, there, states, solution.up, solution.down)
-        (first, up), (_, down) = (solution.evaluate_travel(corner, way, flank=True) for way in (1.0, -1.0))
+            return cls(solution, travel, on_flank, states, solution.up, solution.down)
+        (first, up), (_, down) = (solution.evaluate_travel(corner, sign, flank=True) for sign in (1.0, -1.0))
         return cls(
             solution,
             _append_column(corner, travel),
-            _append_column(leaves, there),
+            _append_column(leaves, on_flank),
             TrackStates(*map(_append_column, first.fields(), states.fields())),
             _forces_behind(up, solution.up),
             _forces_behind(down, solution.down),
@@ -365,8 +369,8 @@ class FlankSamples(ShortRepr):
 
     def pressure(self, travel: FloatArray) -> FloatArray:
         """Return the pressure of the contact on the way up at travels [Pa]; NaN where there is none."""
-        states, found = self.solution.evaluate_travel(travel, 1.0, flank=True)
-        return flank_pressure(self.solution.assembly, states, found.contact)
+        states, contact_forces = self.solution.evaluate_travel(travel, 1.0, flank=True)
+        return flank_pressure(self.solution.assembly, states, contact_forces.contact)
 
     @cached_property
     def largest_pressure(self) -> tuple[FloatArray, FloatArray]:
@@ -393,7 +397,7 @@ def _split_inside_behind(first: Forces, rest: Forces) -> tuple[FloatArray, Float
 def _append_column(first: Any, rest: Any) -> Any:
     """Return (..., 1) and (..., n) as (..., n + 1)."""
     shape = np.broadcast_shapes(np.shape(first)[:-1], rest.shape[:-1])
-    return np.concatenate([np.broadcast_to(one, (*shape, one.shape[-1])) for one in (first, rest)], axis=-1)
+    return np.concatenate([np.broadcast_to(column, (*shape, column.shape[-1])) for column in (first, rest)], axis=-1)
 
 
 def _clip_intervals(jams: tuple[tuple[float, float], ...], end: float) -> tuple[tuple[float, float], ...]:

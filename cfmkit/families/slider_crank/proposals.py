@@ -110,19 +110,21 @@ def propose(request: Request, run: Run) -> FamilyOffer:
 def _of_force(request: Request) -> FamilyOffer:
     if request.adjustable is not None:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
-    tried = [one for lengths in PUSHED_PROPORTIONS for one in _offer_pushed(request, lengths)]
-    if found := [one for one in tried if isinstance(one, Candidate)]:
-        return FamilyOffer(tuple(_vary_by_turns(found)))
+    tried = [offer for lengths in PUSHED_PROPORTIONS for offer in _offer_pushed(request, lengths)]
+    if candidates := [offer for offer in tried if isinstance(offer, Candidate)]:
+        return FamilyOffer(tuple(_vary_by_turns(candidates)))
     reasons = []
     fits = [largest_printed(request.envelope, lengths) for lengths in PUSHED_PROPORTIONS]
-    wide = min((strip_width(request, block, one) for one in fits for block in _materials(request)), default=0.0)
+    wide = min(
+        (strip_width(request, block, proportions) for proportions in fits for block in _materials(request)), default=0.0
+    )
     if wide > MAX_WIDTH_RATIO * (request.depth or max(request.envelope)):
         reasons.append(f"a strip would have to be about {mm(wide)} wide")
     largest = max(fits)
     if not _can_be_cut(request, MAX_THICKNESS_RATIOS * largest):
         text = f"strips are made {mm(request.thinnest)} thick at least, too thick for a crank of {mm(largest)}"
         reasons.append(f"{text}, the longest that fits")
-    if most := max((one for one in tried if isinstance(one, float)), default=0.0):
+    if most := max((offer for offer in tried if isinstance(offer, float)), default=0.0):
         told = format_short(most, "force", 2)
         reasons.append(f"springs of steel wire that fit at the pins hold at most {told} over this travel")
     elif not reasons and (reason := explain_overfilled(request)) is not None:
@@ -190,18 +192,18 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
         request.envelope[1] / (lengths.stretched + 2 * EYE_SHARE),
     )
     pins = explain_overfilled(request) is None
-    found: list[Candidate | float] = []
+    offers: list[Candidate | float] = []
     for size in RELATIVE_SIZES:
         pair = size * pair_size(request, lengths)
         for crank, parts in ((size * printed, _single_parts), (pair, _pairs)):
             for start in _starts(request, REACH * lengths.reach * crank):
-                found += parts(request, lengths, crank, _window(request, start))
+                offers += parts(request, lengths, crank, _window(request, start))
         if size in RELATIVE_SIZES[:2]:
-            found += _slow_parts(request, lengths, size * printed)
+            offers += _slow_parts(request, lengths, size * printed)
         first, last = _window(request, START_SHARES[0])
         if last <= lengths.reach * size * pinned and pins:
-            found.append(pushed_linkage(request, lengths, size * pinned, first))
-    return found
+            offers.append(pushed_linkage(request, lengths, size * pinned, first))
+    return offers
 
 
 def _window(request: Request, start: float) -> tuple[float, float]:
@@ -248,13 +250,13 @@ def _can_be_cut(request: Request, thickest: float) -> bool:
 
 def pair_size(request: Request, lengths: Proportions) -> float:
     """Return the crank's length of the largest mirrored pair that fits the envelope [m]: two heights and a gap."""
-    one = (request.envelope[0] - PAIR_GAP[1]) / (2.0 + PAIR_GAP[0])
-    return largest_printed((one, request.envelope[1]), lengths) if one > 0.0 else 0.0
+    crank = (request.envelope[0] - PAIR_GAP[1]) / (2.0 + PAIR_GAP[0])
+    return largest_printed((crank, request.envelope[1]), lengths) if crank > 0.0 else 0.0
 
 
 def _pairs(request: Request, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
     """Return mirrored pairs of strips, each half as wide as one strip; the guide of the slider carries nothing."""
-    found = []
+    pairs = []
     for block in _materials(request):
         wide = 0.5 * strip_width(request, block, crank)
         if wide <= MAX_WIDTH_RATIO * (request.depth or max(request.envelope)) and _can_be_cut(
@@ -264,8 +266,8 @@ def _pairs(request: Request, lengths: Proportions, crank: float, travel: tuple[f
             spec = plain.spec.replace({"mechanism.copies": "mirrored"})
             variant = plain.variant.replace("strip", "pair of strips")
             doubtful = wide > PROBABLY_TOO_WIDE * (request.depth or math.inf)
-            found.append(replace(plain, variant=variant, spec=spec, doubtful=doubtful))
-    return found
+            pairs.append(replace(plain, variant=variant, spec=spec, doubtful=doubtful))
+    return pairs
 
 
 def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
@@ -278,20 +280,26 @@ def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
     strength = material.allowable(1.0)
     if strength is None:
         return math.inf
-    size, way = crank / 0.054, request.travel / 0.034
+    size, scale = crank / 0.054, request.travel / 0.034
     stiffer = material.modulus / 1.8e9
-    thicker = request.strength_used * strength / 42.5e6 / stiffer * size**2 / way
-    return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * way)
+    thicker = request.strength_used * strength / 42.5e6 / stiffer * size**2 / scale
+    return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * scale)
 
 
-def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
+def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
     """Return as many candidates as are offered, of different kinds by turns; what takes long to design comes last."""
-    kinds = list(dict.fromkeys(one.variant for one in found))
-    rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
+    kinds = list(dict.fromkeys(candidate.variant for candidate in candidates))
+    rows = [
+        sorted(
+            (candidate for candidate in candidates if candidate.variant == kind),
+            key=lambda candidate: candidate.promise,
+        )
+        for kind in kinds
+    ]
     longest = max(map(len, rows))
     by_turns = [row[k] for k in range(longest) for row in rows if k < len(row)]
     # cut before what takes long goes to the end, or none of that would be left
-    return sorted(by_turns[:MAX_PROPOSALS], key=lambda one: one.promise >= SLOW_PROMISE)
+    return sorted(by_turns[:MAX_PROPOSALS], key=lambda candidate: candidate.promise >= SLOW_PROMISE)
 
 
 def _materials(request: Request) -> list[dict[str, Any]]:
@@ -372,7 +380,7 @@ def _flexures(
     rate = request.target / 1.5 * scale
     long = FLEXURE_LENGTH_RATIO * crank
     thick = 0.09 * long
-    one = {"length": long, "thickness": thick, "width": 2.0 * thick}
+    flexure = {"length": long, "thickness": thick, "width": 2.0 * thick}
     # rates per rad grow with force times length; those of Bilancia et al. 2019 are for 1.5 N at 54 mm
     springs = {"pivot": 0.028303 * rate, "crank_pin": 0.035379 * rate, "slider_pin": 0.035379 * rate}
     data = {
@@ -381,7 +389,7 @@ def _flexures(
         "mechanism": {
             **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / request.strength_used,
             "springs": springs,
-            "flexures": {"pivot": one, "crank_pin": one, "slider_pin": one},
+            "flexures": {"pivot": flexure, "crank_pin": flexure, "slider_pin": flexure},
         },
         "design": {"force": request.target, "travel": (0.0, travel[1]), "flexures": {}},
         "analysis": pushed_analysis(travel),
@@ -429,12 +437,12 @@ def _scale_sections(spec: SliderCrankSpec, thinner: float, wider: float) -> dict
     strip = spec.mechanism.beam
     if strip is not None and spec.piece == "beam":
         thick = strip.thickness
-        many = tuple(thinner * one for one in thick) if isinstance(thick, tuple) else thinner * thick
+        many = tuple(thinner * thickness for thickness in thick) if isinstance(thick, tuple) else thinner * thick
         return {"mechanism.beam.thickness": many, "mechanism.beam.width": wider * strip.width}
     names = "pivot", "crank_pin", "slider_pin"
     sizes: dict[str, Any] = {name: getattr(spec.mechanism.flexures, name) for name in names}
-    thicknesses = {f"mechanism.flexures.{name}.thickness": thinner * one.thickness for name, one in sizes.items()}
-    return thicknesses | {f"mechanism.flexures.{name}.width": wider * one.width for name, one in sizes.items()}
+    thicknesses = {f"mechanism.flexures.{name}.thickness": thinner * size.thickness for name, size in sizes.items()}
+    return thicknesses | {f"mechanism.flexures.{name}.width": wider * size.width for name, size in sizes.items()}
 
 
 def part(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:

@@ -83,11 +83,11 @@ class LeavesAroundSprings:
         What a catalogue offers as a guide is left out if the springs do not need one.
         """
         springs, coil, buckles = self.springs, self.springs.coil, self.deflection > self.springs.unguided
-        known = springs.model_dump(exclude_unset=True)
+        fields = springs.model_dump(exclude_unset=True)
         if buckles and not springs.is_guided and coil is not None:
-            return type(springs).model_validate(known | {"guide_rod": guide_rod_for(coil)})
+            return type(springs).model_validate(fields | {"guide_rod": guide_rod_for(coil)})
         if self.listed and springs.is_guided and not buckles:
-            plain = {key: value for key, value in known.items() if key not in ("guide_rod", "guide_tube")}
+            plain = {key: value for key, value in fields.items() if key not in ("guide_rod", "guide_tube")}
             return type(springs).model_validate(plain)
         return springs
 
@@ -130,15 +130,18 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
             thickness_for(target)  # what the largest rise does not allow no spring does
         tried = [_design_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
         fitting = sorted(
-            (one for one in tried if isinstance(one, LeavesAroundSprings)), key=lambda one: one.rank(target)
+            (choice for choice in tried if isinstance(choice, LeavesAroundSprings)),
+            key=lambda choice: choice.rank(target),
         )
-        missed = [one for one in tried if isinstance(one, Miss)]
-        for number, one in enumerate(fitting[:MAX_TRIED_SPRINGS], 1):
-            found = _fit_width(spec, target, one) if target.refine else one
-            if isinstance(found, LeavesAroundSprings):
-                others = tuple(partial(_with_next, spec, target, other) for other in fitting[number:MAX_TRIED_SPRINGS])
-                return replace(_make_design(spec, target, found), next_best=others)
-            missed.append(found)
+        missed = [choice for choice in tried if isinstance(choice, Miss)]
+        for number, choice in enumerate(fitting[:MAX_TRIED_SPRINGS], 1):
+            sized = _fit_width(spec, target, choice) if target.refine else choice
+            if isinstance(sized, LeavesAroundSprings):
+                others = tuple(
+                    partial(_with_next, spec, target, following) for following in fitting[number:MAX_TRIED_SPRINGS]
+                )
+                return replace(_make_design(spec, target, sized), next_best=others)
+            missed.append(sized)
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
     none = "it lists no spring of the required kind ('mechanism.springs.kind')"
@@ -148,27 +151,27 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     )
 
 
-def _with_next(spec: VcfmSpec, target: VcfmDesign, one: LeavesAroundSprings) -> Design:
+def _with_next(spec: VcfmSpec, target: VcfmDesign, choice: LeavesAroundSprings) -> Design:
     """Return the design around springs that are not the best of the catalogue."""
     try:
-        found = _fit_width(spec, target, one) if target.refine else one
+        sized = _fit_width(spec, target, choice) if target.refine else choice
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
-    if isinstance(found, Miss):
-        return no_design(finding("no_spring_fits", nearest([found])))
-    return _make_design(spec, target, found)
+    if isinstance(sized, Miss):
+        return no_design(finding("no_spring_fits", nearest([sized])))
+    return _make_design(spec, target, sized)
 
 
 def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:
     """Yield springs in their numbers, with their places in the catalogue; without one those of the mechanism."""
     from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 
-    given = spec.mechanism.springs
+    stated = spec.mechanism.springs
     if not target.catalogue:
-        if given is not None:
-            yield given, None
+        if stated is not None:
+            yield stated, None
         return
-    kinds = (given.kind,) if given is not None else ("compression", "extension")
+    kinds = (stated.kind,) if stated is not None else ("compression", "extension")
     for offer in offers(target.catalogue, *kinds):
         for count in offer.counts:
             about = {
@@ -184,8 +187,8 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
                 "wound": wire_of(offer),
                 "life": offer.life,
             } | support_of(offer)
-            known = {key: value for key, value in about.items() if value is not None}
-            yield BoughtSprings.model_validate(known), offer
+            fields = {key: value for key, value in about.items() if value is not None}
+            yield BoughtSprings.model_validate(fields), offer
 
 
 def _design_around(
@@ -215,10 +218,10 @@ def _design_around(
     worst, reported = max(ratios)
     if worst > 1 + 1e-9:
         return Miss(label, worst - 1.0, reported)
-    own = target.model_copy(update={"force": left, "rise": rise, "preload": preload or None})
+    own_target = target.model_copy(update={"force": left, "rise": rise, "preload": preload or None})
     try:
-        thickness = thickness_for(own)
-        shortest = shortest_leaf(spec, own, thickness)
+        thickness = thickness_for(own_target)
+        shortest = shortest_leaf(spec, own_target, thickness)
     except Infeasible as problem:
         return Miss(label, 1.0, problem.finding.message)
     length = max(target.leaf_length or 0.0, shortest)
@@ -229,28 +232,28 @@ def _design_around(
     sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
     if sheet is not None:
         try:
-            count, leaf = leaf_of_sheet(spec, own, thickness, length, sheet)
+            count, leaf = leaf_of_sheet(spec, own_target, thickness, length, sheet)
         except Infeasible as problem:
             return Miss(label, 1.0, problem.finding.message)
     else:
-        leaf = _wide_enough(spec, own, thickness, length)
-    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count, offer is not None)
-    return _find_miss(spec, target, found, offer) or found
+        leaf = _wide_enough(spec, own_target, thickness, length)
+    leaves = LeavesAroundSprings(springs, own_target, leaf, onset_and_exit(leaf), count, offer is not None)
+    return _find_miss(spec, target, leaves, offer) or leaves
 
 
-def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: float) -> LeafStrip:
+def _wide_enough(spec: VcfmSpec, own_target: VcfmDesign, thickness: float, length: float) -> LeafStrip:
     """Return a leaf that does not buckle out of the plane: a longer one has to be wider. A stated length stays."""
-    leaf = sized_leaf(spec, own, thickness, length)
-    while leaf.width < MIN_WIDTH_RATIO * leaf.thickness and own.leaf_length is None:
+    leaf = sized_leaf(spec, own_target, thickness, length)
+    while leaf.width < MIN_WIDTH_RATIO * leaf.thickness and own_target.leaf_length is None:
         length *= 1.02
-        leaf = sized_leaf(spec, own, thickness, length)
+        leaf = sized_leaf(spec, own_target, thickness, length)
     return leaf
 
 
-def _find_miss(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
+def _find_miss(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
     """Return what springs miss with the leaves around them; None if they fit."""
-    springs, leaf = found.springs, found.leaf
-    most, held = found.deflection, found.held_springs
+    springs, leaf = leaves.springs, leaves.leaf
+    most, held = leaves.deflection, leaves.held_springs
     limits = (
         ("deflected by", most, springs.max_elongation, "they allow"),
         ("deflected by", most, room_of_coils(springs), "their turns touch at"),
@@ -267,38 +270,38 @@ def _find_miss(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, o
     for words, needed, limit, allowed in limits:
         if needed is not None and limit is not None and needed > limit * (1 + 1e-9):
             return Miss(
-                found.label, needed / limit - 1.0 if limit else 1.0, f"{words} {mm(needed)}, {allowed} {mm(limit)}"
+                leaves.label, needed / limit - 1.0 if limit else 1.0, f"{words} {mm(needed)}, {allowed} {mm(limit)}"
             )
     if leaf.angle > MAX_LEAF_ANGLE * (1 + 1e-9):
-        return Miss(found.label, float(leaf.angle) / MAX_LEAF_ANGLE - 1.0, "leaves steeper than 15 deg")
+        return Miss(leaves.label, float(leaf.angle) / MAX_LEAF_ANGLE - 1.0, "leaves steeper than 15 deg")
     if offer is not None and target.spring_life is not None:
         wanted = target.spring_life
-        short = [miss for one in _in_use(spec, found, offer) if (miss := one.misses_life(wanted)) is not None]
-        return Miss(found.label, *max(short)) if short else None
+        short = [miss for use in _in_use(spec, leaves, offer) if (miss := use.misses_life(wanted)) is not None]
+        return Miss(leaves.label, *max(short)) if short else None
     return None
 
 
-def _in_use(spec: VcfmSpec, found: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
+def _in_use(spec: VcfmSpec, leaves: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
     """Yield a spring between rest and the end of the travel at each preload, by the closed form of the leaves."""
     from cfmkit.families.vcfm.model import LawSampler, rest_of
 
-    springs, end = found.springs, max(float(found.linear[1]), spec.analysis.travel or 0.0)
-    sampler = LawSampler(LeafLaws(VBeam(found.leaf), coils(springs), found.half_beams))
+    springs, end = leaves.springs, max(float(leaves.linear[1]), spec.analysis.travel or 0.0)
+    sampler = LawSampler(LeafLaws(VBeam(leaves.leaf), coils(springs), leaves.half_beams))
     stated = "analysis" in spec.model_fields_set and "preloads" in spec.analysis.model_fields_set
-    for preload in {*(spec.analysis.preloads if stated else (0.0,)), found.target.preload_stroke}:
+    for preload in {*(spec.analysis.preloads if stated else (0.0,)), leaves.target.preload_stroke}:
         rest = rest_of(sampler, preload, np.linspace(0.0, end, 101)) or 0.0
         least, most = (springs.load(place + preload) for place in (rest, end))
         yield SpringInUse(offer.wound, least, most, offer.fatigue, offer.life)
 
 
-def _write_design(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
+def _write_design(spec: VcfmSpec, leaves: LeavesAroundSprings) -> VcfmSpec:
     """Return the spec with springs and leaves written into its mechanism."""
-    leaf = found.leaf
+    leaf = leaves.leaf
     return spec.replace(
         {
             "mechanism.positive": None,
-            "mechanism.springs": found.held_springs.model_dump(exclude_unset=True),
-            "mechanism.bistable.half_beams": found.half_beams,
+            "mechanism.springs": leaves.held_springs.model_dump(exclude_unset=True),
+            "mechanism.bistable.half_beams": leaves.half_beams,
             "mechanism.bistable.length": float(leaf.length),
             "mechanism.bistable.angle": float(leaf.angle),
             "mechanism.bistable.thickness": float(leaf.thickness),
@@ -311,7 +314,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -
     """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
     from cfmkit.families.vcfm.exact_model import ExactSampler, farthest_back
 
-    allowable, own = spec.mechanism.allowable_stress or 0.0, found.target
+    allowable, own_target = spec.mechanism.allowable_stress or 0.0, found.target
     first, last = found.linear
     middle, half = 0.5 * (first + last), 0.5 * FITTED_REGION_SHARE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
@@ -319,19 +322,19 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -
     for _ in range(N_RESCALES if sheet is None else MAX_PASSES):
         made = _write_design(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
         # leaves are followed as far as the spring can push them, not through all of a long preload
-        back = min(own.preload_stroke, RETURN_TRAVEL_RATIO * farthest_back(made, (own.preload_stroke,)))
+        back = min(own_target.preload_stroke, RETURN_TRAVEL_RATIO * farthest_back(made, (own_target.preload_stroke,)))
         sampler = ExactSampler(made, last, back)
         if sampler.problem:
             return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
         leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
         wide = float(leaves @ (target.level - spring) / (leaves @ leaves))
         fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
-        ends = np.linspace(-_rest(sampler, wide, own.preload_stroke), last, 201)
+        ends = np.linspace(-_rest(sampler, wide, own_target.preload_stroke), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable
         if sheet is not None:
             if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= FORCE_RTOL:
                 return _find_miss(spec, target, found, None) or found
-            count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own.height)
+            count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own_target.height)
             found = replace(found, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
             continue
         if worst <= 1.0 + 1e-4:
@@ -339,7 +342,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -
         if target.leaf_length is not None:
             break
         # stress falls with the square of a length
-        longer = sized_leaf(spec, own, found.leaf.thickness, float(found.leaf.length) * sqrt(1.0005 * worst))
+        longer = sized_leaf(spec, own_target, found.leaf.thickness, float(found.leaf.length) * sqrt(1.0005 * worst))
         found = replace(found, leaf=longer, linear=onset_and_exit(longer))
     return Miss(
         found.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"
@@ -357,19 +360,25 @@ def _rest(sampler: ExactSampler, wide: float, preload: float) -> float:
     return float(back[pushed[0]]) if len(pushed) else preload
 
 
-def _make_design(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Design:
+def _make_design(spec: VcfmSpec, target: VcfmDesign, leaves: LeavesAroundSprings) -> Design:
     """Return the design with an analysis that shows what was requested."""
-    own = found.target
-    note = f"{found.label}: the rise of the leaves follows from their rate, {mm(own.height)}"
-    if own.preload_stroke:
-        note += f", the preload for the adjustment is {mm(own.preload_stroke)}"
-        stated = max((abs(one) for one in spec.analysis.preloads), default=0.0)
-        if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > PRELOAD_RTOL * own.preload_stroke:
+    own_target = leaves.target
+    note = f"{leaves.label}: the rise of the leaves follows from their rate, {mm(own_target.height)}"
+    if own_target.preload_stroke:
+        note += f", the preload for the adjustment is {mm(own_target.preload_stroke)}"
+        stated = max((abs(preload) for preload in spec.analysis.preloads), default=0.0)
+        if (
+            "analysis" in spec.model_fields_set
+            and abs(stated - own_target.preload_stroke) > PRELOAD_RTOL * own_target.preload_stroke
+        ):
             note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
-    if (words := guide_words(found.held_springs)) and found.deflection > found.springs.unguided:
-        note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(found.springs.unguided)}"
+    if (words := guide_words(leaves.held_springs)) and leaves.deflection > leaves.springs.unguided:
+        note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(leaves.springs.unguided)}"
     made = complete_analysis(
-        _write_design(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
+        _write_design(spec, leaves),
+        own_target.model_copy(update={"force": target.force}),
+        leaves.linear,
+        leaves.leaf.angle,
     )
     active = ("design.catalogue",) if target.catalogue else ("mechanism.springs",)
     return Design(made, Status.COMPLETE, note, active_bounds=active)

@@ -114,8 +114,8 @@ class PartNumbers:
         design = self.variant(x, np.zeros(errors.shape[1]))
         middle = np.array([float(design.get_value(path)) for path in self.parts.paths])
         values = dict(zip(self.parts.paths, (middle + errors).T, strict=True))
-        found = numbers_of_parts(design, values, self.rows, self.run, stated_places(self.parts.spec))
-        return np.array([one is not None and (self.rows.limits(one) >= 0).all() for one in found], dtype=bool)
+        numbers = numbers_of_parts(design, values, self.rows, self.run, stated_places(self.parts.spec))
+        return np.array([row is not None and (self.rows.limits(row) >= 0).all() for row in numbers], dtype=bool)
 
     def slopes(self, x: FloatArray, errors: FloatArray) -> PartSlopes | None:
         """Return the exact derivatives of the numbers of a part, as far as its family knows them; None of none."""
@@ -123,11 +123,11 @@ class PartNumbers:
             return None
         paths = self.parts.paths
         try:
-            found = exact_derivatives(self.variant(x, errors), self.rows.places, tuple({*self.free, *paths}))
+            derivatives = exact_derivatives(self.variant(x, errors), self.rows.places, tuple({*self.free, *paths}))
         except CfmError:
             return None
         unknown = np.full(len(self.rows.matrix.T), np.nan)
-        by = {path: numbers_in(one) for path, one in found.items()}
+        by = {path: numbers_in(derivative) for path, derivative in derivatives.items()}
         by_x, by_error = (np.array([by.get(path, unknown) for path in names]).T for names in (self.free, paths))
         return PartSlopes(by_x, by_error) if by else None
 
@@ -145,7 +145,7 @@ class PartNumbers:
         stated, x = stated_places(self.parts.spec), self.start
         if not stated:
             return 0
-        return sum(self._follows(x, one, ()) and not self._follows(x, one, stated) for one in self._fresh_errors)
+        return sum(self._follows(x, error, ()) and not self._follows(x, error, stated) for error in self._fresh_errors)
 
     def _follows(self, x: FloatArray, errors: FloatArray, reached: tuple[float, ...]) -> bool:
         try:
@@ -175,16 +175,16 @@ class PartNumbers:
             self.slopes,
         )
 
-    def build_spec(self, found: RobustResult, problem: RobustProblem) -> Spec:
+    def build_spec(self, design: RobustResult, problem: RobustProblem) -> Spec:
         """Return the design with its values moved, as few digits of them as matter."""
         steps = 10.0**-VALUE_DECIMALS * problem.reach
-        x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
+        x = np.clip(np.round(design.x / steps) * steps, *problem.bounds.T)
         return self.variant(np.array([float(f"{value:.9g}") for value in x]), problem.perfect)
 
-    def costliest(self, found: RobustResult, problem: RobustProblem) -> str:
+    def costliest(self, design: RobustResult, problem: RobustProblem) -> str:
         """Return the value whose tolerance costs most; several that err as one are joined by commas."""
         groups = self.parts.joined
-        return ", ".join(self.parts.paths[k] for k in groups[costliest(found, problem, groups)])
+        return ", ".join(self.parts.paths[k] for k in groups[costliest(design, problem, groups)])
 
 
 def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
@@ -198,22 +198,22 @@ def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
     block = getattr(given, "design", None)
     stated = getattr(block, "free", None)
     if stated:
-        found, faults = {}, []
+        ranges, faults = {}, []
         for path, ends in stated.items():
             try:
-                found[path] = _range_of(designed, path, ends)
+                ranges[path] = _range_of(designed, path, ends)
             except CannotVary as problem:
                 faults.append(Fault("", 0, 0, f"design.free.{path}", str(problem)))
         if faults:
             raise SpecError(faults)
-        return found
+        return ranges
     record = family(designed.family)
     return dict(function_named(record.free)(given, designed)) if record.free is not None else {}
 
 
 def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, float]:
-    one = leaf(type(spec), path)
-    low, high = (float(one.read(_plain(one.kind, end))[0]) for end in ends)
+    key = leaf(type(spec), path)
+    low, high = (float(key.read(_plain(key.kind, end))[0]) for end in ends)
     if not low < high:
         raise CannotVary(f"[{ends[0]}, {ends[1]}] is not a range: the first must be smaller than the second")
     try:
@@ -231,14 +231,14 @@ def _plain(kind: str, text: str) -> Any:
     return read_number(text) if kind == "number" else text
 
 
-def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
+def with_design_margins(stated: Spec, design: Design, run: Run) -> Design:
     """Return a design whose made parts are good as often as `design.yield` asks, moved from one that was found.
 
     Where none is, the next springs of a catalogue are tried.
 
     Parameters
     ----------
-    given : Spec
+    stated : Spec
         With `design.tolerances` and `design.yield`.
     design : Design
         What the family made of it; returned as it is where nothing may move or nothing is asked.
@@ -246,37 +246,37 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
         Seed, progress, time budget.
     """
     others, clock = design.next_best[:OTHER_SPRINGS], Clock.from_budgets(run.time_budget)
-    good, found = _move_design(given, design, run, clock, not others)
-    if not others or design.spec is None or found.spec is not None:
-        return found
+    good, moved = _move_design(stated, design, run, clock, not others)
+    if not others or design.spec is None or moved.spec is not None:
+        return moved
     tried = [(good, design)]
     for make in others:
         if clock.late():
             break
-        other = make()
-        if other.spec is None:
+        alternative = make()
+        if alternative.spec is None:
             continue
-        good, found = _move_design(given, other, run, clock, False)
-        if found.spec is not None and good:  # without a part that was solved nothing is known of its yield
+        good, moved = _move_design(stated, alternative, run, clock, False)
+        if moved.spec is not None and good:  # without a part that was solved nothing is known of its yield
             reported = f"{len(tried)} with a smaller deviation miss the yield that is requested"
-            return replace(found, notes=(*found.notes, ("springs", f"other springs of the catalogue: {reported}")))
-        tried.append((good, other))
-    _, found = _move_design(given, max(tried, key=lambda one: one[0])[1], run, clock, True)
+            return replace(moved, notes=(*moved.notes, ("springs", f"other springs of the catalogue: {reported}")))
+        tried.append((good, alternative))
+    _, moved = _move_design(stated, max(tried, key=lambda pair: pair[0])[1], run, clock, True)
     reported = f"the best {len(tried)} choices of the catalogue's springs were tried"
-    return replace(found, message=f"{found.message}; {reported}") if len(tried) > 1 else found
+    return replace(moved, message=f"{moved.message}; {reported}") if len(tried) > 1 else moved
 
 
-def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -> tuple[int, Design]:
+def _move_design(stated: Spec, design: Design, run: Run, clock: Clock, largest: bool) -> tuple[int, Design]:
     """Return how many of `N_CHECKED_PARTS` parts are good, where some were solved, and the design moved for its yield.
 
     `largest`: whether the largest yield is looked for where the requested one is not found.
     """
-    block = getattr(given, "design", None)
+    block = getattr(stated, "design", None)
     wanted = getattr(block, "yield", None)
     if design.spec is None or block is None or wanted is None:
         return 0, design
-    free = free_of(given, design.spec)
-    nominal = family(given.family).analyze(design.spec, run)
+    free = free_of(stated, design.spec)
+    nominal = family(stated.family).analyze(design.spec, run)
     parts = Parts.of_design(design.spec, block, run.seed)
     if parts is None:
         return 0, replace(design, notes=(*design.notes, ("margins", f"none: {NO_TOLERANCE}")))
@@ -288,16 +288,16 @@ def _move_design(given: Spec, design: Design, run: Run, clock: Clock, largest: b
     numbers = PartNumbers(parts, tuple(free), rows, run)
     problem = numbers.problem(free, wanted, clock)
     try:
-        found, good = _with_margins(problem, numbers, numbers.start, largest)
+        moved, good = _with_margins(problem, numbers, numbers.start, largest)
         if block.robust is not None and free:
-            again = optimise_on_samples(problem, found, N_DRAWN_PARTS, block.robust == "worst")
+            again = optimise_on_samples(problem, moved, N_DRAWN_PARTS, block.robust == "worst")
             better = numbers.count_good_parts(again.x)
-            found, good = (again, better) if better >= good else (found, good)
+            moved, good = (again, better) if better >= good else (moved, good)
     except NoPart:
         return 0, replace(
             design, notes=(*design.notes, ("margins", "a neighbour of the design has no curve: no margins"))
         )
-    return good, _finish_design(design, numbers, found, good, problem)
+    return good, _finish_design(design, numbers, moved, good, problem)
 
 
 def _with_margins(
@@ -307,15 +307,15 @@ def _with_margins(
     best: tuple[RobustResult, int] | None = None
     asked, x, began = problem.share, start, None
     for _ in range(MAX_CHECK_ROUNDS):
-        found = with_margins(replace(problem, share=asked), x)
-        began = found.began if began is None else began
-        good = numbers.count_good_parts(found.x)
+        moved = with_margins(replace(problem, share=asked), x)
+        began = moved.began if began is None else began
+        good = numbers.count_good_parts(moved.x)
         if best is None or good > best[1]:
-            best = replace(found, began=began), good
+            best = replace(moved, began=began), good
         short = problem.share - good / N_CHECKED_PARTS
-        if short <= 0 or not found.reached or asked >= MOST_ASKED or problem.late():
+        if short <= 0 or not moved.reached or asked >= MOST_ASKED or problem.late():
             break
-        asked, x = min(MOST_ASKED, max(found.share, asked) + 0.5 * short), found.x
+        asked, x = min(MOST_ASKED, max(moved.share, asked) + 0.5 * short), moved.x
     assert best is not None
     return _largest(problem, numbers, start, best) if largest and _misses(best[1], problem) else best
 
@@ -338,10 +338,10 @@ def _largest(
         asked = 0.5 * (low + high)
         if problem.late():
             break
-        found = with_margins(replace(problem, share=asked), start)
-        good = numbers.count_good_parts(found.x)
+        moved = with_margins(replace(problem, share=asked), start)
+        good = numbers.count_good_parts(moved.x)
         if good > best[1]:
-            best = replace(found, reached=False), good
+            best = replace(moved, reached=False), good
         low, high = (
             (max(asked, best[1] / N_CHECKED_PARTS), high)
             if good >= N_CHECKED_PARTS * asked
@@ -352,21 +352,21 @@ def _largest(
     return best
 
 
-def _finish_design(design: Design, part: PartNumbers, found: RobustResult, good: int, problem: RobustProblem) -> Design:
+def _finish_design(design: Design, part: PartNumbers, moved: RobustResult, good: int, problem: RobustProblem) -> Design:
     """Return the design with its values moved, or why there is none, and what the search says of it."""
-    x, spec, worst = found.x, part.build_spec(found, problem), part.costliest(found, problem)
+    x, spec, worst = moved.x, part.build_spec(moved, problem), part.costliest(moved, problem)
     if _misses(good, problem):
         return _impossible(design, part, good, worst, problem)
     solved = f"{good} of {N_CHECKED_PARTS} solved parts meet them; largest contributor: {worst}"
     reported = (
-        f"{len(x)} values moved in {found.steps} steps: yield about {100 * found.began:.3g} % before, "
-        f"{100 * found.share:.3g} % now (linear estimate); {solved}"
+        f"{len(x)} values moved in {moved.steps} steps: yield about {100 * moved.began:.3g} % before, "
+        f"{100 * moved.share:.3g} % now (linear estimate); {solved}"
         if len(x)
         else f"{NOTHING_FREE}; {solved}"
     )
     numbers: dict[str, tuple[float | None, str, str]] = {
-        "margins_steps": (float(found.steps), "count", "steps towards the requested yield"),
-        "margins_first_order": (found.share, "ratio", "yield, linear estimate"),
+        "margins_steps": (float(moved.steps), "count", "steps towards the requested yield"),
+        "margins_first_order": (moved.share, "ratio", "yield, linear estimate"),
         "margins_solved": (
             good / N_CHECKED_PARTS,
             "ratio",

@@ -85,42 +85,42 @@ class _RowsOfMargins:
         slack = 1e-9 * (self.places[-1] - self.places[0])
         return np.flatnonzero((self.places >= low - slack) & (self.places <= high + slack))
 
-    def add(self, one: Requirement, number: int) -> None:
+    def add(self, requirement: Requirement, number: int) -> None:
         """Add the rows of a requirement."""
-        name, branch = split_name(one.metric)
+        name, branch = split_name(requirement.metric)
         if name in ENVELOPE_METRICS:  # tolerances move the box by next to nothing, and it takes a drawing of each part
             return
-        (metric,) = metrics_of(self.nominal.spec, [one.metric], self.nominal.curve)
-        limits = Bounds.from_requirement(one, metric.dimension)
+        (metric,) = metrics_of(self.nominal.spec, [requirement.metric], self.nominal.curve)
+        limits = Bounds.from_requirement(requirement, metric.dimension)
         plain = name.replace("torque_", "force_", 1)
-        if plain in _OF_STRESS and self.stresses and self._stress(plain, limits, one.over, number):
+        if plain in _OF_STRESS and self.stresses and self._stress(plain, limits, requirement.over, number):
             return
         if plain in _OF_EFFORT:
-            found = [
+            rows_by_branch = [
                 rows
-                for k, each in enumerate(self.branches)
-                if branch in (None, each)
-                for rows in [self._effort(plain, limits, one.over, k)]
+                for k, name in enumerate(self.branches)
+                if branch in (None, name)
+                for rows in [self._effort(plain, limits, requirement.over, k)]
             ]
-            if found and all(rows is not None for rows in found):
-                added = [(row, constant, number) for rows in found for row, constant in rows or ()]
-                if not self._contradicts_analysis(added, one):
+            if rows_by_branch and all(rows is not None for rows in rows_by_branch):
+                added = [(row, constant, number) for rows in rows_by_branch for row, constant in rows or ()]
+                if not self._contradicts_analysis(added, requirement):
                     self.rows += added
                     return
         column = self._numbers + len(self.metrics)
-        self.metrics.append(replace(metric, over=one.over, label=str(number)))
+        self.metrics.append(replace(metric, over=requirement.over, label=str(number)))
         if limits.min is not None:
             self.rows.append(({column: 1.0}, -limits.min, number))
         if limits.max is not None:
             self.rows.append(({column: -1.0}, limits.max, number))
 
-    def _contradicts_analysis(self, rows: list[tuple[dict[int, float], float, int]], one: Requirement) -> bool:
+    def _contradicts_analysis(self, rows: list[tuple[dict[int, float], float, int]], requirement: Requirement) -> bool:
         """Return True if rows say that a requirement is missed which the analysis finds met: its points are too few."""
         values = np.concatenate([*self.first.effort.values(), *self.first.stress])
         for row, constant, _ in rows:
             terms = [constant, *(weight * values[column] for column, weight in row.items())]
             if sum(terms) < -CONTRADICTION_SHARE * sum(map(abs, terms)):
-                return all(outcome.ok for outcome in check((one,), self.nominal))
+                return all(outcome.ok for outcome in check((requirement,), self.nominal))
         return False
 
     @property
@@ -177,10 +177,10 @@ class _View:
         if len(self.places) == 1:
             return np.ones(1)
         widths = np.diff(self.places)
-        found = np.zeros(len(self.places))
-        found[:-1] += 0.5 * widths
-        found[1:] += 0.5 * widths
-        return np.asarray(found / widths.sum())
+        weights = np.zeros(len(self.places))
+        weights[:-1] += 0.5 * widths
+        weights[1:] += 0.5 * widths
+        return np.asarray(weights / widths.sum())
 
 
 _Lines = list[tuple[dict[int, float], float]]
@@ -203,7 +203,7 @@ def _from_target(view: _View, limits: Bounds) -> _Lines | None:
     if limits.max is None or limits.min or not view.target:
         return None
     reach, target = limits.max * abs(view.target), view.target
-    return [({i: -way}, reach + way * target) for i in view.columns for way in (1.0, -1.0)]
+    return [({i: -sign}, reach + sign * target) for i in view.columns for sign in (1.0, -1.0)]
 
 
 def _from_mean(view: _View, limits: Bounds) -> _Lines | None:
@@ -211,11 +211,11 @@ def _from_mean(view: _View, limits: Bounds) -> _Lines | None:
         return None
     lines: _Lines = []
     for i in view.columns:
-        for way in (1.0, -1.0):
+        for sign in (1.0, -1.0):
             row = {
-                j: view.sign * float(w) * (limits.max + way) for j, w in zip(view.columns, view.weights, strict=True)
+                j: view.sign * float(w) * (limits.max + sign) for j, w in zip(view.columns, view.weights, strict=True)
             }
-            row[i] -= way * view.sign
+            row[i] -= sign * view.sign
             lines.append((row, 0.0))
     return lines
 
@@ -251,9 +251,9 @@ _OF_STRESS = ("stress_max", "safety_factor")
 
 
 def _window(nominal: Result, over: Any) -> tuple[float, float]:
-    found = window_of(nominal, over)
+    window = window_of(nominal, over)
     motion = nominal.curve.motion
-    return (found.lo, found.hi) if found else (float(motion.min()), float(motion.max()))
+    return (window.lo, window.hi) if window else (float(motion.min()), float(motion.max()))
 
 
 def stated_places(spec: Spec) -> tuple[float, ...]:
@@ -262,14 +262,14 @@ def stated_places(spec: Spec) -> tuple[float, ...]:
     Shares of the travel, and windows that are not stated, are those of each part.
     """
     usual = getattr(getattr(spec, "analysis", None), "window", None)
-    windows = [one.over or usual for one in spec.part_requirements]
+    windows = [requirement.over or usual for requirement in spec.part_requirements]
     return tuple(float(end) for window in windows if window for end in window if not isinstance(end, TravelShare))
 
 
 def places_of(nominal: Result) -> FloatArray:
     """Return the poses at which a part is looked at: those of the windows of all requirements."""
     wanted: list[FloatArray] = []
-    spans = [_window(nominal, one.over) for one in nominal.spec.part_requirements]
+    spans = [_window(nominal, requirement.over) for requirement in nominal.spec.part_requirements]
     whole = max(high for _, high in spans) - min(low for low, _ in spans)
     for low, high in dict.fromkeys(spans):
         share = 0.5 * (
@@ -278,8 +278,8 @@ def places_of(nominal: Result) -> FloatArray:
         wanted.append(low + (high - low) * share)
         wanted[-1][-1] = high
     places = np.unique(np.concatenate(wanted))
-    near = np.append(True, np.diff(places) > 1e-9 * max(whole, 1e-12))
-    return np.asarray(places[near])
+    is_apart = np.append(True, np.diff(places) > 1e-9 * max(whole, 1e-12))
+    return np.asarray(places[is_apart])
 
 
 def requirement_rows(nominal: Result, spec: Spec, run: Run) -> RequirementRows | None:
@@ -292,8 +292,8 @@ def requirement_rows(nominal: Result, spec: Spec, run: Run) -> RequirementRows |
 def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementRows:
     """Return the requirements on a result as rows of what is seen of its parts."""
     builder = _RowsOfMargins(nominal, places, first)
-    for number, one in enumerate(nominal.spec.part_requirements):
-        builder.add(one, number)
+    for number, requirement in enumerate(nominal.spec.part_requirements):
+        builder.add(requirement, number)
     return builder.rows_of()
 
 
@@ -302,9 +302,9 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, .
 
     Where its curve ends a little earlier they are those at its end; None if it does not get to what must be reached.
     """
-    found = quickly_sampled(spec, places)
-    if found is not None:
-        return found
+    sampled = quickly_sampled(spec, places)
+    if sampled is not None:
+        return sampled
     return sampled_on_curves(family(spec.family).analyze(spec, run), places, reached)
 
 
@@ -345,16 +345,16 @@ def numbers_in(seen: Sampled) -> FloatArray:
 
 def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()) -> FloatArray | None:
     """Return what rows look at of a part, (q,); None if it has no such numbers; `reached`: see `sampled_of`."""
-    found, result = quickly_sampled(spec, rows.places), None
-    if found is None:
+    sampled, result = quickly_sampled(spec, rows.places), None
+    if sampled is None:
         result = _looked_at(spec, rows, run)
-        found = sampled_on_curves(result, rows.places, reached)
-    if not _has_columns(found, rows):
+        sampled = sampled_on_curves(result, rows.places, reached)
+    if not _has_columns(sampled, rows):
         return None
     if not rows.metrics:
-        return numbers_in(found)
+        return numbers_in(sampled)
     metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
-    return None if metrics is None else np.concatenate([numbers_in(found), metrics])
+    return None if metrics is None else np.concatenate([numbers_in(sampled), metrics])
 
 
 def numbers_of_parts(
@@ -371,7 +371,7 @@ def numbers_of_parts(
         return spec.replace({path: column[k].item() for path, column in columns.items()}, as_made=True)
 
     parts = Variants(spec.model_copy(update={"requirements": ()}), columns, part, count)
-    found = _numbers_in_rows(parts, rows, reached)
+    numbers_by_part = _numbers_in_rows(parts, rows, reached)
 
     def alone(k: int) -> FloatArray | None:
         try:
@@ -379,45 +379,47 @@ def numbers_of_parts(
         except CfmError:
             return None
 
-    return [found[k] if k in found else alone(k) for k in range(count)]
+    return [numbers_by_part[k] if k in numbers_by_part else alone(k) for k in range(count)]
 
 
 def _numbers_in_rows(
     parts: Variants, rows: RequirementRows, reached: tuple[float, ...]
 ) -> dict[int, FloatArray | None]:
     """Return the numbers of those parts that are solved together and have complete curves."""
-    found: dict[int, FloatArray | None] = {}
+    numbers_by_part: dict[int, FloatArray | None] = {}
     solve = family(parts.spec.family).rows
     if solve is None or not len(parts):
-        return found
+        return numbers_by_part
     study = Study(parts.spec, tuple(parts.values), rows.metrics, findings=False)
     try:
         for members, solved in solve(parts):
-            known = SolvedVariants(study, parts, members, solved)
-            if tuple(solved.branches) != rows.branches or not known.known:
+            variants = SolvedVariants(study, parts, members, solved)
+            if tuple(solved.branches) != rows.branches or not variants.known:
                 continue
-            numbers = _looked_up(solved.branches, rows, known)
+            numbers = _looked_up(solved.branches, rows, variants)
             if numbers is not None:
-                good = known.usable & np.isfinite(numbers).all(axis=1)
-                there = _get_to(solved.branches, rows, reached)
-                found |= {int(members[row]): numbers[row] if there[row] else None for row in np.flatnonzero(good)}
+                good = variants.usable & np.isfinite(numbers).all(axis=1)
+                is_reached = _get_to(solved.branches, rows, reached)
+                numbers_by_part |= {
+                    int(members[row]): numbers[row] if is_reached[row] else None for row in np.flatnonzero(good)
+                }
     except CfmError:  # each part says by itself what is wrong with it
         return {}
-    return found
+    return numbers_by_part
 
 
 def _get_to(branches: Mapping[str, CurveRows], rows: RequirementRows, reached: tuple[float, ...]) -> NDArray[np.bool_]:
     """Return which rows of a solution get to all places that must be reached, on every branch."""
     slack = 1e-9 * float(rows.places[-1] - rows.places[0])
     ends = [curves.extent for curves in branches.values()]
-    there = np.ones(len(ends[0][0]), dtype=bool)
+    is_reached = np.ones(len(ends[0][0]), dtype=bool)
     for low, high in ends:
         for place in reached:
-            there &= (low - slack <= place) & (place <= high + slack)
-    return there
+            is_reached &= (low - slack <= place) & (place <= high + slack)
+    return is_reached
 
 
-def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, known: SolvedVariants) -> FloatArray | None:
+def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, variants: SolvedVariants) -> FloatArray | None:
     """Return the numbers of each row of a solution, (m, q); None if it has other stresses than the rows look at."""
     columns, stresses = [], []
     for curves in branches.values():
@@ -430,11 +432,11 @@ def _looked_up(branches: Mapping[str, CurveRows], rows: RequirementRows, known: 
                 return None
             # between the points of its curve, as of a part alone
             points = curves.stress.samples[0]
-            each = zip(points.motion, points.values, points.count.tolist(), strict=True)
-            stresses.append([np.interp(rows.places, motion[:n], values[:n]) for motion, values, n in each])
+            points_by_row = zip(points.motion, points.values, points.count.tolist(), strict=True)
+            stresses.append([np.interp(rows.places, motion[:n], values[:n]) for motion, values, n in points_by_row])
     if len(stresses) != rows.stresses:
         return None
-    return np.hstack([*columns, *map(np.array, stresses), known.rows().values])
+    return np.hstack([*columns, *map(np.array, stresses), variants.rows().values])
 
 
 def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:
@@ -442,31 +444,31 @@ def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRow
 
     `quick`: what `quickly_sampled` says of it at the places of the rows; None of a family without a quick way.
     """
-    found = sampled_on_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
-    if not _has_columns(found, rows):
+    sampled = sampled_on_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
+    if not _has_columns(sampled, rows):
         return None
-    return np.concatenate([numbers_in(found), metrics_in(result, rows)]) if rows.metrics else numbers_in(found)
+    return np.concatenate([numbers_in(sampled), metrics_in(result, rows)]) if rows.metrics else numbers_in(sampled)
 
 
 def exact_derivatives(spec: Spec, places: FloatArray, paths: Sequence[str]) -> dict[str, Sampled]:
     """Return the derivatives of effort and stress at places, by those values of a design by which they are known."""
     name = family(spec.family).sampled_slopes
     try:
-        found = None if name is None else function_named(name)(spec, places, tuple(paths))
+        derivatives = None if name is None else function_named(name)(spec, places, tuple(paths))
     except CfmError:
         return {}
-    return {} if found is None else dict(found.by)
+    return {} if derivatives is None else dict(derivatives.by)
 
 
-def _has_columns(found: Sampled | None, rows: RequirementRows) -> TypeGuard[Sampled]:
+def _has_columns(sampled: Sampled | None, rows: RequirementRows) -> TypeGuard[Sampled]:
     """Return whether a part was seen, with the branches and stresses that rows look at."""
-    return found is not None and tuple(found.effort) == rows.branches and len(found.stress) == rows.stresses
+    return sampled is not None and tuple(sampled.effort) == rows.branches and len(sampled.stress) == rows.stresses
 
 
 def _looked_at(spec: Spec, rows: RequirementRows, run: Run) -> Result:
     """Return the analysis of a part, with the sizes of its box if rows look at them."""
     record = family(spec.family)
-    return record.with_envelope(record.analyze(spec, run), [one.name for one in rows.metrics])
+    return record.with_envelope(record.analyze(spec, run), [metric.name for metric in rows.metrics])
 
 
 def metrics_of_part(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
@@ -478,4 +480,4 @@ def metrics_of_part(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray |
 def metrics_in(result: Result, rows: RequirementRows) -> FloatArray:
     """Return those metrics of a result that are numbers of their own in rows; nan where one has no value."""
     values = Study(result.spec, (), rows.metrics).quantities(result)
-    return np.array([np.nan if one.value is None else one.value for one in values])
+    return np.array([np.nan if metric_value.value is None else metric_value.value for metric_value in values])

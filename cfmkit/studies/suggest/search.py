@@ -146,7 +146,7 @@ def suggest(
     """
     times, bugs = _Times.from_budget(run.time_budget, reserve), list[str]()
     answers, unasked = _answers(request, run, times.asking, bugs)
-    queues = {one.family: list(one.offer.candidates) for one in answers}
+    queues = {answer.family: list(answer.offer.candidates) for answer in answers}
     making = _Making(run, times, sum(map(len, queues.values())), bugs)
     turn, cut, enough = 0, unasked, ENOUGH_PROPOSALS if request.good_parts is None else ENOUGH_WITH_PARTS
     while not making.late() and (
@@ -159,20 +159,20 @@ def suggest(
             cut = True
             break
     done = making.done
-    counts = {name: sum(one.family == name for one in done) for name in queues}
-    if not cut and not any(one.passes for one in done):
+    counts = {name: sum(proposal.family == name for proposal in done) for name in queues}
+    if not cut and not any(proposal.passes for proposal in done):
         answers = _with_nearest(answers, request, run, times.without, bugs)
-    passing = distinct([one for one in done if one.passes])
+    passing = distinct([proposal for proposal in done if proposal.passes])
     return Suggestions(
         request,
-        tuple(order_proposals([one for one in passing if one.good], prefer)),
+        tuple(order_proposals([proposal for proposal in passing if proposal.good], prefer)),
         tuple(_near(done, request)),
-        tuple(replace(one, made=counts[one.family]) for one in answers),
+        tuple(replace(proposal, made=counts[proposal.family]) for proposal in answers),
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
         making.reused,
         tuple(bugs),
-        tuple(order_proposals([one for one in passing if not one.good], prefer)),
+        tuple(order_proposals([proposal for proposal in passing if not proposal.good], prefer)),
     )
 
 
@@ -212,8 +212,8 @@ class _Making:
 
     def late(self) -> bool:
         """Return True if the time is up, of which there is more as long as nothing is found."""
-        found = any(one.good for one in (*self.done, *self._known.values()))
-        end = self._times.with_proposals if found else self._times.without
+        has_proposal = any(proposal.good for proposal in (*self.done, *self._known.values()))
+        end = self._times.with_proposals if has_proposal else self._times.without
         return end is not None and time.time() > end
 
     def all_of(self, jobs: Sequence[ProposalJob]) -> bool:
@@ -221,7 +221,7 @@ class _Making:
         run, notes = self._run, self._run.notes
         keys = [_key(job) for job in jobs]
         records = {index: notes.find(key) for index, key in enumerate(keys)}
-        self._known = {index: Proposal.of_record(one) for index, one in records.items() if one is not None}
+        self._known = {index: Proposal.of_record(record) for index, record in records.items() if record is not None}
         self.reused += len(self._known)
         left = [index for index in range(len(jobs)) if index not in self._known]
         work = partial(_made_of, tuple(jobs))
@@ -235,7 +235,7 @@ class _Making:
                     notes.add(keys[index], proposal.as_record())
             self._tried += jobs[index].near is None
             made = (self._tried + self.reused) / max(self._total, 1)
-            run.progress(min(0.99, made), f"{sum(one.good for one in self.done)} proposals")
+            run.progress(min(0.99, made), f"{sum(proposal.good for proposal in self.done)} proposals")
         for index in sorted(self._known):
             self._take(jobs[index], self._known[index])
         complete = len(self._known) == len(jobs)
@@ -248,7 +248,7 @@ class _Making:
             self.done.append(proposal)
             self._jobs.append(job)
             return
-        at = next(k for k, one in enumerate(self.done) if one is job.near)
+        at = next(k for k, proposal in enumerate(self.done) if proposal is job.near)
         failed = replace(job.near, movable=False)
         if job.near.passes and proposal.message:  # of its finest model, which cannot follow it
             failed = replace(failed, text="", message=f"{job.near.pending} model: {proposal.message}")
@@ -258,23 +258,23 @@ class _Making:
         """Return what is to be judged by the finest model, of each family that lacks proposals, by turns."""
         rows = []
         for name in dict.fromkeys(job.family for job in self._jobs):
-            mine = [(job, one) for job, one in zip(self._jobs, self.done, strict=True) if job.family == name]
-            lacking = enough - sum(one.settled for _, one in mine)
-            waiting = [replace(job, near=one) for job, one in mine if one.passes and one.pending]
+            mine = [(job, proposal) for job, proposal in zip(self._jobs, self.done, strict=True) if job.family == name]
+            lacking = enough - sum(proposal.settled for _, proposal in mine)
+            waiting = [replace(job, near=proposal) for job, proposal in mine if proposal.passes and proposal.pending]
             rows.append(waiting[: max(lacking, 0)])
         longest = max(map(len, rows), default=0)
         return [row[k] for k in range(longest) for row in rows if k < len(row)]
 
     def with_margins(self, enough: int) -> list[ProposalJob]:
         """Return what is worth a design with margins: of families that lack proposals those with the largest yield."""
-        found = []
+        jobs = []
         for name in dict.fromkeys(job.family for job in self._jobs):
-            mine = [(job, one) for job, one in zip(self._jobs, self.done, strict=True) if job.family == name]
-            lacking = enough - sum(one.passes for _, one in mine)
-            near = [(job, one) for job, one in mine if one.movable]
-            near.sort(key=lambda pair: -float(pair[1].numbers["yield"] or 0.0))
-            found += [replace(job, near=one) for job, one in near[: max(lacking, 0)]]
-        return found
+            mine = [(job, proposal) for job, proposal in zip(self._jobs, self.done, strict=True) if job.family == name]
+            lacking = enough - sum(proposal.passes for _, proposal in mine)
+            movable = [(job, proposal) for job, proposal in mine if proposal.movable]
+            movable.sort(key=lambda pair: -float(pair[1].numbers["yield"] or 0.0))
+            jobs += [replace(job, near=proposal) for job, proposal in movable[: max(lacking, 0)]]
+        return jobs
 
 
 def _with_nearest(
@@ -320,16 +320,16 @@ def _answers(request: Request, run: Run, deadline: float | None, bugs: list[str]
     asked = list(names())
     plain = Run(run.seed)
     executor = surviving_until(run, deadline, bugs)
-    found = dict(executor(partial(_ask_family, request, plain), iter(asked), lambda: False))
+    outcomes = dict(executor(partial(_ask_family, request, plain), iter(asked), lambda: False))
     answers, late = [], False
     for name in asked:
-        outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED_MESSAGE)
+        outcome: FamilyOffer | Lost = outcomes.get(name) or Lost(Status.TIMEOUT, UNANSWERED_MESSAGE)
         if not isinstance(outcome, FamilyOffer):
             timed_out = outcome.status is Status.TIMEOUT
             late |= timed_out
             outcome = FamilyOffer(reason=UNANSWERED_MESSAGE if timed_out else outcome.message)
         answers.append(Answered(name, outcome))
-    return [one for one in answers if one.offer.candidates or one.offer.reason], late
+    return [answer for answer in answers if answer.offer.candidates or answer.offer.reason], late
 
 
 def _ask_family(request: Request, run: Run, name: str) -> FamilyOffer:
@@ -355,23 +355,23 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     """
     propose = function_named(str(record.propose))
     reserves = (1.0,) if record.elastic_parts is None else (RESERVE_FOR_FILLETS, 1.0)
-    found: dict[tuple[str, str], Candidate] = {}
-    for one, reserve in product(request.with_strengths, reserves):
-        offer: FamilyOffer = propose(replace(one, reserve=reserve), run)
+    candidates: dict[tuple[str, str], Candidate] = {}
+    for requested, reserve in product(request.with_strengths, reserves):
+        offer: FamilyOffer = propose(replace(requested, reserve=reserve), run)
         for candidate in offer.candidates:
             if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
                 continue
-            found.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
+            candidates.setdefault((candidate.variant, dump(candidate.spec)), replace(candidate, reserve=reserve))
     reason = f"it needs {OTHER_SPRINGS[request.springs]} springs" if offer.candidates and request.springs else ""
-    likely_first = tuple(sorted(found.values(), key=lambda candidate: candidate.doubtful))
-    return FamilyOffer(likely_first, offer.reason if found else offer.reason or reason)
+    likely_first = tuple(sorted(candidates.values(), key=lambda candidate: candidate.doubtful))
+    return FamilyOffer(likely_first, offer.reason if candidates else offer.reason or reason)
 
 
 def _next(
     queues: dict[str, list[Candidate]], done: Sequence[Proposal], most: int, enough: int
 ) -> Iterator[tuple[str, Candidate]]:
     """Yield the next candidates of every family that has not enough proposals, by turns; they leave the queues."""
-    short = [name for name in queues if sum(one.settled for one in done if one.family == name) < enough]
+    short = [name for name in queues if sum(proposal.settled for proposal in done if proposal.family == name) < enough]
     for _ in range(most):
         for name in short:
             if queues[name]:
@@ -400,19 +400,22 @@ def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
     >>> [one.variant for one in distinct([Proposal("cam", "2 springs", numbers=size) for size in sizes])]
     ['2 springs, 34 x 51 mm', '2 springs, 69 x 23 mm']
     """
-    count = Counter((one.family, one.variant) for one in proposals)
-    sized = [_add_size_to_name(one) if count[one.family, one.variant] > 1 else one for one in proposals]
-    count, seen = Counter((one.family, one.variant) for one in sized), Counter[tuple[str, str]]()
-    found = []
-    for one in sized:
-        seen[key := (one.family, one.variant)] += 1
-        found.append(replace(one, variant=f"{one.variant} ({seen[key]})") if count[key] > 1 else one)
-    return found
+    count = Counter((proposal.family, proposal.variant) for proposal in proposals)
+    sized = [
+        _add_size_to_name(proposal) if count[proposal.family, proposal.variant] > 1 else proposal
+        for proposal in proposals
+    ]
+    count, seen = Counter((proposal.family, proposal.variant) for proposal in sized), Counter[tuple[str, str]]()
+    renamed = []
+    for proposal in sized:
+        seen[key := (proposal.family, proposal.variant)] += 1
+        renamed.append(replace(proposal, variant=f"{proposal.variant} ({seen[key]})") if count[key] > 1 else proposal)
+    return renamed
 
 
-def _add_size_to_name(one: Proposal) -> Proposal:
-    across, along = (1e3 * float(one.numbers.get(side) or 0.0) for side in ("across", "along"))
-    return replace(one, variant=f"{one.variant}, {across:.3g} x {along:.3g} mm")
+def _add_size_to_name(proposal: Proposal) -> Proposal:
+    across, along = (1e3 * float(proposal.numbers.get(side) or 0.0) for side in ("across", "along"))
+    return replace(proposal, variant=f"{proposal.variant}, {across:.3g} x {along:.3g} mm")
 
 
 EQUAL_RTOL = 1e-3
@@ -425,7 +428,7 @@ def order_proposals(proposals: Sequence[Proposal], prefer: Sequence[str]) -> lis
     Of equal ones, as two sizes of one shape are in their ripple, the one that was made first is the first.
     """
     weights = {name: 0.5**place for place, name in enumerate(dict.fromkeys(prefer))}
-    measures = {name: [measure(one, name) for one in proposals] for name in weights}
+    measures = {name: [measure(proposal, name) for proposal in proposals] for name in weights}
 
     def score(index: int) -> float:
         total = 0.0
@@ -458,26 +461,30 @@ MAX_OVERSIZE = 1.5
 
 def _near(done: Sequence[Proposal], request: Request) -> list[Proposal]:
     """Return those that miss one requirement, and no side of the envelope by far; two of each family at most."""
-    found: list[Proposal] = []
-    for name in dict.fromkeys(one.family for one in done):
-        near = [one for one in done if one.family == name and one.near and _nearly_fits(one, request)]
-        found += sorted(near, key=lambda one: measure(one, "ripple"))[:2]
-    return found
+    near_misses: list[Proposal] = []
+    for name in dict.fromkeys(proposal.family for proposal in done):
+        family_misses = [
+            proposal
+            for proposal in done
+            if proposal.family == name and proposal.near and _nearly_fits(proposal, request)
+        ]
+        near_misses += sorted(family_misses, key=lambda proposal: measure(proposal, "ripple"))[:2]
+    return near_misses
 
 
 def _nearly_fits(proposal: Proposal, request: Request) -> bool:
     sides = [float(proposal.numbers.get(name) or 0.0) for name in ("across", "along", "depth")]
-    given = [*request.envelope, np.inf][:3]
+    allowed_sides = [*request.envelope, np.inf][:3]
     if request.kind == "torque":  # what turns may lie either way in the plane
-        sides[:2], given[:2] = sorted(sides[:2]), sorted(given[:2])
-    return all(side <= MAX_OVERSIZE * most for side, most in zip(sides, given, strict=True))
+        sides[:2], allowed_sides[:2] = sorted(sides[:2]), sorted(allowed_sides[:2])
+    return all(side <= MAX_OVERSIZE * most for side, most in zip(sides, allowed_sides, strict=True))
 
 
 def _failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:
     """Return why nothing came of candidates, by family."""
-    found: dict[str, tuple[str, ...]] = {}
-    for one in done:
-        if not one.passes and not one.near:
-            reported = one.message or "; ".join(one.missed)
-            found[one.family] = tuple(dict.fromkeys((*found.get(one.family, ()), reported)))
-    return found
+    reasons: dict[str, tuple[str, ...]] = {}
+    for proposal in done:
+        if not proposal.passes and not proposal.near:
+            reported = proposal.message or "; ".join(proposal.missed)
+            reasons[proposal.family] = tuple(dict.fromkeys((*reasons.get(proposal.family, ()), reported)))
+    return reasons

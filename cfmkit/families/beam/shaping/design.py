@@ -87,8 +87,8 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     mechanism = spec.mechanism
     layers = mechanism.copies.layers if mechanism.copies else 1
     if layers > 1 and mechanism.copies:
-        one = mechanism.copies.model_copy(update={"layers": 1})
-        spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": one})})
+        single_layer = mechanism.copies.model_copy(update={"layers": 1})
+        spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": single_layer})})
     assembly = assemble(spec)
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None
@@ -128,14 +128,14 @@ def mean_of(curve: TargetCurve, window: tuple[float, float]) -> float:
 
 def _coordinates(wanted: Optimise) -> list[Coordinate]:
     box = wanted.limits.envelope
-    found = []
+    coordinates = []
     for name, node in wanted.free.items():
         both = node.x is None and node.y is None
-        for axis, given in enumerate((node.x, node.y)):
-            inside = (box.x, box.y)[axis] if both and box is not None else given
+        for axis, stated in enumerate((node.x, node.y)):
+            inside = (box.x, box.y)[axis] if both and box is not None else stated
             if inside is not None:
-                found.append(Coordinate(name, axis, *inside))
-    return found
+                coordinates.append(Coordinate(name, axis, *inside))
+    return coordinates
 
 
 def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
@@ -158,9 +158,9 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
 
 def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Judged | Design:
     """Return the best design that analysis and audit confirm, or why there is none."""
-    candidates = [(one, result.audits.get(index)) for index, one in rank(task, result.found)]
+    candidates = [(candidate, result.audits.get(index)) for index, candidate in rank(task, result.found)]
     if not candidates:
-        some = [one for one in result.found.values() if one is not None]
+        some = [candidate for candidate in result.found.values() if candidate is not None]
         if not some:
             return _nothing(result, plan)
         if plan.late():
@@ -178,7 +178,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
             return Design(None, Status.INFEASIBLE, said, nearest_feasible=why.nearest)
         candidates = [(met, None)]
     if task.objective == "range" and candidates[0][0].objective > task.half_band:
-        flattest = min((one for one, _ in candidates), key=lambda one: one.objective)
+        flattest = min((candidate for candidate, _ in candidates), key=lambda candidate: candidate.objective)
         said = (
             f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
             f"requested window (design.optimise.window); the flattest keeps it within ± {percent(flattest.objective)}"
@@ -186,8 +186,8 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
         nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
     fallback = None
-    for one, audit in candidates:
-        design = judge_design(spec, task, one, audit)
+    for candidate, audit in candidates:
+        design = judge_design(spec, task, candidate, audit)
         if not design.faults:
             return design
         fallback = fallback or design
@@ -214,12 +214,12 @@ def _nothing(result: Explored, plan: StartBudget) -> Design:
 
 def _report_search(task: Task, design: Judged, result: Explored) -> str:
     """Return what the search did, in one sentence; force and window in it are those of the analysis."""
-    found, window = design.found, design.window
-    some = [one for one in result.found.values() if one is not None]
-    feasible = [one for one in some if one.feasible]
-    unsound = len(feasible) - sum(one.sound for one in result.audits.values())
+    best, window = design.found, design.window
+    some = [audit_or_design for audit_or_design in result.found.values() if audit_or_design is not None]
+    feasible = [audit_or_design for audit_or_design in some if audit_or_design.feasible]
+    unsound = len(feasible) - sum(audit_or_design.sound for audit_or_design in result.audits.values())
     refuted = f", the audit rejects {unsound} of them" if unsound else ""
-    total = sum(one.evaluations for one in some)
+    total = sum(audit_or_design.evaluations for audit_or_design in some)
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not finished in time" if result.missing else ""
     reached = "the analysis has no force at the end of the window"
@@ -232,11 +232,11 @@ def _report_search(task: Task, design: Judged, result: Explored) -> str:
         whose = "force" if task.contact is None else f"force of {task.contact!r}"
         reached = f"{whose} within ± {percent(design.half_band)} over {percent(share)} of the travel"
     if task.objective == "paper":
-        reached = f"F(a)/F(b) - 1 = {found.objective:.3f}"
+        reached = f"F(a)/F(b) - 1 = {best.objective:.3f}"
     return (
         f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} "
         f"({total} traces{reused}{left}); "
-        f"the last minimisation {found.ending}"
+        f"the last minimisation {best.ending}"
     )
 
 
@@ -280,51 +280,57 @@ class Blocked:
     freed: Found | None  # a design that meets all limits after all
 
 
-def find_blocking(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
+def find_blocking(task: Task, designs: Iterable[Found], plan: StartBudget) -> Blocked:
     """Return what blocks, judged from the designs that miss the limits least."""
-    best = sorted(found, key=lambda one: one.violation)[:MAX_NEAR_DESIGNS]
+    best = sorted(designs, key=lambda candidate: candidate.violation)[:MAX_NEAR_DESIGNS]
     missed = missed_by(task, best[0])
     nearest: dict[str, str] = {}
     for name in missed:
-        gives = [_relax_limits(task, one, plan, (name,)) for one in best]
-        for one in gives:
-            if one.feasible:
-                return Blocked(missed, {}, one)
-        slack = min((one.violation for one in gives if set(missed_by(task, one)) <= {name}), default=None)
+        gives = [_relax_limits(task, candidate, plan, (name,)) for candidate in best]
+        for candidate in gives:
+            if candidate.feasible:
+                return Blocked(missed, {}, candidate)
+        slack = min(
+            (candidate.violation for candidate in gives if set(missed_by(task, candidate)) <= {name}), default=None
+        )
         if slack is not None:
             nearest |= NEAREST_LIMITS[name](task, 1.02 * slack)
     if not nearest:  # none gives way alone: all that are missed together, by the same share
-        gives = [_relax_limits(task, one, plan, tuple(missed)) for one in best]
-        slack = min((one.violation for one in gives if set(missed_by(task, one)) <= set(missed)), default=None)
+        gives = [_relax_limits(task, candidate, plan, tuple(missed)) for candidate in best]
+        slack = min(
+            (candidate.violation for candidate in gives if set(missed_by(task, candidate)) <= set(missed)), default=None
+        )
         if slack is not None:
             nearest = {key: value for name in missed for key, value in NEAREST_LIMITS[name](task, 1.02 * slack).items()}
     return Blocked(missed, nearest, None)
 
 
-def _relax_limits(task: Task, found: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
+def _relax_limits(task: Task, candidate: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
     """Return a design that meets all limits but some, and misses those as little as possible."""
     rest = [
-        satisfy_limits(task, found, task.orders[-1], plan, tuple(set(missed_by(task, found)) - set(give)) or give, 0.9)
+        satisfy_limits(
+            task, candidate, task.orders[-1], plan, tuple(set(missed_by(task, candidate)) - set(give)) or give, 0.9
+        )
     ]
     return satisfy_limits(task, rest[0], task.orders[-1], plan, give, 0.98)
 
 
-def missed_by(task: Task, found: Found) -> dict[str, str]:
+def missed_by(task: Task, candidate: Found) -> dict[str, str]:
     """Return the limits that a design misses, each with its worst place and by how much, the worst first."""
-    program = Shaping(Variables(task, found.order), found.start, Flattest())
-    view = program.view(found.x)
+    program = Shaping(Variables(task, candidate.order), candidate.start, Flattest())
+    view = program.view(candidate.x)
     if view is None:
         return {}
     rows = design_limits.list_missed_limits(program.limits(view), VIOLATION_TOL)
-    return {one.name: f"{one.about}: missed by {percent(one.by)}" for one in rows}
+    return {row.name: f"{row.about}: missed by {percent(row.by)}" for row in rows}
 
 
-def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
+def held_by(task: Task, candidate: Found, close: float = 2e-3) -> tuple[str, ...]:
     """Return the limits and bounds that hold a design, by name and place."""
-    variables = Variables(task, found.order)
-    program = Shaping(variables, found.start, Flattest())
-    view = program.view(found.x, sloped=True)
-    at_bound = find_active_bounds(found.x, variables.bounds, AT_BOUND)
+    variables = Variables(task, candidate.order)
+    program = Shaping(variables, candidate.start, Flattest())
+    view = program.view(candidate.x, sloped=True)
+    at_bound = find_active_bounds(candidate.x, variables.bounds, AT_BOUND)
     held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
     return tuple(held) if view is None else (*held, *design_limits.list_active_rows(program.limits(view), close))
 

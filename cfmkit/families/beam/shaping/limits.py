@@ -52,9 +52,10 @@ def rows_of(view: View) -> list[LimitRows]:
     if pending is None:  # else the derivatives are requested where the values were
         pending = view.kept["limits"] = [rows for make in LIMIT_FUNCTIONS.values() for rows in make(view)]
     if not view.sloped:
-        return [LimitRows(one.name, one.values.ravel(), None, one.about) for one in pending]
+        return [LimitRows(limit.name, limit.values.ravel(), None, limit.about) for limit in pending]
     return [
-        LimitRows(one.name, one.values.ravel(), one.slopes().reshape(one.values.size, -1), one.about) for one in pending
+        LimitRows(limit.name, limit.values.ravel(), limit.slopes().reshape(limit.values.size, -1), limit.about)
+        for limit in pending
     ]
 
 
@@ -93,18 +94,18 @@ def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float,
     lines = view.response.state.lines
     poses = np.arange(len(view.poses.at))[which]
     top, three, weights = _highest(
-        [one.place for one in lines.values()], [getattr(one, what)[which] for one in lines.values()]
+        [line.place for line in lines.values()], [getattr(line, what)[which] for line in lines.values()]
     )
     values = (np.array(most)[:, None] - top) / unit
-    near = values < view.near
-    share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[near]
-    rows = np.stack([at.index[which] for at, which in zip(view.response.rows.values(), three, strict=True)])[near]
-    pose = np.broadcast_to(poses, near.shape)[near]
+    is_near = values < view.near
+    share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[is_near]
+    rows = np.stack([at.index[which] for at, which in zip(view.response.rows.values(), three, strict=True)])[is_near]
+    pose = np.broadcast_to(poses, is_near.shape)[is_near]
 
     def slopes() -> FloatArray:
         out = np.zeros((*values.shape, len(view.response.x)))
         at_three = view.response.slopes_at(what, pose[:, None], rows)
-        out[near] = (share[:, :, None] * at_three).sum(axis=1)
+        out[is_near] = (share[:, :, None] * at_three).sum(axis=1)
         return out
 
     sides = SIDE_NAMES[what]
@@ -118,11 +119,11 @@ def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float,
 
 def _highest(places: list[FloatArray], values: list[FloatArray]) -> tuple[FloatArray, Any, FloatArray]:
     """Return `largest_of_three` of the values (p, r) of all beams and of their negatives, (beams, 2, p, ...)."""
-    both = [np.stack([one, -one]) for one in values]
+    both = [np.stack([value, -value]) for value in values]
     if len({len(place) for place in places}) == 1:  # as a rule: one call for all beams
         return largest_of_three(np.stack(places)[:, None, None], np.stack(both))
-    found = [largest_of_three(place, one) for place, one in zip(places, both, strict=True)]
-    top, three, weights = (np.stack(one) for one in zip(*found, strict=True))
+    extremes = [largest_of_three(place, value) for place, value in zip(places, both, strict=True)]
+    top, three, weights = (np.stack(part) for part in zip(*extremes, strict=True))
     return top, three, weights
 
 
@@ -132,9 +133,9 @@ def length_ratio(view: View) -> list[PendingRows]:
     if task.limits.length_ratio is None:
         return []
     least = 1.0 / task.limits.length_ratio
-    many = {name: one for name, one in view.lengths.items() if name in task.shaped}
-    values = np.array([one.straightness - least for one in many.values()])
-    slopes = np.array([one.by_straightness for one in many.values()])
+    many = {name: line for name, line in view.lengths.items() if name in task.shaped}
+    values = np.array([line.straightness - least for line in many.values()])
+    slopes = np.array([line.by_straightness for line in many.values()])
     return [PendingRows("max_length_ratio", values, lambda: slopes, lambda: list(many))]
 
 
@@ -145,8 +146,8 @@ def slenderness(view: View) -> list[PendingRows]:
         return []
     many = view.lengths
     least = np.array([task.limits.slenderness * thickest_of(view.section(name)) for name in many])
-    values = np.array([one.length for one in many.values()]) / least - 1.0
-    slopes = np.array([one.by_length for one in many.values()]) / least[:, None]
+    values = np.array([line.length for line in many.values()]) / least - 1.0
+    slopes = np.array([line.by_length for line in many.values()]) / least[:, None]
     return [PendingRows("min_slenderness", values, lambda: slopes, lambda: list(many))]
 
 
@@ -158,20 +159,20 @@ def radius(view: View) -> list[PendingRows]:
         return []
     u = np.linspace(0, 1, 17)
     powers = np.arange(1, variables.order + 1) * u[:, None] ** np.arange(variables.order)
-    found = []
+    rows = []
     for row, name in enumerate(variables.task.shaped):
         first = len(variables.task.coordinates) + variables.order * row
-        one = view.lengths[name]
+        lengths = view.lengths[name]
         turn = powers @ view.response.x[first : first + variables.order]
         for sign in (1.0, -1.0):
             value, _, weights = largest(u, sign * turn)
-            slopes = least * value / one.length**2 * one.by_length
-            slopes[first : first + variables.order] -= sign * least / one.length * (weights @ powers)
-            values = np.atleast_1d(1.0 - least * value / one.length)
-            found.append(
+            slopes = least * value / lengths.length**2 * lengths.by_length
+            slopes[first : first + variables.order] -= sign * least / lengths.length * (weights @ powers)
+            values = np.atleast_1d(1.0 - least * value / lengths.length)
+            rows.append(
                 PendingRows("min_radius", values, lambda slopes=slopes: slopes, lambda name=name: [name])  # type: ignore[misc]
             )
-    return found
+    return rows
 
 
 def clearance(view: View) -> list[PendingRows]:
@@ -252,29 +253,31 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     shown, opening = view.poses.shown, view.response.variables.task.limits.opening
     lines = {name: _Thinned.from_view(view, name) for name in view.lengths}
     ways = [_way(view, pair, *(lines[name].place for name in pair.beams)) for pair in couples]
-    way = np.stack([one.length for one in ways])
+    ways_between = np.stack([pair_ways.length for pair_ways in ways])
     wanted = np.array([_required_gap(view, pair) for pair in couples])[:, None, None]
-    near = opening * way < wanted
-    required = np.where(near, opening * way, wanted)
-    required[~np.stack([_choose_pairs(pair, one.length) for pair, one in zip(couples, ways, strict=True)])] = np.nan
+    is_near = opening * ways_between < wanted
+    required = np.where(is_near, opening * ways_between, wanted)
+    required[
+        ~np.stack([_choose_pairs(pair, pair_ways.length) for pair, pair_ways in zip(couples, ways, strict=True)])
+    ] = np.nan
     first, second = ([lines[pair.beams[side]] for pair in couples] for side in (0, 1))
-    dx = np.stack([one.x for one in first])[..., None] - np.stack([one.x for one in second])[:, :, None]
-    dy = np.stack([one.y for one in first])[..., None] - np.stack([one.y for one in second])[:, :, None]
+    dx = np.stack([pair_ways.x for pair_ways in first])[..., None] - np.stack([line.x for line in second])[:, :, None]
+    dy = np.stack([line.y for line in first])[..., None] - np.stack([line.y for line in second])[:, :, None]
     distance = np.hypot(dx, dy) + 1e-12
     ratio = np.nan_to_num(distance / required[:, None], nan=np.inf)
     soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), BOUND_SHARPNESS)
     share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
     at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
     pull = share.reshape(ratio.shape)[at] / required[p, i, j]
-    rows = tuple(np.stack([one.row for one in side])[p, k] for side, k in ((first, i), (second, j)))
+    rows = tuple(np.stack([line.row for line in side])[p, k] for side, k in ((first, i), (second, j)))
 
     def slopes() -> FloatArray:
-        push = np.where(near[p, i, j], opening * pull * ratio[at], 0.0)
+        push = np.where(is_near[p, i, j], opening * pull * ratio[at], 0.0)
         by = -push[:, None] * slopes_of_ways(ways, p, i, j)
         for axis, apart in (("x", dx), ("y", dy)):
             along = (apart[at] / distance[at] * pull)[:, None]
-            one, other = (view.response.slopes_at(axis, shown[q], row) for row in rows)
-            by += along * (one - other)
+            line, second_slopes = (view.response.slopes_at(axis, shown[q], row) for row in rows)
+            by += along * (line - second_slopes)
         out = np.zeros((*soft.shape, len(view.response.x)))
         np.add.at(out, (p, q), by)
         return out
@@ -312,11 +315,11 @@ def _even(count: int) -> Any:
     return np.unique(np.linspace(0, count - 1, _N_PLACES + 1).round().astype(np.int64))
 
 
-def _choose_pairs(pair: Pair, way: FloatArray) -> Any:
+def _choose_pairs(pair: Pair, distance: FloatArray) -> Any:
     """Return which places are compared: not a joint with itself, and no neighbours on one beam."""
     if pair.alone:
-        return np.triu(np.ones(way.shape, dtype=bool), 2)
-    return way > 1e-9
+        return np.triu(np.ones(distance.shape, dtype=bool), 2)
+    return distance > 1e-9
 
 
 def _required_gap(view: View, pair: Pair) -> float:
@@ -341,25 +344,25 @@ def slopes_of_ways(ways: list[_Way], pair: Any, i: Any, j: Any) -> FloatArray:
     """Return the derivatives of the ways of some pairs at places (n,) of both beams, (n, k)."""
     total = 0.0
     for side in (0, 1):
-        share = np.stack([one.shares[side] for one in ways])[pair, i, j]
-        total = total + share[:, None] * np.stack([one.by_lengths[side] for one in ways])[pair]
+        share = np.stack([pair_ways.shares[side] for pair_ways in ways])[pair, i, j]
+        total = total + share[:, None] * np.stack([pair_ways.by_lengths[side] for pair_ways in ways])[pair]
     return np.asarray(total)
 
 
 def _way(view: View, pair: Pair, u: FloatArray, v: FloatArray) -> _Way:
     """Return the way between places of the two beams."""
-    one, other = (view.lengths[name] for name in pair.beams)
+    first, second = (view.lengths[name] for name in pair.beams)
     u, v = u[:, None], v[None, :]
-    slopes = one.by_length, other.by_length
+    slopes = first.by_length, second.by_length
     if pair.alone:
         apart = abs(u - v)
-        return _Way(apart * one.length, (apart, np.zeros_like(apart)), slopes)
-    way = np.full((u.size, v.size), np.inf)
-    shares = np.zeros(way.shape), np.zeros(way.shape)
+        return _Way(apart * first.length, (apart, np.zeros_like(apart)), slopes)
+    shortest = np.full((u.size, v.size), np.inf)
+    shares = np.zeros(shortest.shape), np.zeros(shortest.shape)
     for end, at in pair.joints:
         p, q = abs(u - end), abs(v - at)
-        here = p * one.length + q * other.length
-        shorter = here < way
-        way = np.where(shorter, here, way)
+        through_joint = p * first.length + q * second.length
+        shorter = through_joint < shortest
+        shortest = np.where(shorter, through_joint, shortest)
         shares = np.where(shorter, p, shares[0]), np.where(shorter, q, shares[1])
-    return _Way(way, shares, slopes)
+    return _Way(shortest, shares, slopes)

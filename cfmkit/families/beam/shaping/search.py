@@ -128,12 +128,12 @@ def search_start(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     if first is task:
         return polish(task, begun, plan)
     enough = _BAND_SHARE * task.half_band if task.objective == "range" else -np.inf
-    found = evaluate_in_model(task, flatten(first, begun, plan, enough))
-    if found.violation > _MAX_VIOLATION or (
-        task.objective == "range" and found.objective > _MAX_BAND_RATIO * task.half_band
+    design = evaluate_in_model(task, flatten(first, begun, plan, enough))
+    if design.violation > _MAX_VIOLATION or (
+        task.objective == "range" and design.objective > _MAX_BAND_RATIO * task.half_band
     ):
-        return found
-    return polish(task, found if found.feasible else satisfy_limits(task, found, found.order, plan), plan)
+        return design
+    return polish(task, design if design.feasible else satisfy_limits(task, design, design.order, plan), plan)
 
 
 def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
@@ -152,17 +152,17 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     begun = _begin_network(first, np.random.default_rng([seed, index]), replace(plan, tries=1))
     if begun is None:
         return None
-    found = flatten(first, evaluate_in_model(first, replace(begun, start=far)), plan)
+    design = flatten(first, evaluate_in_model(first, replace(begun, start=far)), plan)
     if first is task:
-        return found
-    found = evaluate_in_model(task, found)
-    hopeless = found.violation > _MAX_VIOLATION or found.objective > _MAX_BAND_RATIO * task.half_band
-    return found if hopeless else flatten(task, found, plan)
+        return design
+    design = evaluate_in_model(task, design)
+    hopeless = design.violation > _MAX_VIOLATION or design.objective > _MAX_BAND_RATIO * task.half_band
+    return design if hopeless else flatten(task, design, plan)
 
 
-def nearer(task: Task, found: Found, plan: StartBudget) -> Found:
+def nearer(task: Task, design: Found, plan: StartBudget) -> Found:
     """Return a design that was flattened over a window that begins farther, flattened and widened as any other."""
-    far = evaluate_in_model(task, found)
+    far = evaluate_in_model(task, design)
     flat = far.feasible and far.objective <= task.half_band
     return widen(task, polish(task, far if flat else replace(far, start=task.window[0]), plan), plan)
 
@@ -172,10 +172,10 @@ def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> F
     best: Found | None = None
     evaluations = plan.drawn
     for first in draw_networks(task, rng, plan)[: plan.tries]:
-        found = satisfy_limits(task, replace(first, evaluations=evaluations), _coarse(task), plan)
-        evaluations = found.evaluations
-        if best is None or found.violation < best.violation:
-            best = found
+        candidate = satisfy_limits(task, replace(first, evaluations=evaluations), _coarse(task), plan)
+        evaluations = candidate.evaluations
+        if best is None or candidate.violation < best.violation:
+            best = candidate
         if best.feasible or plan.late():
             break
     if best is None:
@@ -184,88 +184,88 @@ def _begin_network(task: Task, rng: np.random.Generator, plan: StartBudget) -> F
     return best if best.feasible else satisfy_limits(task, best, task.orders[-1], plan)
 
 
-def evaluate_in_model(task: Task, found: Found) -> Found:
+def evaluate_in_model(task: Task, design: Found) -> Found:
     """Return a design that was found in another model with objective and limits as they are in that of the task."""
-    program = Shaping(Variables(task, found.order), found.start, Flattest())
-    view = program.view(found.x)
+    program = Shaping(Variables(task, design.order), design.start, Flattest())
+    view = program.view(design.x)
     if view is None:
-        return replace(found, objective=np.inf, violation=np.inf)
-    objective = found.objective if task.objective == "paper" else _half_band(window_force(view))
-    violation = worst_of(program, found.x)
-    return replace(found, objective=objective, violation=violation, evaluations=found.evaluations + 1)
+        return replace(design, objective=np.inf, violation=np.inf)
+    objective = design.objective if task.objective == "paper" else _half_band(window_force(view))
+    violation = worst_of(program, design.x)
+    return replace(design, objective=objective, violation=violation, evaluations=design.evaluations + 1)
 
 
-def polish(task: Task, found: Found, plan: StartBudget) -> Found:
+def polish(task: Task, design: Found, plan: StartBudget) -> Found:
     """Return a design flattened in every order from its own on, as it is at many poses."""
 
     def again(finer: Task, design: Found) -> Found:
         return _minimise_objective(finer, design, design.order, plan, plan.flattening)
 
-    return verify(task, flatten(task, found, plan), plan, again)
+    return verify(task, flatten(task, design, plan), plan, again)
 
 
-def flatten(task: Task, found: Found, plan: StartBudget, enough: float = -np.inf) -> Found:
+def flatten(task: Task, design: Found, plan: StartBudget, enough: float = -np.inf) -> Found:
     """Return a design flattened in every order from its own on, in each until the half band is small enough."""
     for order in task.orders:
-        if order >= found.order and not plan.late():
-            found = _minimise_objective(task, found, order, plan, plan.flattening, enough)
-    return found
+        if order >= design.order and not plan.late():
+            design = _minimise_objective(task, design, order, plan, plan.flattening, enough)
+    return design
 
 
-def verify(task: Task, found: Found, plan: StartBudget, again: Callable[[Task, Found], Found]) -> Found:
+def verify(task: Task, design: Found, plan: StartBudget, again: Callable[[Task, Found], Found]) -> Found:
     """Return a design with objective, window and limits as they are at many poses.
 
     Parameters
     ----------
-    task, found, plan : Task, Found, StartBudget
+    task, design, plan : Task, Found, StartBudget
         What was searched for, and what came out; where that misses a limit it is returned as it is.
     again : callable
         What searches on, from a task with more poses and a design.
     """
-    if not found.feasible:
-        return found
+    if not design.feasible:
+        return design
     for points in (*(more for more in _FINER_POSE_COUNTS if more > task.points), None):
-        found = round_design(task, found)
-        view = looked_at(task, Variables(task, found.order).build(found.x))
-        found = replace(found, evaluations=found.evaluations + 1)
-        if points is None or plan.late() or _shows_all(task, found, view):
+        design = round_design(task, design)
+        view = looked_at(task, Variables(task, design.order).build(design.x))
+        design = replace(design, evaluations=design.evaluations + 1)
+        if points is None or plan.late() or _shows_all(task, design, view):
             break
-        more = again(replace(task, points=points), found)
-        found = replace(more, points=points)
-        if not found.feasible:
-            return found
-    return _as_seen(task, found, view)
+        more = again(replace(task, points=points), design)
+        design = replace(more, points=points)
+        if not design.feasible:
+            return design
+    return _as_seen(task, design, view)
 
 
-def _shows_all(task: Task, found: Found, view: CloseView | None) -> bool:
+def _shows_all(task: Task, design: Found, view: CloseView | None) -> bool:
     """Return True if a design is at many poses what it was found to be at those of the search."""
     if view is None or _overstress(task, view) > 0:
         return False
     if task.objective == "paper":
         return True
-    if task.objective == "range" and found.objective <= task.half_band:
-        return view.widest(task.half_band) <= found.start + _MIN_WINDOW_GAIN * task.window[1]
-    return view.half_band(found.start) <= _BAND_RATIO_TOL * found.objective + _NEAR
+    if task.objective == "range" and design.objective <= task.half_band:
+        return view.widest(task.half_band) <= design.start + _MIN_WINDOW_GAIN * task.window[1]
+    return view.half_band(design.start) <= _BAND_RATIO_TOL * design.objective + _NEAR
 
 
-def _as_seen(task: Task, found: Found, view: CloseView | None) -> Found:
+def _as_seen(task: Task, design: Found, view: CloseView | None) -> Found:
     """Return a design with what was seen at many poses: half band, widest window, stress."""
     if view is None:
-        return replace(found, violation=np.inf)
-    found = replace(found, violation=max(found.violation, _overstress(task, view)))
+        return replace(design, violation=np.inf)
+    design = replace(design, violation=max(design.violation, _overstress(task, view)))
     if task.objective == "paper":
-        return found
-    starts = [found.start]
+        return design
+    starts = [design.start]
     if task.objective == "range":
         widest = min(view.widest(task.half_band), task.window[0])  # no less than the window that was requested
-        wider = found.start < task.window[0]  # one that was not widened yet is left as flat as it is
-        starts = [widest, found.start] if wider and widest < found.start else [max(widest, found.start)]
+        wider = design.start < task.window[0]  # one that was not widened yet is left as flat as it is
+        starts = [widest, design.start] if wider and widest < design.start else [max(widest, design.start)]
     for start in starts:  # the mean force is over another window
-        program = Shaping(Variables(task, found.order), start, Flattest())
-        violation = found.violation if start == found.start else max(found.violation, worst_of(program, found.x))
+        program = Shaping(Variables(task, design.order), start, Flattest())
+        violation = design.violation if start == design.start else max(design.violation, worst_of(program, design.x))
         if violation <= VIOLATION_TOL:
             break
-    return replace(found, start=start, objective=view.half_band(start), violation=violation)
+    return replace(design, start=start, objective=view.half_band(start), violation=violation)
 
 
 def _overstress(task: Task, view: CloseView) -> float:
@@ -274,12 +274,12 @@ def _overstress(task: Task, view: CloseView) -> float:
     return 0.0 if allowed is None else max(0.0, float(view.stress.max()) / allowed - 1.0)
 
 
-def round_design(task: Task, found: Found) -> Found:
+def round_design(task: Task, design: Found) -> Found:
     """Return a design with coordinates and coefficients that print short."""
-    places, bounds = len(task.coordinates), Variables(task, found.order).bounds
-    coordinates = rounded_within(found.x[:places], bounds[:places], COORDINATE_DECIMALS, task.size)
+    places, bounds = len(task.coordinates), Variables(task, design.order).bounds
+    coordinates = rounded_within(design.x[:places], bounds[:places], COORDINATE_DECIMALS, task.size)
     return replace(
-        found, x=np.append(coordinates, rounded_within(found.x[places:], bounds[places:], COEFFICIENT_DECIMALS))
+        design, x=np.append(coordinates, rounded_within(design.x[places:], bounds[places:], COEFFICIENT_DECIMALS))
     )
 
 
@@ -288,7 +288,7 @@ def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> li
 
     Straight ones; curved ones too where those cannot move, as a single beam that does not stretch.
     """
-    found: list[Found] = []
+    networks: list[Found] = []
     for order in dict.fromkeys((0, _coarse(task))):
         variables = Variables(task, order)
         program = Shaping(variables, task.window[0], Flattest())
@@ -299,12 +299,15 @@ def draw_networks(task: Task, rng: np.random.Generator, plan: StartBudget) -> li
             if view is not None:
                 band = _half_band(window_force(view))
                 excess = worst_of(program, x) if band < _SPRING_HALF_BAND else np.inf
-                found.append(Found(x, order, task.window[0], band, excess, "", 1))
-        if len(found) >= plan.tries:
+                networks.append(Found(x, order, task.window[0], band, excess, "", 1))
+        if len(networks) >= plan.tries:
             break
     return sorted(
-        found,
-        key=lambda one: (one.violation + _BAND_WEIGHT * max(0.0, one.objective - _START_HALF_BAND), one.objective),
+        networks,
+        key=lambda network: (
+            network.violation + _BAND_WEIGHT * max(0.0, network.objective - _START_HALF_BAND),
+            network.objective,
+        ),
     )
 
 
@@ -315,7 +318,7 @@ def _coarse(task: Task) -> int:
 
 def satisfy_limits(
     task: Task,
-    found: Found,
+    design: Found,
     order: int,
     plan: StartBudget,
     give: tuple[str, ...] = tuple(LIMIT_FUNCTIONS),
@@ -325,36 +328,36 @@ def satisfy_limits(
 
     Given up where a round does not bring what is missed below a share of what it was.
     """
-    cap = max(_START_HALF_BAND, 1.1 * found.objective)
-    variables, x = Variables(task, found.order).change_order(found.x, max(order, found.order))
-    program = Shaping(variables, found.start, Flattest(), give, cap, _NEAR_ROWS)
+    cap = max(_START_HALF_BAND, 1.1 * design.objective)
+    variables, x = Variables(task, design.order).change_order(design.x, max(order, design.order))
+    program = Shaping(variables, design.start, Flattest(), give, cap, _NEAR_ROWS)
     for _ in range(_MAX_ROUNDS):
         z = program.begin(x)
         if z is None:
-            return found
+            return design
         optimum = minimize(program, z, program.bounds, plan.effort(plan.meeting, enough=0.0))
-        now, before = found_of(program, optimum, found.evaluations), found.violation
-        found = now if now.violation < before else replace(found, evaluations=now.evaluations)
-        if found.feasible or not found.violation < share * before or plan.late():
+        now, before = found_of(program, optimum, design.evaluations), design.violation
+        design = now if now.violation < before else replace(design, evaluations=now.evaluations)
+        if design.feasible or not design.violation < share * before or plan.late():
             break
-        x = found.x
-    return found
+        x = design.x
+    return design
 
 
 def _minimise_objective(
-    task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf
+    task: Task, design: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf
 ) -> Found:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
-    variables, x = Variables(task, found.order).change_order(found.x, order)
+    variables, x = Variables(task, design.order).change_order(design.x, order)
     goal = ForceRatio() if task.objective == "paper" else Flattest()
-    program = Shaping(variables, found.start, goal, near=_NEAR_ROWS)
+    program = Shaping(variables, design.start, goal, near=_NEAR_ROWS)
     z = program.begin(x)
     if z is None:
-        return found
+        return design
     optimum = minimize(program, z, program.bounds, plan.effort(steps, BAND_WEIGHT * enough))
-    now = found_of(program, optimum, found.evaluations)
-    worse = found.feasible and not now.feasible
-    return replace(found, evaluations=now.evaluations) if worse else now
+    now = found_of(program, optimum, design.evaluations)
+    worse = design.feasible and not now.feasible
+    return replace(design, evaluations=now.evaluations) if worse else now
 
 
 def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> Found:
@@ -389,15 +392,15 @@ def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> flo
     return worst(program.limits(view))
 
 
-def widen(task: Task, found: Found, plan: StartBudget) -> Found:
+def widen(task: Task, design: Found, plan: StartBudget) -> Found:
     """Return the design with the widest window in which the force stays in the wanted band.
 
     The start of the window is a variable like all others; the window grows from the last design, whose force is flatter
     than it has to be.
     """
-    if task.objective != "range" or not (found.feasible and found.objective <= task.half_band):
-        return found
-    good, task = found, replace(task, points=found.points)
+    if task.objective != "range" or not (design.feasible and design.objective <= task.half_band):
+        return design
+    good, task = design, replace(task, points=design.points)
     refuted: list[Found] = []
 
     def again(finer: Task, design: Found) -> Found:
@@ -406,38 +409,45 @@ def widen(task: Task, found: Found, plan: StartBudget) -> Found:
 
     wide = verify(task, _widest(task, good, plan), plan, again)
     # what more poses refute keeps the band over a narrower window, which may be wider than what the repair came to
-    narrower = (_as_seen(task, one, looked_at(task, Variables(task, one.order).build(one.x))) for one in refuted)
-    kept = [one for one in (good, *narrower, wide) if one.feasible and one.objective <= task.half_band]
-    widest = min(reversed(kept), key=lambda one: one.start)
+    narrower = (
+        _as_seen(task, candidate, looked_at(task, Variables(task, candidate.order).build(candidate.x)))
+        for candidate in refuted
+    )
+    kept = [
+        candidate
+        for candidate in (good, *narrower, wide)
+        if candidate.feasible and candidate.objective <= task.half_band
+    ]
+    widest = min(reversed(kept), key=lambda candidate: candidate.start)
     return replace(widest, evaluations=wide.evaluations + len(refuted))
 
 
-def refine(task: Task, found: Found, plan: StartBudget) -> Found:
+def refine(task: Task, design: Found, plan: StartBudget) -> Found:
     """Return a widened design flattened and widened again in every finer order; never one with a narrower window."""
     for order in task.orders:
-        if order > found.order and found.objective <= task.half_band and not plan.late():
-            flat = _minimise_objective(task, found, order, plan, plan.flattening)
+        if order > design.order and design.objective <= task.half_band and not plan.late():
+            flat = _minimise_objective(task, design, order, plan, plan.flattening)
             finer = widen(task, flat, plan)
-            wider = finer.feasible and finer.start < found.start
-            found = finer if wider else replace(found, evaluations=finer.evaluations)
-    return found
+            wider = finer.feasible and finer.start < design.start
+            design = finer if wider else replace(design, evaluations=finer.evaluations)
+    return design
 
 
-def _widest(task: Task, found: Found, plan: StartBudget) -> Found:
+def _widest(task: Task, design: Found, plan: StartBudget) -> Found:
     """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
     for _ in range(_MAX_WIDENINGS):
-        program = Shaping(Variables(task, found.order), found.start, goal, near=_NEAR_ROWS)
-        z = program.begin(found.x)
+        program = Shaping(Variables(task, design.order), design.start, goal, near=_NEAR_ROWS)
+        z = program.begin(design.x)
         if z is None or plan.late():
-            return found
+            return design
         effort = plan.effort(plan.widening, violation=_REPAIRABLE_VIOLATION)
-        wide = found_of(program, minimize(program, z, program.bounds, effort), found.evaluations)
-        now = _repair(task, wide, found, plan)
-        gain, found = found.start - now.start, now
+        wide = found_of(program, minimize(program, z, program.bounds, effort), design.evaluations)
+        now = _repair(task, wide, design, plan)
+        gain, design = design.start - now.start, now
         if not gain > _MIN_WINDOW_GAIN * task.window[1]:
             break
-    return found
+    return design
 
 
 def _repair(task: Task, wide: Found, good: Found, plan: StartBudget) -> Found:

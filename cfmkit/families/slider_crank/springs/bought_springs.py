@@ -63,14 +63,14 @@ def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> 
     list of (float, (m,) array)
         The deviation and the rates; empty if no set keeps what the goal requires beside the deviation.
     """
-    if any(not len(one) for one in offered):
+    if any(not len(rates) for rates in offered):
         return []
     few = goal.select_rows(np.unique(np.linspace(0, len(goal.wanted) - 1, N_BOUND_PLACES).round().astype(int)))
     # limits of single rates are those of what is offered
     search = _Sets(goal, replace(few, upper=np.full(len(offered), np.inf), lower=None), count)
     search.begin(offered)
-    search.look([np.asarray(one) for one in offered])
-    return sorted(search.found, key=lambda one: one[0])
+    search.look([np.asarray(rates) for rates in offered])
+    return sorted(search.found, key=lambda pair: pair[0])
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
     best = _sets(goal, options, 1)
     if best and (tolerance is None or best[0].deviation <= tolerance * (1 + 1e-9)):
         return best[0]
-    misses = [_miss_of(one) for one in (_sets(goal, options, 3) if best else [])]
+    misses = [_miss_of(chosen) for chosen in (_sets(goal, options, 3) if best else [])]
     reported = nearest(misses) if misses else _none_together(task, refused)
     allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
     raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue keep the target: {reported}{allowed}"))
@@ -143,47 +143,55 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
 def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
     """Return the sets of springs that hold the target best after the one that `choose` takes, within the tolerance."""
     most = np.inf if task.wanted.tolerance is None else task.wanted.tolerance * (1 + 1e-9)
-    found = _sets(goal, _options(task, window)[0], 1 + count)[1:]
-    return [one for one in found if one.deviation <= most]
+    sets = _sets(goal, _options(task, window)[0], 1 + count)[1:]
+    return [chosen for chosen in sets if chosen.deviation <= most]
 
 
 def least_deviation(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> float:
     """Return the deviation of the springs of the catalogue that hold the target best; infinite where none do."""
-    found = _sets(goal, _options(task, window)[0], 1)
-    return found[0].deviation if found else np.inf
+    sets = _sets(goal, _options(task, window)[0], 1)
+    return sets[0].deviation if sets else np.inf
 
 
 def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[Chosen]:
     """Return the sets of options that hold the target best."""
     least = np.zeros(len(JOINT_NAMES)) if goal.lower is None else goal.lower
     at = [_by_rate(options, joint, low) for joint, low in enumerate(least.tolist())]
-    found = best_sets(goal, [np.array(sorted(one)) for one in at], count)
+    ranked = best_sets(goal, [np.array(sorted(joint_options)) for joint_options in at], count)
     return [
-        Chosen(tuple(option for one, rate in zip(at, rates.tolist(), strict=True) if (option := one[rate])), rates, off)
-        for off, rates in found
+        Chosen(
+            tuple(
+                option
+                for joint_options, rate in zip(at, rates.tolist(), strict=True)
+                if (option := joint_options[rate])
+            ),
+            rates,
+            off,
+        )
+        for off, rates in ranked
     ]
 
 
 def _by_rate(options: list[SpringOption], joint: int, least: float) -> dict[float, SpringOption | None]:
     """Return what gives each rate that a joint may have: of equal ones the fewest springs, and none for zero."""
-    own = sorted((one for one in options if one.joint == joint), key=lambda one: one.count)
-    found: dict[str, SpringOption | None] = {} if least > 0 else {"0": None}
-    for one in own:
-        if one.rate >= least * (1 - 1e-9):
-            found.setdefault(f"{one.rate:.12g}", one)  # three of 0.1 and one of 0.3 are the same
-    return {one.rate if one else 0.0: one for one in found.values()}
+    joint_options = sorted((option for option in options if option.joint == joint), key=lambda option: option.count)
+    by_rate: dict[str, SpringOption | None] = {} if least > 0 else {"0": None}
+    for option in joint_options:
+        if option.rate >= least * (1 - 1e-9):
+            by_rate.setdefault(f"{option.rate:.12g}", option)  # three of 0.1 and one of 0.3 are the same
+    return {option.rate if option else 0.0: option for option in by_rate.values()}
 
 
-def _miss_of(one: Chosen) -> Miss:
-    label = " + ".join(option.label for option in one.options) or "no spring"
-    return Miss(label, one.deviation, f"off by {percent(one.deviation)}")
+def _miss_of(chosen: Chosen) -> Miss:
+    label = " + ".join(option.label for option in chosen.options) or "no spring"
+    return Miss(label, chosen.deviation, f"off by {percent(chosen.deviation)}")
 
 
 def _none_together(task: SpringTask, refused: list[Miss]) -> str:
     """Return why no set does what is required beside the target: to let the force be trimmed."""
     reported = f"; {nearest(refused)}" if refused else ""
-    way = "anchor_travel" if task.wanted.anchor_travel is not None else "angle_travel"
-    return f"none is stiff enough for 'design.adjustment' within 'design.{way}'{reported}"
+    key = "anchor_travel" if task.wanted.anchor_travel is not None else "angle_travel"
+    return f"none is stiff enough for 'design.adjustment' within 'design.{key}'{reported}"
 
 
 def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[SpringOption], list[Miss]]:
@@ -205,10 +213,10 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
             if reason is not None:
                 refused.append(Miss(label, *reason))
                 continue
-            own = [SpringOption(joint, offer, count, max(map(abs, ends))) for count in offer.counts]
-            soft = [one for one in own if cap is None or one.rate <= cap * (1 + 1e-9)]
+            joint_options = [SpringOption(joint, offer, count, max(map(abs, ends))) for count in offer.counts]
+            soft = [option for option in joint_options if cap is None or option.rate <= cap * (1 + 1e-9)]
             if not soft and cap is not None:
-                least = min(one.rate for one in own)
+                least = min(option.rate for option in joint_options)
                 refused.append(Miss(label, least / cap - 1.0, f"stiffer than 'design.max_rates.{name}'"))
             usable += soft
     return usable, refused
@@ -269,60 +277,64 @@ class _Sets:
             return
         off = np.abs(sets @ self.goal.matrix.T - self.goal.wanted).max(axis=1)
         for k in np.argsort(off, kind="stable")[: self.count].tolist():
-            known = any(np.array_equal(sets[k], one) for _, one in self.found)
-            if off[k] <= self.bound and not known:
-                self.found = sorted([*self.found, (float(off[k]), sets[k])], key=lambda one: one[0])[: self.count]
+            is_known = any(np.array_equal(sets[k], other_set) for _, other_set in self.found)
+            if off[k] <= self.bound and not is_known:
+                self.found = sorted([*self.found, (float(off[k]), sets[k])], key=lambda pair: pair[0])[: self.count]
 
     def begin(self, offered: Sequence[FloatArray]) -> None:
         """Take the sets next to the best rates that could be had if every rate could: they bound all others."""
         rates = minimax(self.few)
         if rates is not None:
-            near = [
-                one[max(0, int(np.searchsorted(one, rate)) - 1) :][:2] for one, rate in zip(offered, rates, strict=True)
+            neighbours = [
+                rates_of_joint[max(0, int(np.searchsorted(rates_of_joint, rate)) - 1) :][:2]
+                for rates_of_joint, rate in zip(offered, rates, strict=True)
             ]
-            self.take(np.array(list(product(*near))))
+            self.take(np.array(list(product(*neighbours))))
 
     def look(self, offered: list[FloatArray]) -> None:
         """Look at all sets of what is offered that may be among the best."""
-        open_ = [k for k, one in enumerate(offered) if len(one) > 1]
+        open_ = [k for k, rates in enumerate(offered) if len(rates) > 1]
         if len(open_) <= 2:
             self._look_at_pairs(offered, open_)
             return
         offered = self._restrict_to_bound(offered)
-        if any(not len(one) for one in offered):
+        if any(not len(rates) for rates in offered):
             return
         joint = min((k for k in open_ if len(offered[k]) > 1), key=lambda k: len(offered[k]), default=open_[0])
-        one = offered[joint]
+        rates = offered[joint]
         # the middle first: the sooner a good set is found, the more is left out
-        for rate in one[np.argsort(np.abs(one - 0.5 * (one[0] + one[-1])), kind="stable")]:
-            self.look([np.array([rate]) if k == joint else other for k, other in enumerate(offered)])
+        for rate in rates[np.argsort(np.abs(rates - 0.5 * (rates[0] + rates[-1])), kind="stable")]:
+            self.look([np.array([rate]) if k == joint else rates_of_joint for k, rates_of_joint in enumerate(offered)])
 
     def _restrict_to_bound(self, offered: list[FloatArray]) -> list[FloatArray]:
         """Return what is left of each joint's rates if no place may be off by more than the bound."""
         if not np.isfinite(self.bound):
             return offered
-        ends = np.array([[one[0], one[-1]] for one in offered])
+        ends = np.array([[rates_of_joint[0], rates_of_joint[-1]] for rates_of_joint in offered])
         worst = self.bound * (1 + BOUND_RTOL) + 1e-12
-        found = ranges(replace(self.few, lower=ends[:, 0], upper=ends[:, 1]), worst)
-        if np.isnan(found).any():
-            return [one[:0] for one in offered]
-        reach = 1e-6 * np.abs(found).max(axis=1, keepdims=True) * np.array([-1.0, 1.0])
-        return [one[(one >= low) & (one <= high)] for one, (low, high) in zip(offered, found + reach, strict=True)]
+        limits = ranges(replace(self.few, lower=ends[:, 0], upper=ends[:, 1]), worst)
+        if np.isnan(limits).any():
+            return [rates_of_joint[:0] for rates_of_joint in offered]
+        reach = 1e-6 * np.abs(limits).max(axis=1, keepdims=True) * np.array([-1.0, 1.0])
+        return [
+            rates_of_joint[(rates_of_joint >= low) & (rates_of_joint <= high)]
+            for rates_of_joint, (low, high) in zip(offered, limits + reach, strict=True)
+        ]
 
     def _look_at_pairs(self, offered: list[FloatArray], open_: list[int]) -> None:
         """Look at all sets in which at most two joints have more than one rate."""
         first, second = (open_ + [k for k in range(len(offered)) if k not in open_])[:2]
-        fixed = np.array([one[0] for one in offered])
+        fixed = np.array([rates_of_joint[0] for rates_of_joint in offered])
         fixed[[first, second]] = 0.0
-        own, other = offered[first], offered[second]
-        base = self.few.matrix @ fixed - self.few.wanted + np.outer(own, self.few.matrix[:, first])
+        first_rates, second_rates = offered[first], offered[second]
+        base = self.few.matrix @ fixed - self.few.wanted + np.outer(first_rates, self.few.matrix[:, first])
         column = self.few.matrix[:, second]
         for k in np.argsort(np.abs(base).min(axis=1), kind="stable").tolist():
             low, high = _interval(base[k], column, self.bound * (1 + BOUND_RTOL) + 1e-12)
-            mates = other[(other >= low) & (other <= high)]
+            mates = second_rates[(second_rates >= low) & (second_rates <= high)]
             if len(mates):
                 sets = np.tile(fixed, (len(mates), 1))
-                sets[:, first], sets[:, second] = own[k], mates
+                sets[:, first], sets[:, second] = first_rates[k], mates
                 self.take(sets)
 
 
