@@ -45,7 +45,10 @@ def test_a_design_all_of_whose_starts_crash_ends_as_a_bug(name: str, changes: li
 
 @pytest.mark.parametrize(
     ("name", "module", "function"),
-    [("beam_design_arch", multistart, "search_start"), ("slider_crank_taper_design", strip_thickness_search, "descend")],
+    [
+        ("beam_design_arch", multistart, "search_start"),
+        ("slider_crank_taper_design", strip_thickness_search, "descend"),
+    ],
 )
 def test_a_fault_in_the_process_itself_is_not_swallowed(
     name: str, module: Any, function: str, monkeypatch: pytest.MonkeyPatch

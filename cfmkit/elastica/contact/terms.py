@@ -59,7 +59,7 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
 
 
 class SlipWay(NamedTuple):
-    """The way that a contact has slipped along what it touches, with its derivatives by the n unknowns that change it."""
+    """The way that a contact has slipped, with its derivatives by the n unknowns that change it."""
 
     value: Any
     unknowns: Any  # (n,)
