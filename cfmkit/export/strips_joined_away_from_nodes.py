@@ -143,7 +143,8 @@ def _material(contours: Sequence[Contour], thinnest: float) -> Any:
     """Return the area within outlines and outside of holes, a little larger for rounding."""
     from shapely import Polygon, union_all
 
-    rings = [(one.hole, Polygon(one.points(SAGITTA_RTOL * thinnest)).buffer(0.0)) for one in contours if one.closed]
+    closed = [contour for contour in contours if contour.closed]
+    rings = [(edge.hole, Polygon(edge.points(SAGITTA_RTOL * thinnest)).buffer(0.0)) for edge in closed]
     areas = [union_all([ring for is_hole, ring in rings if is_hole is hole]) for hole in (False, True)]
     return areas[0].difference(areas[1]).buffer(OUTSIDE_RTOL * thinnest)
 
