@@ -12,7 +12,7 @@ from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Length, Stiffness
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from cfmkit.specs.spec import Requirement
 
@@ -45,11 +45,16 @@ def stop_faults(
     for name in stops:
         if not _NAME.fullmatch(name):
             yield ("mechanism", "stops", name), "a name is a letter and then at most 39 letters, digits, '_' or '-'"
+    yield from contact_requirement_faults(stops, "a stop", requirements)
+
+
+def contact_requirement_faults(
+    names: Collection[str], kinds: str, requirements: Sequence[Requirement]
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield requirements on the force of a contact that is none of those of some kinds that a mechanism has."""
     for number, requirement in enumerate(requirements):
         plain, bracket, rest = requirement.metric.partition("[")
-        if plain in ("contact_force", "contact_force_ripple") and not (bracket and rest.removesuffix("]") in stops):
-            listed = ", ".join(stops) or "none"
-            yield (
-                ("requirements", number, "metric"),
-                f"{plain!r} needs the name of a stop in brackets; there are: {listed}",
-            )
+        if plain in ("contact_force", "contact_force_ripple") and not (bracket and rest.removesuffix("]") in names):
+            listed = ", ".join(names) or "none"
+            text = f"{plain!r} needs the name of {kinds} in brackets; there are: {listed}"
+            yield ("requirements", number, "metric"), text

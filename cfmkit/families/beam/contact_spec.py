@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
@@ -20,7 +20,7 @@ from cfmkit.elastica.model.contact import (
     line,
     polyline,
 )
-from cfmkit.specs.spec import Model, PositiveLength, Requirement
+from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, format_short
 
 Point = tuple[Length, Length]
@@ -370,16 +370,3 @@ def column_names(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], 
     for name, obstacle in mechanism.obstacles.items():
         for toucher in (*pads_of(mechanism, obstacle), *sides_of(mechanism, obstacle)):
             yield ("obstacles", name, obstacle.kind), f"{name}_{toucher}_force"
-
-
-def contact_requirement_faults(mechanism: Mechanism, requirements: Sequence[Requirement]) -> Iterator[Fault]:
-    """Yield requirements on the force of a contact that a mechanism does not have."""
-    names = [*mechanism.stops, *mechanism.obstacles]
-    for number, requirement in enumerate(requirements):
-        plain, bracket, rest = requirement.metric.partition("[")
-        if plain in ("contact_force", "contact_force_ripple") and not (bracket and rest.removesuffix("]") in names):
-            listed = ", ".join(names) or "none"
-            yield (
-                ("requirements", number, "metric"),
-                f"{plain!r} needs the name of a stop or an obstacle in brackets; there are: {listed}",
-            )

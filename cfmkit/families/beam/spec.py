@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.families.beam.contact_spec import contact_requirement_faults
 from cfmkit.families.beam.mechanism_spec import Mechanism
 from cfmkit.families.beam.network_elements_spec import BeamMaterial, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
+from cfmkit.families.end_stops_spec import contact_requirement_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula_of_x import formula
@@ -375,7 +375,8 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
 
 def _contact_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Yield what cannot be done with stops and obstacles, and requirements on those that are not there."""
-    yield from contact_requirement_faults(spec.mechanism, spec.requirements)
+    contacts = (*spec.mechanism.stops, *spec.mechanism.obstacles)
+    yield from contact_requirement_faults(contacts, "a stop or an obstacle", spec.requirements)
     if not (spec.mechanism.stops or spec.mechanism.obstacles):
         return
     if spec.analysis.modes:
