@@ -14,8 +14,8 @@ from cfmkit.elastica import (
     gradient,
     trace,
 )
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.equations import NumpyEquations, SolvedStates
-from cfmkit.elastica.mechanics.march import CompiledEquations
 from cfmkit.errors import InputError
 
 FINE = Control(tolerance=1e-11)

@@ -39,15 +39,13 @@ from cfmkit.elastica import (
 )
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, raise_designs, set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
 from cfmkit.elastica.mechanics.march import (
-    WITHOUT_C_VARIABLE,
-    CompiledEquations,
     engine,
     equations,
-    load_compiled,
     march_many,
     solve_designs,
 )
@@ -99,20 +97,20 @@ def test_stops_and_pads_of_c_and_numpy_are_equal_on_random_layouts(ramp: bool) -
     """Open and closed as their forces say, which are of either sign here; by random numbers far from equilibrium."""
     for seed in range(40):
         network = discretise(*with_pads(seed), 6)
-        own = equations(network, ramp)
-        assert isinstance(own, CompiledEquations)
+        compiled = equations(network, ramp)
+        assert isinstance(compiled, CompiledEquations)
         right = ContactEquations(network, ramp, plain=equations(open_all_contacts(network), ramp))
         free = random_state(network, seed)[network.free]
         free[-len(network.contacts) :] *= 10
-        found, known = own.linearise(free, 0.4), right.linearise(free, 0.4)
-        assert found.residual == pytest.approx(known.residual, abs=1e-12 * np.abs(known.residual).max())
-        assert found.tangent == pytest.approx(known.tangent, abs=1e-12 * np.abs(known.tangent).max())
-        assert found.change == pytest.approx(known.change, abs=1e-12)
-        z = own.values(free, 0.4)
-        for mine, its in zip(own.evaluate(z, 0.3, 0.7), right.evaluate(z, 0.3, 0.7), strict=True):
+        in_c, in_numpy = compiled.linearise(free, 0.4), right.linearise(free, 0.4)
+        assert in_c.residual == pytest.approx(in_numpy.residual, abs=1e-12 * np.abs(in_numpy.residual).max())
+        assert in_c.tangent == pytest.approx(in_numpy.tangent, abs=1e-12 * np.abs(in_numpy.tangent).max())
+        assert in_c.change == pytest.approx(in_numpy.change, abs=1e-12)
+        z = compiled.values(free, 0.4)
+        for mine, its in zip(compiled.evaluate(z, 0.3, 0.7), right.evaluate(z, 0.3, 0.7), strict=True):
             assert difference(mine, its) < 1e-12
-        if np.linalg.cond(known.tangent) < 1e12:  # else two rigid floors press on one pad
-            assert own.resolve(free, 0.4, np.ones((1, own.n)))[1] == right.count_unstable(known)
+        if np.linalg.cond(in_numpy.tangent) < 1e12:  # else two rigid floors press on one pad
+            assert compiled.resolve(free, 0.4, np.ones((1, compiled.n)))[1] == right.count_unstable(in_numpy)
 
 
 @needs_c

@@ -25,8 +25,9 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.mechanics.march import CompiledEquations, equations
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 X = np.array([0.3, 0.02, 2e9, 0.35, 0.9])  # thickness [mm], width [m], modulus [Pa], Poisson's ratio, curvature

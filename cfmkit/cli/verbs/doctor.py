@@ -107,7 +107,8 @@ def _locks() -> Record:
 
 def _solver() -> Record:
     """Return what the beam engine runs on: "C" or "numpy"."""
-    from cfmkit.elastica.mechanics.march import WITHOUT_C_VARIABLE, engine
+    from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE
+    from cfmkit.elastica.mechanics.march import engine
 
     return {"engine": engine(), "switched_off": WITHOUT_C_VARIABLE in os.environ}
 

@@ -114,7 +114,7 @@ class PieceOfPath:
     def carry(self, at: PathEquilibrium, beyond: PieceOfPath) -> PathEquilibrium:
         """Return an equilibrium in the unknowns of another piece, but for forces and places of sides."""
         z, old, new = self.whole.values(at.x, at.drive), self.whole.mesh, beyond.whole.mesh
-        moved = carry(old, z, LoadStage.from_problem(self.whole, np.array([at.drive])), new)
+        moved = carry(old, z[None], LoadStage.from_problem(self.whole, np.array([at.drive])), new)[0]
         kept = {(contact.number, k): contact for k, contact in self._enumerate_contacts(old)}
         for k, contact in self._enumerate_contacts(new):
             same = kept.get((contact.number, k))

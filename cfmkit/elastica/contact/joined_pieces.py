@@ -64,13 +64,13 @@ def join_pieces(
     for piece, sequence in zip(pieces, sequences, strict=True):
         used = _match_slots(sequence, slots)
         before = [contact for contact in piece.mesh.contacts if contact.slide >= 0]
-        for z, drive in zip(piece.z, piece.drive.tolist(), strict=True):
-            joined = carry(piece.mesh, z, LoadStage(np.array([drive])), mesh, places[count])
-            for contact, slot in zip(before, used, strict=True):
-                joined[sides[slot].unknown] = max(float(z[contact.unknown]), 0.0)
-                joined[sides[slot].flag] = contact.laid
-            states[count] = joined
-            count += 1
+        rows = slice(count, count + len(piece.drive))
+        joined = carry(piece.mesh, piece.z, LoadStage(piece.drive), mesh, places[rows])
+        for contact, slot in zip(before, used, strict=True):
+            joined[:, sides[slot].unknown] = np.maximum(piece.z[:, contact.unknown], 0.0)
+            joined[:, sides[slot].flag] = contact.laid
+        states[rows] = joined
+        count += len(piece.drive)
     return mesh, _correct_states(mesh, states, np.concatenate([piece.drive for piece in pieces]))
 
 

@@ -11,7 +11,10 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
+from cfmkit.elastica.mechanics.contact_arrays import edge_rows
+from cfmkit.elastica.mechanics.equations import BeamSide
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.section import Taper
@@ -53,6 +56,12 @@ class LoadStage(NamedTuple):
     def from_problem(cls, problem: NetworkProblem, ways: FloatArray) -> LoadStage:
         """Return the stage at places of the way of a problem, (n,)."""
         return cls(np.zeros(len(ways)), ways[:, None, None]) if problem.ramp else cls(ways)
+
+    def rows(self) -> FloatArray:
+        """Return drive and share of each state, (n, 2)."""
+        rows = np.empty((len(self.drive), 2))
+        rows[:, 0], rows[:, 1] = self.drive, np.ravel(self.share)
+        return rows
 
     def take(self, some: Any) -> LoadStage:
         """Return the stage of some of the states."""
@@ -113,6 +122,20 @@ def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
     return _RowsAtPlaces(shapes, primitives @ series / 2, polynomials[:, :count] @ series)
 
 
+@lru_cache(maxsize=64)
+def _packed_tables(degree: int) -> FloatArray:
+    """Return places along an element, Gauss weights and the matrices at these places, in one row."""
+    fractions = _even_angles()
+    at, rule = _rows_at(degree, fractions), basis(degree)
+    parts = fractions, rule.weights, at.values, at.integrals, at.interpolation, _series_matrix(degree)
+    return read_only(np.concatenate([np.ravel(part) for part in parts]))
+
+
+def _even_angles() -> FloatArray:
+    """Return the places of an element at which gaps are measured."""
+    return np.asarray(0.5 * (1 - np.cos(np.pi * np.arange(N_ALONG) / (N_ALONG - 1))))
+
+
 class LeastGap(NamedTuple):
     """The least gap of the side of a beam."""
 
@@ -137,7 +160,7 @@ class SideGaps:
     @cached_property
     def fractions(self) -> FloatArray:
         """Places of an element at which gaps are measured."""
-        return 0.5 * (1 - np.cos(np.pi * np.arange(N_ALONG) / (N_ALONG - 1)))
+        return _even_angles()
 
     @cached_property
     def slack(self) -> FloatArray:
@@ -178,6 +201,9 @@ class SideGaps:
 
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
+        result = self._search(z[None], stage)
+        if result is not None:
+            return bool(result[0, 4] < PARALLEL_GAP)
         return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
 
     def least(self, z: FloatArray, stage: LoadStage) -> FloatArray:
@@ -185,6 +211,9 @@ class SideGaps:
 
         It is exact where it is below `NEAR_GAP`, and above it otherwise.
         """
+        result = self._search(z, stage)
+        if result is not None:
+            return result[:, 0]
         gap, rows, _ = self._dips(z, stage)
         values = (gap + self.slack[:, None]).min(axis=(1, 2))
         for state, row, value in zip(rows.state, rows.row, self._refine(z, stage, rows)[0], strict=True):
@@ -193,6 +222,10 @@ class SideGaps:
 
     def find_least(self, z: FloatArray, stage: LoadStage) -> LeastGap:
         """Return the least gap of one state (size,) exactly: where the side is parallel to the obstacle."""
+        result = self._search(z[None], stage)
+        if result is not None:
+            low, high = cuts_at(self.mesh, z)[self.elements[int(result[0, 2])]]
+            return LeastGap(float(result[0, 1]), float(low + (high - low) * result[0, 3]))
         gap, rows, seen = self._dips(z[None], stage)
         slack = self.slack[:, None]
         row, place = np.unravel_index(int((gap[0] + slack).argmin()), gap[0].shape)
@@ -207,6 +240,23 @@ class SideGaps:
                 )
                 best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
         return least
+
+    def _search(self, z: FloatArray, stage: LoadStage) -> FloatArray | None:
+        """Return what compiled code finds in n states, (n, 5); None without it, or if the thickness varies."""
+        if self._side is None or not len(z):
+            return None
+        return equations(self.mesh).search_side(z, stage.rows(), self._side)
+
+    @cached_property
+    def _side(self) -> BeamSide | None:
+        """The side as compiled code takes it."""
+        mesh, edge = self.mesh, self.item.outline
+        if isinstance(mesh.fits.network.beams[self.item.beam].section.thickness, Taper):
+            return None
+        half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
+        counts = len(edge.length), len(edge.radius), float(edge.closed), N_ALONG
+        numbers = np.array([half, mesh.scales.length, *counts], float)
+        return BeamSide(self.elements, self.slack, edge_rows(edge), numbers, _packed_tables(mesh.degree))
 
     def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
@@ -314,77 +364,87 @@ def least_side_gaps(mesh: Discretisation, item: BeamOnObstacle, z: FloatArray, d
 def carry(
     old: Discretisation, z: FloatArray, stage: LoadStage, new: Discretisation, places: FloatArray | None = None
 ) -> FloatArray:
-    """Return a state (size,) of a network on other elements of the same degree: fields are evaluated anew.
+    """Return states (n, size) of a network on other elements of the same degree: fields are evaluated anew.
 
-    Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (k,) are those of the
+    Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (n, k) are those of the
     contacts of sides of the new elements, if they are not those that these were made for.
     """
-    values = np.zeros(new.size, z.dtype)
+    values = np.zeros((len(z), new.size), z.dtype)
     for name, place in new.nodes.items():
-        values[new.attachments.unknowns[place]] = z[old.attachments.unknowns[old.nodes[name]]]
-    moved = with_places(old, z).elements
-    cuts = moved.cuts if moved.moved_cuts is None else moved.moved_cuts
-    fresh = new.elements.cuts
+        values[:, new.attachments.unknowns[place]] = z[:, old.attachments.unknowns[old.nodes[name]]]
+    cuts = cuts_at(old, z)
+    fresh = np.broadcast_to(new.elements.cuts, (len(z), *new.elements.cuts.shape))
     if places is not None and new.moving is not None:
         fresh = fresh.copy()
-        fresh[new.moving.elements] = new.moving.fixed + new.moving.shares @ places
-    rule, columns = basis(new.degree), energy.rotation_columns(new.degree)
-    bubbles = np.linalg.pinv(rule.values[:, 2:])
+        fresh[:, new.moving.elements] = new.moving.fixed + np.einsum("rck,nk->nrc", new.moving.shares, places)
+    rule, columns, bubbles = basis(new.degree), energy.rotation_columns(new.degree), _bubble_matrix(new.degree)
     for beam in new.fits:
         before = np.array([k for k, name in enumerate(old.elements.beam) if name == beam])
         after = np.array([k for k, name in enumerate(new.elements.beam) if name == beam])
         for k, side in ((0, 0), (-1, 1)):
             ends = old.elements.ends[before[k], side], new.elements.ends[after[k], side]
-            values[new.attachments.unknowns[ends[1]]] = z[old.attachments.unknowns[ends[0]]]
-        if len(before) == len(after) and np.array_equal(cuts[before], fresh[after]):
-            indices = new.elements.unknowns[after]
-            values[indices[:, 8:]] = z[old.elements.unknowns[before, 8:]]
-            for k in after[:-1].tolist():
-                old_place = old.attachments.unknowns[old.elements.ends[before[0] + k - after[0], 1]]
-                new_place = new.attachments.unknowns[new.elements.ends[k, 1]]
-                values[new_place] = z[old_place]
-                values[new_place[:2]] += _origin(old, int(old.elements.ends[before[0] + k - after[0], 1])) - _origin(
-                    new, int(new.elements.ends[k, 1])
-                )
+            values[:, new.attachments.unknowns[ends[1]]] = z[:, old.attachments.unknowns[ends[0]]]
+        rows, joints = new.elements.unknowns[after], new.elements.ends[after[:-1], 1]
+        bodies = new.attachments.unknowns[joints]
+        if len(before) == len(after) and np.array_equal(cuts[:, before], fresh[:, after]):
+            values[:, rows[:, 8:]] = z[:, old.elements.unknowns[before, 8:]]
+            last = old.elements.ends[before[:-1], 1]
+            values[:, bodies] = z[:, old.attachments.unknowns[last]]
+            values[:, bodies[:, :2]] += _origins(old, last) - _origins(new, joints)
             continue
-        for k in after.tolist():
-            left, right = fresh[k]
-            at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
-            place, turn, force = _sample(old, z, stage, before, cuts, at)
-            end = int(new.elements.ends[k, 1])
-            if k != after[-1]:
-                x, y, body, _ = new.attachments.unknowns[end]
-                values[[x, y]], values[body] = place[-1] - _origin(new, end), turn[-1]
-            indices = new.elements.unknowns[k]
-            rest = turn[:-2] - turn[-2] * rule.values[:, 0] - turn[-1] * rule.values[:, 1]
-            values[indices[columns[2:]]] = bubbles @ rest
-            values[indices[-2:]] = force[-1]
+        left, right = fresh[:, after, :1], fresh[:, after, 1:]
+        at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
+        place, turn, force = _sample(old, z, stage, before, cuts[:, before], at)
+        values[:, bodies[:, :2]] = place[:, :-1] - _origins(new, joints)
+        values[:, bodies[:, 2]] = turn[:, :-1, -1]
+        rest = turn[..., :-2] - turn[..., -2:-1] * rule.values[:, 0] - turn[..., -1:] * rule.values[:, 1]
+        values[:, rows[:, columns[2:]]] = rest @ bubbles.T
+        values[:, rows[:, -2:]] = force
     number_of = {contact.number: contact.own_unknowns for contact in old.contacts if contact.slide < 0}
     for contact in new.contacts:
         if contact.slide < 0:
-            values[list(contact.own_unknowns)] = z[list(number_of[contact.number])]
+            values[:, list(contact.own_unknowns)] = z[:, list(number_of[contact.number])]
         else:
-            values[contact.slide], values[contact.flag] = fresh[contact.element, 1], contact.laid
+            values[:, contact.slide], values[:, contact.flag] = fresh[:, contact.element, 1], contact.laid
     return values
 
 
-def _origin(mesh: Discretisation, place: int) -> FloatArray:
-    return np.asarray(mesh.attachments.origin[place] + mesh.attachments.arm[place])
+@lru_cache(maxsize=64)
+def _bubble_matrix(degree: int) -> FloatArray:
+    """Return the matrix from rotations at the Gauss points, those of both ends taken off, to bubbles."""
+    return read_only(np.linalg.pinv(basis(degree).values[:, 2:]))
+
+
+def _origins(mesh: Discretisation, places: Any) -> FloatArray:
+    return np.asarray(mesh.attachments.origin[places] + mesh.attachments.arm[places])
 
 
 def _sample(
     mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, cuts: FloatArray, at: FloatArray
 ) -> tuple[Any, Any, Any]:
-    """Return place, rotation and section force of a beam at parameters, (m, 2), (m,), (m, 2)."""
-    place, turn, force = np.empty((len(at), 2)), np.empty(len(at)), np.empty((len(at), 2))
-    ends = cuts[elements, 1]
-    home = np.minimum(np.searchsorted(ends, at, side="left"), len(elements) - 1)
-    for k in np.unique(home).tolist():
-        number, indices = int(elements[k]), home == k
-        left, right = cuts[number]
-        fractions = np.clip((at[indices] - left) / (right - left), 0.0, 1.0)
-        seen = side_states(mesh, z[None], stage, np.array([number]), fractions)
-        place[indices], turn[indices] = seen.place[0, 0], seen.turn[0, 0]
-        load = energy.line_load(mesh, *stage)[0, number]
-        force[indices] = z[mesh.elements.unknowns[number, -2:]] + load * seen.ahead[0, 0][:, None]
-    return place, turn, force
+    """Return where m parts of a beam end in n states, (n, m, 2), rotations at parameters (n, m, k), and end forces."""
+    count = len(z)
+    flat = at.reshape(count, -1)
+    home = np.minimum((flat[..., None] > cuts[:, None, :, 1]).sum(axis=-1), len(elements) - 1)
+    left, right = np.moveaxis(np.take_along_axis(cuts, home[..., None], axis=1), -1, 0)
+    fractions = np.clip((flat - left) / (right - left), 0.0, 1.0)
+    stages = stage.rows()
+    numbers = elements[home]
+    result = equations(mesh).locate(z, stages, np.stack([numbers, fractions], axis=-1), _series_matrix(mesh.degree))
+    if result is None:
+        result = np.array([_locate(mesh, z[k], stage.take([k]), numbers[k], fractions[k]) for k in range(count)])
+    result = result.reshape(*at.shape, 4)
+    last, states = numbers.reshape(at.shape)[..., -1], np.arange(count)[:, None]
+    load = energy.line_load(mesh, stages[:, 0], stages[:, 1, None, None])[states, last]
+    force = z[states[..., None], mesh.elements.unknowns[last, -2:]] + load * result[..., -1, 3:]
+    return result[..., -1, :2], result[..., 2], force
+
+
+def _locate(mesh: Discretisation, z: FloatArray, stage: LoadStage, numbers: Any, fractions: FloatArray) -> FloatArray:
+    """Return x, y, rotation, arc length to the end of the element, at places in one state, (k, 4)."""
+    result = np.empty((len(numbers), 4))
+    for number in np.unique(numbers).tolist():
+        rows = numbers == number
+        seen = side_states(mesh, z[None], stage, np.array([number]), fractions[rows])
+        result[rows, :2], result[rows, 2], result[rows, 3] = seen.place[0, 0], seen.turn[0, 0], seen.ahead[0, 0]
+    return result

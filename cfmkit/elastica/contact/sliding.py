@@ -2,9 +2,9 @@
 
 A contact at the parameter S of a beam ends an element there. Its rows are the gap g = 0 and the tangency n . t = 0 of
 the beam to the obstacle (beside a slope of the thickness: n . t = dr/ds). The change of all residuals with S, at held
-coefficients of the rotation, is a difference: of elements that are polynomials it has ten digits, and Newton's method
-needs fewer. The matrix is not symmetric: the stationarity f n . t = 0, which would make it so, says nothing where a
-contact begins.
+coefficients of the rotation, is exact for beams of one thickness whose unloaded angle is a polynomial; else it is a
+difference of ten digits, of which Newton's method needs fewer. The matrix is not symmetric: the stationarity
+f n . t = 0, which would make it so, says nothing where a contact begins.
 
 The number of unstable directions comes from another, symmetric matrix, in which all places are held: with the force f
 of a contact and the curvature g'' of its gap along the beam, tangency is a constraint of the stiffness f / g''. So P is
@@ -14,16 +14,25 @@ taken at the least gap along the beam, not at a gap that follows a material poin
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
 from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, compute_moved_tables
+from cfmkit.elastica.mechanics.moving_elements import (
+    MOVED_TABLES,
+    PLACE_STEP,
+    compute_moved_tables,
+    with_own_tables,
+)
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -88,14 +97,8 @@ class SlidingEquations(NumpyEquations):
     @classmethod
     def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
-        e = mesh.elements
-        names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
-        if e.weight.ndim > 2:  # of several states: those of the first
-            first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
-            e = e._replace(**first, moved_cuts=None)
-        copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
-        own = replace(mesh, elements=e._replace(**copies))
-        return cls(own, ramp, plain=make(replace(open_all_contacts(own), moving=None), ramp))
+        mesh = with_own_tables(mesh)
+        return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
         """Return the equations with other values of the unknowns that are held, (size,)."""
@@ -231,6 +234,10 @@ class SlidingEquations(NumpyEquations):
         mesh, item = self.mesh, contact.item
         beam, fitted = mesh.fits.network.beams[item.beam], mesh.fits[item.beam]  # type: ignore[union-attr]
         inside, step, length = float(mesh.elements.cuts[contact.element].mean()), PLACE_STEP, mesh.scales.length
+        if is_plain(beam):
+            angle, turning = _value_and_slope(lambda t: fitted.angle(t, inside), parameter)
+            half, speed = 0.5 * float(beam.section.thickness_at(0.5, inside)) / length, fitted.length / length
+            return (angle, turning, speed), turning / speed, half, 0.0
         t = np.array([parameter - step, parameter, parameter + step])
         angle = np.real(fitted.angle(t, inside)) + 0.0 * t
         speed = float(np.real(fitted.speed(np.array([parameter]), inside) + np.zeros(1))[0]) / length
@@ -344,6 +351,8 @@ class SlidingEquations(NumpyEquations):
         self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]
     ) -> FloatArray:
         """Return the change of the residuals without contacts with one of the places."""
+        if self._is_plain and not laid:
+            return self._differentiate_plain(way, z, number)
         sides, unknown = [], self._sides[number].slide
         for step in (PLACE_STEP, -PLACE_STEP):
             beside = z.copy()
@@ -359,6 +368,27 @@ class SlidingEquations(NumpyEquations):
                 residual[slots[slots >= 0]] += rows[slots >= 0]
             sides.append(residual)
         return np.asarray((sides[0] - sides[1]) / (2 * PLACE_STEP))
+
+    @cached_property
+    def _is_plain(self) -> bool:
+        """True if all elements that move are of plain beams."""
+        beams = {self.mesh.elements.beam[number] for number in self.mesh.moving.elements}  # type: ignore[union-attr]
+        return all(is_plain(self.mesh.fits.network.beams[beam]) for beam in beams)
+
+    def _differentiate_plain(self, place: float, z: FloatArray, number: int) -> FloatArray:
+        """Return the same exactly: tables of plain beams may have complex ends."""
+        moving: Any = self.mesh.moving
+        places = z[moving.places] + 0j
+        places[number] += 1j * COMPLEX_STEP
+        tables = compute_moved_tables(self.mesh, places)
+        del tables["moved_cuts"]
+        mesh, changed = self.plain.mesh, dict[str, Any]()
+        for name, values in tables.items():
+            changed[name] = getattr(mesh.elements, name) + 0j
+            changed[name][moving.elements] = values
+        moved = replace(mesh, elements=mesh.elements._replace(**changed))
+        gradient = energy.gradient(moved, z[: mesh.size], *self.factors(place))
+        return np.asarray(gradient[mesh.free].imag / COMPLEX_STEP)
 
     def _frozen(
         self, tangent: FloatArray, rows: list[tuple[Any, FloatArray, float]], laid: list[LaidPart], z: FloatArray
@@ -440,4 +470,7 @@ class SlidingEquations(NumpyEquations):
         return total
 
 
-MOVED_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")
+def _value_and_slope(function: Callable[[complex], Any], at: float) -> tuple[float, float]:
+    """Return an analytic function and its derivative at a place."""
+    value = complex(function(at + 1j * COMPLEX_STEP))
+    return value.real, value.imag / COMPLEX_STEP

@@ -26,13 +26,23 @@ def are_compiled(mesh: Discretisation) -> bool:
     return kinds <= {Stop, NodeOnObstacle} and all(contact.rub < 0 for contact in mesh.contacts) and not follows
 
 
+def node_contacts(mesh: Discretisation) -> list[ContactAt]:
+    """Return the contacts of nodes."""
+    return [contact for contact in mesh.contacts if contact.slide < 0]
+
+
+def side_contacts(mesh: Discretisation) -> list[ContactAt]:
+    """Return the contacts of sides of beams."""
+    return [contact for contact in mesh.contacts if contact.slide >= 0]
+
+
 def contact_arrays(mesh: Discretisation) -> dict[str, Any]:
-    """Return the arrays of the contacts in a `Model`: (contacts, 8), (contacts, 6), (parts, 6)."""
+    """Return the arrays of the contacts of nodes in a `Model`: (contacts, 8), (contacts, 6), (parts, 6)."""
     rows: list[tuple[int, ...]] = []
     values: list[tuple[float, ...]] = []
     parts: list[FloatArray] = []
     first = 0
-    for contact in mesh.contacts:
+    for contact in node_contacts(mesh):
         kind, numbers = _describe(mesh, contact)
         edge = contact.item.outline if isinstance(contact.item, NodeOnObstacle) else None
         counts = (len(edge.length), len(edge.radius), int(edge.closed)) if edge else (0, 0, 0)
@@ -56,10 +66,11 @@ def edge_rows(edge: ObstacleEdge) -> FloatArray:
 
 
 def last_elements(mesh: Discretisation, leaves: Any) -> Any:
-    """Return the last element that holds each unknown, (size,), with forces of contacts as long as their nodes."""
+    """Return the last element that holds each unknown, (size,); forces and places of contacts as long as nodes."""
     kept = np.array(leaves)
     for contact in mesh.contacts:
-        kept[contact.unknown] = leaves[mesh.attachments.unknowns[contact.place]].max()
+        rows = [contact.unknown, contact.slide] if contact.slide >= 0 else [contact.unknown]
+        kept[rows] = leaves[mesh.attachments.unknowns[contact.place]].max()
     return kept
 
 

@@ -67,6 +67,16 @@ class MarchState(NamedTuple):
     target: int = -1  # number of the target it lies at, -1 if at none
 
 
+class BeamSide(NamedTuple):
+    """The side of a beam of one thickness, and an obstacle, as `gaps.c` takes them."""
+
+    elements: FloatArray  # (m,)
+    slack: FloatArray  # (m,) by how much each may lie in the obstacle
+    edge: FloatArray  # (parts, 6)
+    numbers: FloatArray  # half the thickness, unit of length [m], segments, arcs, whether it is closed, places
+    tables: FloatArray  # places and matrices, in one row
+
+
 class SolvedStates(NamedTuple):
     """Equilibria that Newton's method finds near k guesses."""
 
@@ -151,6 +161,14 @@ class NumpyEquations:
         """Return the gradient by all unknowns, (size,)."""
         drive, share = self.factors(place)
         return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
+
+    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide) -> FloatArray | None:
+        """Return what compiled code finds of the gaps of a side, (n, 5): see `CompiledEquations`; None without it."""
+        return None
+
+    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+        """Return what compiled code finds at places of elements, (n, k, 4): see `CompiledEquations`; None without."""
+        return None
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""

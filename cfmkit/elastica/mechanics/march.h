@@ -25,6 +25,7 @@ typedef struct {
     Int ramp;    /* the drive is the share of what is constant; the drive proper rests */
     Int follows; /* some load turns with its node: the tangent is unsymmetric */
     Int contacts, presses; /* of nodes; how many of their forces are free */
+    Int sides, moved, coefficients; /* contacts of sides of beams; elements that move with them; of their angles */
     const double *angle, *weight, *rigidity, *axial, *shear, *ahead; /* (e, q) */
     const double *length, *line, *gap, *bend; /* (e), (e, 2, 2), (e, 2), (e, triangle): int EI N_i' N_j' */
     const Int *unknowns, *ends;               /* (e, degree + 9), (e, 2) */
@@ -45,6 +46,13 @@ typedef struct {
     const Int *contact_at; /* (contacts, 8): kind, place, force, closed or -1, first part, segments, arcs, whether closed */
     const double *contact; /* (contacts, 6): gap or radius of a pad [m], sense, direction, compliance, unit of length [m] */
     const double *edge;    /* (parts, 6): segments, start, along, length; arcs, centre, radius, first, sweep, bulge [m] */
+    const Int *side_at;    /* (sides, 12): element that ends there, place, force, parameter, flag, closed or -1, first part,
+                            * nothing, row of the element among those that move, segments, arcs, whether the outline is closed */
+    const double *side;    /* (sides, 2): half the thickness, unit of length [m] */
+    const Int *moved_at;   /* (moved): elements */
+    const double *moved_fixed, *moved_shares; /* (moved, 2), (moved, 2, sides): their ends are fixed + shares . parameters */
+    const double *moved_law; /* (moved, 2 + coefficients): length and rigidity of the beam, its unloaded angle by the parameter */
+    const double *rule, *unit_bend; /* (2, q) Gauss points and weights; (triangle) int N_i' N_j' */
 } Model;
 
 /* Where on the way: both factors and their change with what is followed. */
@@ -75,6 +83,10 @@ typedef struct {
     Int negative;               /* pivots; of L U the parity of negative eigenvalues */
 } Factors;
 
+static inline Int local_shape(Int shape) { return shape < 2 ? 3 + 4 * shape : 6 + shape; } /* unknown of a shape function */
+static inline int is_dense(const Model *m) { return m->follows || m->sides; } /* an unsymmetric tangent */
+static inline double larger(double a, double b) { return a > b ? a : b; } /* fmax is a call */
+
 Stage stage(const Model *m, double way);
 Int terms(const Model *m);
 void term(const Model *m, Int number, const double *z, Stage at, int with_hessian, Term *out);
@@ -82,6 +94,18 @@ void term(const Model *m, Int number, const double *z, Stage at, int with_hessia
 Pose pose(const Model *m, const double *z, Int k);
 Distance outline_distance(const Outline *o, double x, double y);
 void contact_term(const Model *m, Int number, const double *z, Term *t);
+
+int sides_move(const Model *m, const double *z);
+int side_presses(const Model *m, Int number, const double *z);
+int side_term(const Model *m, Int number, const double *z, Term *t, double *frozen);
+void sides_columns(const Model *m, const double *z, Stage at, Term *t, Factors *f);
+int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number);
+
+int side_gaps(const Model *m, const double *z, const double *stages, Int n, double *elements, Int count,
+              const double *edge, const double *numbers, const double *packed, double *found);
+
+int side_places(const Model *m, const double *z, const double *stages, Int n, const double *places, Int count,
+                const double *weights, const double *series, double *found);
 
 int factors_open(Factors *f, Int n, int unsymmetric);
 void factors_close(Factors *f);
@@ -92,7 +116,32 @@ int factors_finish(Factors *f, int unsymmetric);
 void factors_solve_two(const Factors *f, int unsymmetric, double *x, double *y);
 void factors_solve(const Factors *f, int unsymmetric, double *x);
 
-typedef struct Work Work;
+#define SAME_EQUILIBRIUM 1e-7 /* motions that differ by less are one */
+
+enum { CONVERGED, DIVERGED, SINGULAR_OR_FAR };
+
+/* Memory of Newton's method. */
+typedef struct {
+    double *z, *gradient, *step, *slope, *change; /* (size), (size), (free) each */
+    Factors factors;
+    Factors symmetric; /* under loads that follow: of the symmetric part of the tangent; of sides: with places held */
+    int definite;      /* whether that part, forces condensed, is positive: then nothing diverges */
+    Int rows;          /* of contacts in the symmetric matrix of sides */
+    Term term;
+} Work;
+
+/* What Newton's method looks for, and what it found. */
+typedef struct {
+    const double *border; /* (n + 1): border . (x, way) = level instead of a given way; NULL if none */
+    double level;
+    const double *push;   /* (n): added force; NULL if none */
+    double tolerance;
+    int quick; /* accept when the next correction would be below the tolerance */
+} Goal;
+
+typedef struct { Int unstable, told; double effort; } Found; /* effort: gradient of what the drive moves */
+
+int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Found *found);
 Work *work_open(const Model *m);
 void work_close(Work *w);
 int evaluate(const Model *m, const double *z, const double *drive, double share, Int count, double *gradient, double *hessian);

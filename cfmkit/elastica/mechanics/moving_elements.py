@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
 
 
+MOVED_TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "rest", "curl", "hindrance")
 PLACE_STEP = 1e-6  # of a beam's parameter, by which is differentiated
 
 
@@ -32,7 +33,7 @@ def compute_moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
         tables = smooth_tables(section, fitted, mesh.scales, mesh.degree, cuts[..., rows, :], inside, wide)
         for name, values in tables.items():
             inner = values.shape[len(cuts.shape) - 1 :]
-            table = tables_by_name.setdefault(name, np.empty((*cuts.shape[:-1], *inner)))
+            table = tables_by_name.setdefault(name, np.empty((*cuts.shape[:-1], *inner), values.dtype))
             table[(..., rows, *(slice(None),) * len(inner))] = values
     floor = mesh.floor[moving.elements]
     if floor.any():
@@ -43,6 +44,28 @@ def compute_moved_tables(mesh: Discretisation, places: Any) -> dict[str, Any]:
 def with_places(mesh: Discretisation, z: Any) -> Discretisation:
     """Return the arrays with contacts at their places in states (..., size): tables of elements are (..., e, q)."""
     return mesh if mesh.moving is None else replace(mesh, elements=move_elements(mesh, z))
+
+
+def cuts_at(mesh: Discretisation, z: Any) -> Any:
+    """Return where all elements begin and end in states (..., size), (..., e, 2)."""
+    cuts = np.broadcast_to(mesh.elements.cuts, (*z.shape[:-1], *mesh.elements.cuts.shape)).copy()
+    if mesh.moving is not None:
+        moving = mesh.moving
+        cuts[..., moving.elements, :] = moving.fixed + np.einsum(
+            "rck,...k->...rc", moving.shares, z[..., moving.places]
+        )
+    return cuts
+
+
+def with_own_tables(mesh: Discretisation) -> Discretisation:
+    """Return the arrays with tables of the elements of their own, of several states those of the first."""
+    e = mesh.elements
+    names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
+    if e.weight.ndim > 2:
+        first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
+        e = e._replace(**first, moved_cuts=None)
+    copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
+    return replace(mesh, elements=e._replace(**copies))
 
 
 def move_elements(mesh: Discretisation, z: Any) -> BeamElements:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState
-from cfmkit.elastica.mechanics.march import CompiledEquations, equations
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.numerics.continuation.path import MarchedSteps

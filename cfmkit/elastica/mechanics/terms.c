@@ -130,8 +130,6 @@ static void gauss_points(const Model *m, Int e, const double *phi, const double 
     }
 }
 
-static Int local(Int shape) { return shape < 2 ? 3 + 4 * shape : 6 + shape; } /* unknown of an element's shape function */
-
 static void element_hessian(const Model *m, const Pose *ends, const double *first, const double *last,
                             const Sums *sum, Term *t) {
     const Int shapes = m->degree + 1, count = t->count, fx = count - 2, fy = count - 1;
@@ -139,9 +137,9 @@ static void element_hessian(const Model *m, const Pose *ends, const double *firs
     memset(h, 0, (size_t)(count * count) * sizeof(double));
     const double *row = sum->stiffness;
     for (Int i = 0; i < shapes; row += ++i) {
-        const Int a = local(i);
+        const Int a = local_shape(i);
         for (Int j = 0; j <= i; j++) {
-            const Int b = local(j);
+            const Int b = local_shape(j);
             h[a * count + b] = h[b * count + a] = row[j];
         }
         h[a * count + fx] = h[fx * count + a] = sum->by_x[i];
@@ -173,7 +171,7 @@ static void element(const Model *m, Int e, const double *z, Stage at, int with_h
     double phi[MAX_SHAPES];
     Sums sum;
     for (Int k = 0; k < shapes; k++) { /* not the whole of the arrays, which are long */
-        phi[k] = z[own[local(k)]];
+        phi[k] = z[own[local_shape(k)]];
         sum.rotation[k] = sum.change[k] = sum.by_x[k] = sum.by_y[k] = 0.0;
     }
     sum.reach[0] = sum.reach[1] = sum.reach_change[0] = sum.reach_change[1] = sum.xx = sum.yy = sum.xy = 0.0;
@@ -183,7 +181,7 @@ static void element(const Model *m, Int e, const double *z, Stage at, int with_h
     memcpy(t->at, own, (size_t)count * sizeof(Int));
     memset(t->gradient, 0, (size_t)count * sizeof(double));
     memset(t->change, 0, (size_t)count * sizeof(double));
-    for (Int k = 0; k < shapes; k++) { t->gradient[local(k)] = sum.rotation[k]; t->change[local(k)] = sum.change[k]; }
+    for (Int k = 0; k < shapes; k++) { t->gradient[local_shape(k)] = sum.rotation[k]; t->change[local_shape(k)] = sum.change[k]; }
     for (Int k = 0; k < 3; k++) {
         t->gradient[k] = -(first[0] * ends[0].by[0][k] + first[1] * ends[0].by[1][k]);
         t->gradient[4 + k] = last[0] * ends[1].by[0][k] + last[1] * ends[1].by[1][k];

@@ -1,0 +1,334 @@
+"""The equations of a network in compiled code, and the arrays that it takes.
+
+C takes a model as a row of 8-byte counts and addresses, so that an array of rows is many designs; what the addresses
+point to is kept with the row.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.compiled_sides import IN_PLACE, side_arrays
+from cfmkit.elastica.mechanics.contact_arrays import contact_arrays, last_elements, node_contacts, side_contacts
+from cfmkit.elastica.mechanics.discretise import BeamElements
+from cfmkit.elastica.mechanics.equations import (
+    FORCE_CHANGE,
+    BeamSide,
+    LinearEquations,
+    MarchCode,
+    MarchPlan,
+    MarchState,
+    NaturalMarch,
+    NumpyEquations,
+    SolvedStates,
+)
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.model.network import LineSpring, SlideSpring
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+
+WITHOUT_C_VARIABLE = "CFMKIT_WITHOUT_C"
+"""Environment variable that keeps everything in numpy, whatever its value."""
+
+COUNT_FIELDS = (
+    "elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows", "contacts", "presses",
+    "sides", "moved", "coefficients",
+)  # fmt: skip
+ADDRESS_FIELDS = (
+    "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
+    "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
+    "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
+    "contact_at", "contact", "edge", "side_at", "side", "moved_at", "moved_fixed", "moved_shares", "moved_law", "rule",
+    "unit_bend",
+)  # fmt: skip
+"""Fields of `Model` in march.h, in its order."""
+OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESS_FIELDS)
+WHOLE_NUMBERS = frozenset(
+    ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at", "contact_at", "side_at", "moved_at")
+)
+
+
+@cache
+def _module() -> Any:
+    try:
+        from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
+    except ImportError:
+        return None
+    return _march
+
+
+def load_compiled() -> Any:
+    """Return the compiled module, None if it was not built, or is switched off by `WITHOUT_C_VARIABLE`."""
+    return None if WITHOUT_C_VARIABLE in os.environ else _module()
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledEquations(NumpyEquations):
+    """The same equations in compiled code."""
+
+    arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
+    row: Any = field(init=False)  # counts and addresses
+    code: Any = field(init=False, default_factory=_module)  # the compiled module
+
+    def __post_init__(self) -> None:
+        """Collect the arrays."""
+        super().__post_init__()
+        arrays = model_arrays(self)
+        counts = model_counts(self.mesh, self.ramp)
+        row = np.array([*counts.values(), *(0 for _ in ADDRESS_FIELDS)], np.int64)
+        self.code.place(row, len(COUNT_FIELDS), tuple(arrays.get(name) for name in ADDRESS_FIELDS))
+        object.__setattr__(self, "arrays", arrays)
+        object.__setattr__(self, "row", row)
+
+    def stiffen(self, mesh: Discretisation) -> CompiledEquations:
+        """Return the equations of the same network with another flexibility along its beams."""
+        return self._exchange(mesh, "axial", mesh.elements.axial)
+
+    def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
+        """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
+        super().refill(elements, tables)
+        for name, values in tables.items():
+            self.arrays[name][elements] = values
+        self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
+
+    def rebase(self, base: FloatArray) -> CompiledEquations:
+        """Return the equations with other values of the unknowns that are held, (size,)."""
+        return self._exchange(replace(self.mesh, base=base), "base", base)
+
+    def _exchange(self, mesh: Discretisation, name: str, values: FloatArray) -> CompiledEquations:
+        """Return the equations of a mesh that differs in one array."""
+        exchanged, array = copy(self), np.ascontiguousarray(values, float)
+        object.__setattr__(exchanged, "mesh", mesh)
+        object.__setattr__(exchanged, "arrays", {**self.arrays, name: array})
+        object.__setattr__(exchanged, "row", self.row.copy())
+        self.code.place(exchanged.row, len(COUNT_FIELDS) + ADDRESS_FIELDS.index(name), (array,))
+        return exchanged
+
+    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
+        gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
+        self.code.evaluate(self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share)
+        return gradient, hessian
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size)."""
+        gradients = np.empty(z.shape)
+        inputs = np.ascontiguousarray(z, float), np.ascontiguousarray(drive, float)
+        self.code.evaluate(self.row, *inputs, gradients, np.empty(0), 1.0)
+        return gradients
+
+    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide) -> FloatArray | None:
+        """Return the least gaps of a side in n states, (n, 5); None if an element vanishes in one.
+
+        Least gap with its slack, the gap, the row of its element, the place on it, and the range of all gaps seen.
+        """
+        result = np.empty((len(z), 5))
+        elements = np.column_stack([side.elements, side.slack, side.slack]).astype(float)
+        inputs = np.ascontiguousarray(z, float), np.ascontiguousarray(stages, float), elements
+        good = self.code.side_gaps(self.row, *inputs, side.edge, side.numbers, side.tables, result)
+        return result if good else None
+
+    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+        """Return place and rotation from rest in n states at places (n, k, 2); None if an element vanishes.
+
+        (n, k, 4): x, y, rotation, arc length from there to the end of the element.
+        A place is the number of an element and a fraction of it; `series` (q, q) takes values at Gauss points to
+        coefficients of Legendre polynomials.
+        """
+        result, weights = np.empty((*places.shape[:2], 4)), basis(self.mesh.degree).weights
+        inputs = (np.ascontiguousarray(array, float) for array in (z, stages, places))
+        return result if self.code.side_places(self.row, *inputs, weights, series, result) else None
+
+    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
+        """Return the equations linearised at some unknowns."""
+        out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
+        self.code.linearise(self.row, np.ascontiguousarray(free, float), *out, place)
+        return out
+
+    def resolve(self, free: FloatArray, place: float, right: FloatArray) -> tuple[FloatArray, int]:
+        """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the tangent is singular.
+        """
+        solutions, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
+        if self.code.resolve(self.row, np.ascontiguousarray(free, float), solutions, count, place):
+            raise np.linalg.LinAlgError("the tangent is singular")
+        return solutions, self._unstable(free, place, int(count[0]))
+
+    def _unstable(self, free: FloatArray, place: float, told: int) -> int:
+        """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
+        return told if told >= 0 else self.count_unstable(self.linearise(free, place))
+
+    def solve(
+        self,
+        free: FloatArray,
+        way: float,
+        border: FloatArray | None = None,
+        level: float = 0.0,
+        push: FloatArray | None = None,
+        tolerance: float = 1e-10,
+        quick: bool = False,
+    ) -> MarchState | None:
+        """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
+        x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
+        nothing = np.empty(0)
+        inputs = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
+        if self.code.solve(self.row, x, at, *inputs, rate, outcome, level, tolerance, quick):
+            return None
+        way = float(at[0])
+        return MarchState(x, way, rate, self._unstable(x, way, int(outcome[0])), float(outcome[1]))
+
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses."""
+        x, ways = np.array(free, float, order="C"), np.array(way, float)
+        rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
+        if self.code.solve_many(self.row, x, ways, rate, outcomes, tolerance, quick):
+            raise MemoryError
+        converged, unstable = outcomes[:, 0] == 0, outcomes[:, 1].astype(np.int64)
+        for k in np.flatnonzero(converged & (unstable < 0)):
+            unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
+        return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
+
+    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+        """Return flexibility and shape of the softest mode."""
+        shape = np.array(vector, float)
+        return self.code.soften(self.row, np.ascontiguousarray(free, float), shape, place, rounds), shape
+
+    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+        """Return the states on the way to targets, as far as nothing happens."""
+        n, goals = self.n, np.ascontiguousarray(targets, float)
+        rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
+        parity = start.unstable % 2 if self.follows else start.unstable
+        plan_row = plan_row_of(plan, parity, False)
+        before = plan.before
+        previous_row = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
+        start_row = np.concatenate([start.free, start.rate, [start.way]])
+        code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored)
+        rows = rows[: stored[0]].copy()
+        places, effort, told, target = rows[:, 2 * n :].T.tolist()
+        given_states = zip(
+            rows[:, :n], places, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True
+        )
+        states = tuple(itertools.starmap(MarchState, given_states))
+        march = NaturalMarch(states, MarchCode(code), float(plan_row[0]))
+        return self._cut_at_stability_change(march, start.unstable) if self.follows else march
+
+    def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
+        """Return a march with its unstable directions counted, as far as their number stays the same."""
+        states: list[MarchState] = []
+        for state in march.states:
+            if self._unstable(state.free, state.way, state.unstable) != unstable:
+                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
+            states.append(state._replace(unstable=unstable))
+        return replace(march, states=tuple(states))
+
+
+def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
+    """Return a `Plan` of march.h."""
+    return np.array(
+        [plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, plan.on_branch, start], float
+    )
+
+
+def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
+    """Return the counts of a `Model`."""
+    elements, points = mesh.elements.weight.shape
+    follows = any(load.item.follows for load in mesh.loads)
+    nodes, sides = node_contacts(mesh), side_contacts(mesh)
+    presses = int(np.isin([contact.unknown for contact in nodes], mesh.free).sum())
+    values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
+    more = (len(mesh.loads), int(ramp), int(follows), len(nodes), presses, len(sides))
+    moved = (len(mesh.moving.elements), mesh.fits.bundle.coefficients.shape[-1]) if mesh.moving is not None else (0, 0)
+    return dict(zip(COUNT_FIELDS, (*values, *more, *moved), strict=True))
+
+
+def model_arrays(of: NumpyEquations) -> dict[str, Any]:
+    """Return the arrays of a `Model` in C order."""
+    mesh = of.mesh
+    e, a = mesh.elements, mesh.attachments
+    slot = np.full(mesh.size, -1, np.int64)
+    slot[mesh.free] = np.arange(len(mesh.free))
+    bend = (e.weight * e.rigidity) @ slope_products(mesh.degree)
+    springs, loads = [spring_row(mesh, s) for s in mesh.springs], [load_row(mesh, load) for load in mesh.loads]
+    arrays: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
+    arrays |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
+    arrays |= _shape_tables(mesh.degree) | {"base": mesh.base, "rate": mesh.rate}
+    arrays |= {"bend": bend, "slot": slot, "leaves": _leaves(mesh), "unit": of.unit}
+    arrays |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
+    arrays |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
+    arrays |= contact_arrays(mesh) if mesh.contacts else {}
+    if mesh.moving is not None:
+        sides, parts = side_arrays(mesh, len(arrays["edge"]), slope_products(mesh.degree))
+        arrays |= sides | {"edge": np.concatenate([arrays["edge"], parts])}
+        arrays |= {name: np.array(arrays[name]) for name in IN_PLACE}  # which C changes
+    return {
+        name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
+        for name, values in arrays.items()
+        if values is not None
+    }
+
+
+@lru_cache(maxsize=64)
+def _shape_tables(degree: int) -> dict[str, Any]:
+    rule, (i, j) = basis(degree), np.tril_indices(degree + 1)
+    tables = {"values": rule.values, "slopes": rule.slopes, "values_by_shape": rule.values.T}
+    tables |= {"slopes_by_shape": rule.slopes.T, "products": rule.values[:, i] * rule.values[:, j]}
+    return {name: np.ascontiguousarray(table) for name, table in tables.items()}
+
+
+@lru_cache(maxsize=64)
+def slope_products(degree: int) -> FloatArray:
+    """Return the products of the slopes of two shape functions at the Gauss points, (q, triangle), by rows of it."""
+    slopes, (i, j) = basis(degree).slopes, np.tril_indices(degree + 1)
+    return read_only(slopes[:, i] * slopes[:, j])
+
+
+def _leaves(mesh: Discretisation) -> Any:
+    """Return the last element that holds each free unknown, -1 if none does."""
+    last, unknowns = np.full(mesh.size, -1, np.int64), mesh.elements.unknowns
+    last[unknowns.ravel()] = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])  # of several values the last stays
+    return (last_elements(mesh, last) if mesh.contacts else last)[mesh.free]
+
+
+def spring_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+    """Return kind and places of a spring, and its stiffness and what else it needs."""
+    item, scales, attachments = attached.item, mesh.scales, mesh.attachments
+    rest = attachments.origin[list(attached.places)] + attachments.arm[list(attached.places)]
+    stiffness = item.stiffness * scales.length / scales.force
+    if isinstance(item, SlideSpring):
+        free = item.free_displacement / scales.length
+        values = (stiffness, free, np.cos(item.direction), np.sin(item.direction), *rest[0])
+        return (1, attached.places[0], -1), values
+    if isinstance(item, LineSpring):
+        ground = np.array(item.ground) / scales.length
+        length = float(np.hypot(*((rest[1] if item.end else ground) - rest[0])))
+        free = length if item.free_length is None else item.free_length / scales.length
+        end = attached.places[1] if item.end else -1
+        return (0, attached.places[0], end), (stiffness, length, free - length, *ground, 0.0)
+    start, end = attached.places if item.start is not None else (-1, attached.places[0])
+    return (2, start, end), (item.stiffness / scales.moment, item.free_angle, 0.0, 0.0, 0.0, 0.0)
+
+
+def load_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+    """Return place of a load, whether it grows and follows, and force and moment."""
+    item, scales = attached.item, mesh.scales
+    unit = scales.drive if attached.grows else 1.0
+    values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
+    return (attached.places[0], int(attached.grows), int(item.follows)), values

@@ -1,0 +1,224 @@
+/* Least gaps of the side of a beam of one thickness to an obstacle, in many states.
+ *
+ * The method is that of `SideGaps` in contact/side_gaps.py: gaps and their slopes at places along each element, then the
+ * place where the slope is zero wherever a least gap may be small; a test holds both equal. */
+#include <math.h>
+#include <string.h>
+
+#include "march.h"
+
+#define MAX_ALONG 64
+#define NEAR_GAP 1e-3        /* within which the least gap is found exactly */
+#define SLOPE_LEVEL 1e-9     /* of the gap where it is least: its square is the error */
+#define GAP_RESOLUTION 1e-13
+#define N_ROUNDS 20
+#define WIDEST 0.1              /* share of an element between two places, and some more */
+
+/* Places along an element, and matrices from an element's unknowns and values at its Gauss points to these places. */
+typedef struct {
+    Int along;
+    const double *fractions, *weights, *values, *integrals, *interpolation; /* (along), (q), (along, shapes), (along, q) twice */
+    const double *series; /* (q, q): from values at Gauss points to Legendre coefficients */
+} GapTables;
+
+typedef struct {
+    const Model *m;
+    const GapTables *tables;
+    Outline outline;
+    double half, unit; /* half the thickness; unit of length [m] */
+} Search;
+
+/* A line of an element in one state: start, slopes at Gauss points and their series, angle at rest, rotation. */
+typedef struct {
+    double start[2], x[MAX_POINTS], y[MAX_POINTS], angle[MAX_POINTS], phi[MAX_SHAPES], speed[MAX_POINTS];
+    double series[4][MAX_POINTS];
+    int has_series;
+} Line;
+
+typedef struct { double gap, slope; } Beside;
+
+static void trace_line(const Search *s, Int e, const double *z, Stage at, Line *line) {
+    const Model *m = s->m;
+    const Int shapes = m->degree + 1, count = m->degree + 9, *own = m->unknowns + e * count;
+    const double *load = m->line + 4 * e, qx = at.share * load[0] + at.drive * load[2];
+    const double qy = at.share * load[1] + at.drive * load[3];
+    const Pose start = pose(m, z, m->ends[2 * e]);
+    memcpy(line->start, start.place, sizeof start.place);
+    for (Int k = 0; k < shapes; k++) line->phi[k] = z[own[local_shape(k)]];
+    for (Int q = 0, o = e * m->points; q < m->points; q++, o++) {
+        double turn = line->angle[q] = m->angle[o];
+        for (Int k = 0; k < shapes; k++) turn += line->phi[k] * m->values[q * shapes + k];
+        const double c = cos(turn), n = sin(turn);
+        const double nx = z[own[count - 2]] + qx * m->ahead[o], ny = z[own[count - 1]] + qy * m->ahead[o];
+        const double stretch = 1.0 + m->axial[o] * (nx * c + ny * n), slip = m->shear[o] * (ny * c - nx * n);
+        line->speed[q] = m->weight[o] / s->tables->weights[q];
+        line->x[q] = (stretch * c - slip * n) * line->speed[q];
+        line->y[q] = (stretch * n + slip * c) * line->speed[q];
+    }
+    line->has_series = 0;
+}
+
+static Beside beside(const Search *s, double x, double y, double angle) {
+    const Distance d = outline_distance(&s->outline, x * s->unit, y * s->unit);
+    const Beside b = {d.value / s->unit - s->half, d.normal[0] * cos(angle) + d.normal[1] * sin(angle)};
+    return b;
+}
+
+static Beside at_table_place(const Search *s, const Line *line, Int place) {
+    const Int q = s->m->points, shapes = s->m->degree + 1;
+    const double *upto = s->tables->integrals + place * q, *through = s->tables->interpolation + place * q;
+    const double *values = s->tables->values + place * shapes;
+    double x = 0.0, y = 0.0, angle = 0.0, turn = 0.0;
+    for (Int k = 0; k < q; k++) {
+        x += upto[k] * line->x[k];
+        y += upto[k] * line->y[k];
+        angle += through[k] * line->angle[k];
+    }
+    for (Int k = 0; k < shapes; k++) turn += values[k] * line->phi[k];
+    return beside(s, line->start[0] + x, line->start[1] + y, angle + turn);
+}
+
+static void find_series(const Search *s, Line *line) {
+    const Int q = s->m->points;
+    const double *given[4] = {line->x, line->y, line->angle, line->speed};
+    for (int i = 0; i < 4; i++)
+        for (Int k = 0; k < q; k++) {
+            line->series[i][k] = 0.0;
+            for (Int j = 0; j < q; j++) line->series[i][k] += s->tables->series[k * q + j] * given[i][j];
+        }
+    line->has_series = 1;
+}
+
+/* Place, rotation from rest and angle at rest at any place, by Legendre polynomials; return the arc length up to it. */
+static double locate(const Search *s, Line *line, double u, double *place, double *turn, double *angle) {
+    const Int q = s->m->points, degree = s->m->degree;
+    double p[MAX_POINTS + 1], upto = 0.0;
+    const double v = 2.0 * u - 1.0;
+    if (!line->has_series) find_series(s, line);
+    memcpy(place, line->start, sizeof line->start);
+    *angle = 0.0;
+    p[0] = 1.0;
+    p[1] = v;
+    for (Int k = 2; k <= q; k++) p[k] = (p[k - 1] * v * (double)(2 * k - 1) - p[k - 2] * (double)(k - 1)) / (double)k;
+    for (Int k = 0; k < q; k++) {
+        const double primitive = 0.5 * (k ? (p[k + 1] - p[k - 1]) / (double)(2 * k + 1) : v + 1.0);
+        place[0] += primitive * line->series[0][k];
+        place[1] += primitive * line->series[1][k];
+        *angle += p[k] * line->series[2][k];
+        upto += primitive * line->series[3][k];
+    }
+    *turn = line->phi[0] * (1.0 - v) / 2.0 + line->phi[1] * (1.0 + v) / 2.0;
+    for (Int k = 2; k <= degree; k++) *turn += line->phi[k] * (p[k] - p[k - 2]) / sqrt((double)(4 * k - 2));
+    return upto;
+}
+
+static Beside at_fraction(const Search *s, Line *line, double u) {
+    double place[2], turn, angle;
+    locate(s, line, u, place, &turn, &angle);
+    return beside(s, place[0], place[1], angle + turn);
+}
+
+/* Where the slope vanishes between two places (Illinois). */
+static Beside refine(const Search *s, Line *line, double a, double b, double low, double high, double *place) {
+    Beside here = {HUGE_VAL, 0.0};
+    for (int round = 0; round < N_ROUNDS; round++) {
+        *place = b - high * (b - a) / (high - low);
+        here = at_fraction(s, line, *place);
+        if (fabs(here.slope) < SLOPE_LEVEL) break;
+        if (here.slope < 0.0) { a = *place; low = here.slope; high *= 0.5; }
+        else { b = *place; high = here.slope; low *= 0.5; }
+    }
+    return here;
+}
+
+/* Look for lower gaps between places of an element where the slope changes its sign. */
+static void search_dips(const Search *s, Line *line, const Beside *seen, double limit, double slack, Int row, double *found) {
+    const GapTables *t = s->tables;
+    const Int q = s->m->points;
+    for (Int k = 0; k < t->along - 1; k++) {
+        const Beside *a = seen + k, *b = seen + k + 1;
+        double step = 0.0, place;
+        if (!(a->slope < 0.0 && b->slope > 0.0)) continue;
+        for (Int j = 0; j < q; j++) step += line->speed[j] * (t->integrals[(k + 1) * q + j] - t->integrals[k * q + j]);
+        const double low = a->slope * step, high = b->slope * step;
+        const double bound = a->gap + (b->gap - high - a->gap) / (low - high) * low; /* where both tangents meet */
+        if (!(bound + slack < limit)) continue;
+        const Beside lower = refine(s, line, t->fractions[k], t->fractions[k + 1], a->slope, b->slope, &place);
+        if (lower.gap + slack > found[0]) continue;
+        found[0] = lower.gap + slack;
+        found[1] = lower.gap;
+        found[2] = (double)row;
+        found[3] = place;
+    }
+}
+
+/* One state: least gap with its slack, the gap itself, the row of its element, the place on it, range of gaps seen. */
+static void search(const Search *s, double *elements, Int count, const double *z, Stage at, double *found) {
+    const GapTables *t = s->tables;
+    Beside seen[MAX_ALONG];
+    Line line;
+    double lowest = HUGE_VAL, highest = -HUGE_VAL;
+    found[0] = HUGE_VAL;
+    for (int pass = 0; pass < 2; pass++) { /* the least of all places first: only lower dips are looked at */
+        const double limit = fmin(found[0], NEAR_GAP) - GAP_RESOLUTION;
+        for (Int row = 0; row < count; row++) {
+            const Int e = (Int)elements[3 * row];
+            const double slack = elements[3 * row + 1];
+            double *nearest = elements + 3 * row + 2;
+            if (pass && *nearest + slack - WIDEST * s->m->length[e] > limit) continue;
+            trace_line(s, e, z, at, &line);
+            for (Int k = 0; k < t->along; k++) seen[k] = at_table_place(s, &line, k);
+            if (pass) { search_dips(s, &line, seen, limit, slack, row, found); continue; }
+            *nearest = HUGE_VAL;
+            for (Int k = 0; k < t->along; k++) {
+                *nearest = fmin(*nearest, seen[k].gap);
+                highest = fmax(highest, seen[k].gap);
+                if (seen[k].gap + slack >= found[0]) continue;
+                found[0] = seen[k].gap + slack;
+                found[1] = seen[k].gap;
+                found[2] = (double)row;
+                found[3] = t->fractions[k];
+            }
+            lowest = fmin(lowest, *nearest);
+        }
+    }
+    found[4] = highest - lowest;
+}
+
+/* Least gaps in states (n, size) at stages (n, 2), drive and share, of elements (count, 3): number, slack, and memory;
+ * found (n, 5). Return 0 if an element vanishes. */
+int side_gaps(const Model *m, const double *z, const double *stages, Int n, double *elements, Int count,
+              const double *edge, const double *numbers, const double *packed, double *found) {
+    const Int along = (Int)numbers[5], shapes = m->degree + 1, q = m->points;
+    const double *values = packed + along + q, *integrals = values + along * shapes;
+    const double *interpolation = integrals + along * q, *series = interpolation + along * q;
+    const GapTables t = {along, packed, packed + along, values, integrals, interpolation, series};
+    const Search s = {m, &t, {edge, (Int)numbers[2], (Int)numbers[3], (Int)numbers[4]}, numbers[0], numbers[1]};
+    if (along > MAX_ALONG) return 0;
+    for (Int k = 0; k < n; k++, z += m->size, found += 5) {
+        const Stage at = {stages[2 * k], stages[2 * k + 1], 0.0, 0.0};
+        if (m->sides && !sides_move(m, z)) return 0;
+        search(&s, elements, count, z, at, found);
+    }
+    return 1;
+}
+
+/* States of a network at places (n, count, 2), elements and fractions of them: place, rotation from rest and arc length
+ * to the end of the element, found (n, count, 4). Return 0 if an element vanishes. */
+int side_places(const Model *m, const double *z, const double *stages, Int n, const double *places, Int count,
+                const double *weights, const double *series, double *found) {
+    const GapTables t = {0, NULL, weights, NULL, NULL, NULL, series};
+    const Search s = {m, &t, {NULL, 0, 0, 0}, 0.0, 1.0};
+    Line line;
+    double angle;
+    for (Int k = 0; k < n; k++, z += m->size) {
+        const Stage at = {stages[2 * k], stages[2 * k + 1], 0.0, 0.0};
+        Int here = -1;
+        if (m->sides && !sides_move(m, z)) return 0;
+        for (Int j = 0; j < count; j++, places += 2, found += 4) {
+            if ((Int)places[0] != here) trace_line(&s, here = (Int)places[0], z, at, &line);
+            found[3] = m->length[here] - locate(&s, &line, places[1], found, found + 2, &angle);
+        }
+    }
+    return 1;
+}

@@ -1,0 +1,118 @@
+"""Sides of beams on obstacles in compiled code beside those in numpy: equations, gaps, states on other elements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from contact_layouts import THIN_SECTION, among_discs
+
+from cfmkit.elastica import (
+    CLAMPED_SUPPORT,
+    Beam,
+    Control,
+    LineLoad,
+    Loading,
+    Network,
+    Node,
+    PointLoad,
+    Polynomial,
+    trace,
+)
+from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, carry
+from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
+from cfmkit.elastica.mechanics.march import CompiledSides, equations
+from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
+
+pytestmark = pytest.mark.skipif(load_compiled() is None, reason="the compiled module was not built")
+OUTLINES = {
+    "disc": circle((0.4, -0.2), 0.1),
+    "roof": polyline([(-0.5, -1), (0.7, -0.2), (1.5, -1)], 0.05),
+    "hole": circle((0.0, 0.0), 1.4, hole=True),
+}
+SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
+SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True, shear=True)}
+
+
+def leaf(shape: str = "straight", section: str = "stiff") -> Network:
+    """Return a leaf under its weight, with a pad at its tip, that may touch three obstacles with its side."""
+    pad = NodeOnObstacle("floor", "tip", line((0, -0.2), 0.1), 0.005)
+    contacts = (pad, *(BeamOnObstacle(name, "leaf", edge) for name, edge in OUTLINES.items()))
+    nodes = {"root": Node(0.0, 0.0, CLAMPED_SUPPORT), "tip": Node(1.0, 0.0)}
+    beams = {"leaf": Beam("root", "tip", SECTIONS[section], SHAPES[shape])}
+    return Network(nodes, beams, loads=(LineLoad("leaf", 0.3, -0.8),), contacts=contacts)
+
+
+def touching(closed: bool | None, places: tuple[float, ...] = (0.35, 0.6, 0.8), **network: str) -> Discretisation:
+    """Return its arrays with places at which it touches each obstacle."""
+    load = Loading((PointLoad("tip", 0.0, -1.0),), np.array([1.0]))
+    flanks = [FlankPlace(1 + k, place) for k, place in enumerate(places)]
+    mesh = discretise(leaf(**network), load, 7, flanks=flanks)
+    return replace(mesh, contacts=tuple(contact._replace(closed=closed) for contact in mesh.contacts))
+
+
+def random_states(mesh: Discretisation, count: int) -> Any:
+    """Return states with places of contacts beside where the elements end, and forces of either sign."""
+    rng = np.random.default_rng(3)
+    z = 0.1 * rng.standard_normal((count, mesh.size))
+    for contact in mesh.contacts:
+        if contact.slide >= 0:
+            z[:, contact.slide] = mesh.elements.cuts[contact.element, 1] + 0.02 * rng.standard_normal(count)
+            z[:, contact.flag] = 0.0
+            z[:, contact.unknown] *= 10
+    return z
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize("closed", [None, True])
+@pytest.mark.parametrize("ramp", [False, True])
+def test_equations_of_sides_are_those_of_numpy(shape: str, section: str, closed: bool | None, ramp: bool) -> None:
+    mesh = touching(closed, shape=shape, section=section)
+    compiled = equations(mesh, ramp)
+    assert isinstance(compiled, CompiledSides)
+    for z in random_states(mesh, 5):
+        free, right = z[mesh.free], compiled.reference
+        in_numpy, in_c = right.linearise(free, 0.3), CompiledEquations.linearise(compiled, free, 0.3)
+        for mine, its in zip(in_c, in_numpy, strict=True):
+            assert mine == pytest.approx(its, abs=1e-12 * max(1.0, np.abs(its).max()))
+        solutions, unstable = CompiledEquations.resolve(compiled, free, 0.3, np.ones((1, compiled.n)))
+        assert unstable == right.count_unstable(in_numpy)
+        assert solutions == pytest.approx(right.resolve(free, 0.3, np.ones((1, compiled.n)))[0], rel=1e-8)
+
+
+@pytest.mark.parametrize("flanks", [(), (0.35, 0.6, 0.8)])
+def test_least_gaps_of_sides_are_those_of_numpy(flanks: tuple[float, ...]) -> None:
+    mesh = touching(None, flanks, shape="curved", section="soft")
+    states, stage = random_states(mesh, 20), LoadStage(np.linspace(0, 1, 20))
+    for item in mesh.fits.network.contacts[1:]:
+        fast, right = SideGaps(mesh, item, (0,)), SideGaps(mesh, item, (0,))
+        vars(right)["_side"] = None
+        assert fast._search(states, stage) is not None
+        assert fast.least(states, stage) == pytest.approx(right.least(states, stage), abs=1e-13)
+        for k in range(len(states)):
+            mine, its = (gaps.find_least(states[k], stage.take([k])) for gaps in (fast, right))
+            assert mine == pytest.approx(its, abs=1e-9)
+
+
+def test_states_on_other_elements_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    old, new = touching(None, (0.35,), shape="curved", section="soft"), touching(None, shape="curved", section="soft")
+    states, stage = random_states(old, 4), LoadStage(np.linspace(0, 1, 4))
+    fast = carry(old, states, stage, new)
+    monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
+    assert fast == pytest.approx(carry(old, states, stage, new), abs=1e-12)
+
+
+def test_a_path_among_discs_is_that_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    fast = trace(*among_discs(1), Control(tolerance=1e-8))
+    monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
+    slow = trace(*among_discs(1), Control(tolerance=1e-8))
+    events = [[(event.kind, event.number) for event in path.contact_events] for path in (fast, slow)]
+    assert len(events[0]) == 4
+    assert events[0] == events[1]
+    drives = [[event.drive for event in path.contact_events] for path in (fast, slow)]
+    assert drives[0] == pytest.approx(drives[1], rel=1e-10)
+    assert fast.motion("tip")[fast.at_requested] == pytest.approx(slow.motion("tip")[slow.at_requested], abs=1e-10)
