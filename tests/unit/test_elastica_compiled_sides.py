@@ -21,7 +21,7 @@ from cfmkit.elastica import (
     Polynomial,
     trace,
 )
-from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, carry
+from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage, SideGaps, carry
 from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import CompiledSides, equations
@@ -88,14 +88,22 @@ def test_equations_of_sides_are_those_of_numpy(shape: str, section: str, closed:
 def test_least_gaps_of_sides_are_those_of_numpy(flanks: tuple[float, ...]) -> None:
     mesh = touching(None, flanks, shape="curved", section="soft")
     states, stage = random_states(mesh, 20), LoadStage(np.linspace(0, 1, 20))
+    counts = np.zeros(2, int)
     for item in mesh.fits.network.contacts[1:]:
         fast, right = SideGaps(mesh, item, (0,)), SideGaps(mesh, item, (0,))
         vars(right)["_side"] = None
         assert fast._search(states, stage) is not None
-        assert fast.least(states, stage) == pytest.approx(right.least(states, stage), abs=1e-13)
+        least = right.least(states, stage)
+        assert fast.least(states, stage) == pytest.approx(least, abs=1e-13)
+        watched, near = fast.least(states, stage, watch=True), least < NEAR_GAP
+        assert watched[near] == pytest.approx(least[near], abs=1e-13)
+        assert (watched[~near] >= NEAR_GAP).all()
+        assert (watched[~near] <= least[~near]).all()
+        counts += int(near.sum()), int((~near).sum())
         for k in range(len(states)):
             mine, its = (gaps.find_least(states[k], stage.take([k])) for gaps in (fast, right))
             assert mine == pytest.approx(its, abs=1e-9)
+    assert (counts >= 5).all()
 
 
 def test_states_on_other_elements_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,6 +38,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
+from cfmkit.elastica.contact.terms import gaps
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, raise_designs, set_up
@@ -107,6 +108,8 @@ def test_stops_and_pads_of_c_and_numpy_are_equal_on_random_layouts(ramp: bool) -
         assert in_c.tangent == pytest.approx(in_numpy.tangent, abs=1e-12 * np.abs(in_numpy.tangent).max())
         assert in_c.change == pytest.approx(in_numpy.change, abs=1e-12)
         z = compiled.values(free, 0.4)
+        measured = [gaps(network, contact, z[None])[0] for contact in network.contacts]
+        assert compiled.measure_nodes(z[None])[:, 0] == pytest.approx(measured, abs=1e-13)
         for mine, its in zip(compiled.evaluate(z, 0.3, 0.7), right.evaluate(z, 0.3, 0.7), strict=True):
             assert difference(mine, its) < 1e-12
         if np.linalg.cond(in_numpy.tangent) < 1e12:  # else two rigid floors press on one pad

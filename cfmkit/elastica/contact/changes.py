@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
 from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
 from cfmkit.elastica.contact.side_gaps import LoadStage, carry
-from cfmkit.elastica.contact.terms import gaps, measure, slip_way
+from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
@@ -41,6 +41,7 @@ FEWEST_SAMPLES, MOST_SAMPLES = 16, 400  # of a step between whose ends a gap may
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
 OPEN_GAP_STEPS = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
 MAX_SLOPE_STEPS = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
+SIDES_TOGETHER, NODES_TOGETHER = 6, 40  # states of a march, between which it is seen at once whether a contact changes
 NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
@@ -68,10 +69,12 @@ class PieceOfPath:
     closed: frozenset[int]
     options: Options
     friction: Mapping[int, FrictionState] = field(default_factory=dict)  # of closed contacts that rub
+    seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
     def own(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
+        assert self.whole.equations is not None  # from which those of the piece are made
         mesh = with_closed(self.whole.mesh, self.closed, self.friction)
         return WatchedProblem(mesh, self.whole.ramp, self.whole.next_correction, piece=self)
 
@@ -210,8 +213,12 @@ class PieceOfPath:
         z[:, mesh.free] = x
         count = len(mesh.contacts) + len(self.sides.all)
         spread_values = np.empty((count + len(self.rubbing), len(z)))
+        measured = self.whole.equations.measure_nodes(z)
         for number, contact in enumerate(mesh.contacts):
-            spread_values[number] = z[:, contact.unknown] if number in self.closed else gaps(mesh, contact, z)
+            if number in self.closed:
+                spread_values[number] = z[:, contact.unknown]
+            else:
+                spread_values[number] = gaps(mesh, contact, z) if measured is None else measured[number]
         spread_values[len(mesh.contacts) : count] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
         for row, number in enumerate(self.rubbing, count):
             spread_values[row] = rub_values(mesh, mesh.contacts[number], self.friction[number], z)
@@ -295,7 +302,10 @@ class PieceOfPath:
             grown = np.array([self.slip_rate(self.grow(at), number) for at in states[1:]]) * width[:, 0]
             values[row] = np.diff(values[row], axis=-1, prepend=values[row, :, :1])
             values[row, :, -1] = np.minimum(values[row, :, -1], grown)
-        calm = (values[..., 1:] >= -self.roundings(values)[..., None]).all(axis=(0, 2))
+        calm: Any = (values[..., 1:] >= -self.roundings(values)[..., None]).all(axis=(0, 2))
+        suspect = int(calm.argmin())
+        if not calm[suspect] and dense[suspect] and smooth[suspect] and not self.slipping_rows:
+            self.seen_between[float(drive[suspect]), float(drive[suspect + 1])] = values[:, suspect]
         return calm & dense & smooth
 
     @cached_property
@@ -335,9 +345,14 @@ class WatchedProblem(NetworkProblem):
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         marched = super().march(walk)
         if marched.states and self.piece is not None:
-            states = [at for at, _ in marched.states]
-            quiet = self.piece.are_quiet([walk.here, *states]).tolist()
-            self._quiet.update((id(at), at) for at, calm in zip(states, quiet, strict=True) if calm)
+            states = [walk.here, *(at for at, _ in marched.states)]
+            together = SIDES_TOGETHER if self.piece.sides.all else NODES_TOGETHER
+            for first in range(0, len(states) - 1, together):
+                some = states[first : first + together + 1]
+                quiet = self.piece.are_quiet(some).tolist()
+                self._quiet.update((id(at), at) for at, calm in zip(some[1:], quiet, strict=True) if calm)
+                if not all(quiet):
+                    break
         return marched
 
     def is_quiet_before(self, at: PathEquilibrium) -> bool:
@@ -387,6 +402,9 @@ class StepBetween:
     @cached_property
     def values(self) -> FloatArray:
         """Forces of closed and gaps of open contacts there, (contacts, shares)."""
+        seen = self.part.seen_between.pop((self.first.drive, self.last.drive), None)
+        if seen is not None and seen.shape[-1] == len(self.shares):
+            return seen
         part, values = self.part, self.part.values(*self.interpolate(self.shares[:, None]))
         for row in part.slipping_rows:
             values[row] = np.diff(values[row], prepend=values[row, :1])
@@ -472,20 +490,6 @@ class StepBetween:
             return None
         at = self.solve(share)
         return None if at is None else part.grow(at)
-
-
-def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:
-    """Return what must not become negative in states (n, size), (n,): what is left of the friction where it sticks.
-
-    Where it slips it is how far it has come in its sense, which must grow.
-    """
-    if state.sense == 0:
-        return np.asarray(contact.item.friction * z[:, contact.unknown] - np.abs(z[:, contact.rub]))
-    ways = [float(slip_way(mesh, contact, one, state.anchor).value) for one in z]
-    round_length = np.inf
-    if isinstance(contact.item, NodeOnObstacle):
-        round_length = contact.item.outline.round_length(contact.item.radius) / mesh.scales.length
-    return state.sense * (np.array(ways) if np.isinf(round_length) else np.unwrap(ways, period=round_length))
 
 
 def describe(item: Contact) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.beam_fits import beam_end_at
@@ -169,7 +169,7 @@ class SideConditions:
     def value(self, condition: SideCondition, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of a condition in n states, (n,)."""
         if condition.kind == "touch":
-            return self.gaps_of(condition.item).least(z, stage)
+            return self.gaps_of(condition.item).least(z, stage, watch=True)
         if condition.kind == "wraps":
             return self._curvature_at_root(condition, z)
         contact = self.mesh.contacts[condition.number]
@@ -198,12 +198,11 @@ class SideConditions:
         mesh, item = self.mesh, condition.item
         elements = [k for k, name in enumerate(mesh.elements.beam) if name == item.beam]
         element, side = (elements[-1], 1) if condition.last else (elements[0], 0)
-        moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]
+        fitted = mesh.fits[item.beam]
         inside, at = float(mesh.elements.cuts[element].mean()), np.array([float(side)])
         slopes = shape_functions(mesh.degree, at)[1][0]
         columns = [3, 7, *range(8, mesh.degree + 7)]
-        length = np.reshape(moved.length, (-1, len(moved.beam)))[:, element]
-        bend = z[:, moved.unknowns[element, columns]] @ slopes / length
+        bend = z[:, mesh.elements.unknowns[element, columns]] @ slopes / lengths_at(mesh, z, element)
         speed = float(np.real(fitted.speed(at, inside) + np.zeros(1))[0]) / mesh.scales.length
         sides = [float(np.real(fitted.angle(at + step, inside) + np.zeros(1))[0]) for step in (PLACE_STEP, -PLACE_STEP)]
         bend = bend + (sides[0] - sides[1]) / (2 * PLACE_STEP) / speed
@@ -229,17 +228,13 @@ class SideConditions:
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""
         mesh, item = self.mesh, contact.item
-        moved, fitted = with_places(mesh, z).elements, mesh.fits[item.beam]  # type: ignore[union-attr]
+        fitted = mesh.fits[item.beam]  # type: ignore[union-attr]
         inside = float(mesh.elements.cuts[contact.element].mean())
         columns = [3, 7, *range(8, mesh.degree + 7)]
         total = np.zeros(len(z))
         for number, end in ((contact.element, 1.0), (contact.element + 1, 0.0)):
             slopes = shape_functions(mesh.degree, np.array([end]))[1][0]
-            total += (
-                z[:, moved.unknowns[number, columns]]
-                @ slopes
-                / np.reshape(moved.length, (-1, len(moved.beam)))[:, number]
-            )
+            total += z[:, mesh.elements.unknowns[number, columns]] @ slopes / lengths_at(mesh, z, number)
         parameter, length = z[:, contact.slide], mesh.scales.length
         speed = np.real(fitted.speed(parameter, inside)) / length
         angles = [np.real(fitted.angle(parameter + step, inside)) for step in (PLACE_STEP, 0.0, -PLACE_STEP)]

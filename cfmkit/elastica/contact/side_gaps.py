@@ -206,12 +206,12 @@ class SideGaps:
             return bool(result[0, 4] < PARALLEL_GAP)
         return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
 
-    def least(self, z: FloatArray, stage: LoadStage) -> FloatArray:
+    def least(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
 
-        It is exact where it is below `NEAR_GAP`, and above it otherwise.
+        It is exact where it is below `NEAR_GAP`, and above it otherwise: to `watch` for contact a lower bound.
         """
-        result = self._search(z, stage)
+        result = self._search(z, stage, watch)
         if result is not None:
             return result[:, 0]
         gap, rows, _ = self._dips(z, stage)
@@ -241,11 +241,11 @@ class SideGaps:
                 best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
         return least
 
-    def _search(self, z: FloatArray, stage: LoadStage) -> FloatArray | None:
+    def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray | None:
         """Return what compiled code finds in n states, (n, 5); None without it, or if the thickness varies."""
         if self._side is None or not len(z):
             return None
-        return equations(self.mesh).search_side(z, stage.rows(), self._side)
+        return equations(self.mesh).search_side(z, stage.rows(), self._side, watch)
 
     @cached_property
     def _side(self) -> BeamSide | None:

@@ -11,6 +11,7 @@ from cfmkit.elastica.mechanics.terms import Contribution
 from cfmkit.elastica.model.contact import FrictionState, NodeOnObstacle, Stop
 
 if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
@@ -95,6 +96,20 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
         gradient, hessian, unknowns = gradient[:3], hessian[:3, :3], unknowns[:3]
         gradient[2] += radius
     return SlipWay(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
+
+
+def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:
+    """Return what must not become negative in states (n, size), (n,): what is left of the friction where it sticks.
+
+    Where it slips it is how far it has come in its sense, which must grow.
+    """
+    if state.sense == 0:
+        return np.asarray(contact.item.friction * z[:, contact.unknown] - np.abs(z[:, contact.rub]))
+    ways = [float(slip_way(mesh, contact, state_values, state.anchor).value) for state_values in z]
+    round_length = np.inf
+    if isinstance(contact.item, NodeOnObstacle):
+        round_length = contact.item.outline.round_length(contact.item.radius) / mesh.scales.length
+    return state.sense * (np.array(ways) if np.isinf(round_length) else np.unwrap(ways, period=round_length))
 
 
 def friction_of(contact: ContactAt, z: Any) -> FrictionState:

@@ -17,6 +17,7 @@ from cfmkit.elastica.model.plain_beams_at_once import is_plain
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
+CLOSED_SIDE = 5  # column of `side_at`
 IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend")
 """Arrays of a `Model` that `sides.c` changes where elements move."""
 

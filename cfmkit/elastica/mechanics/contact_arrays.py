@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.terms import compliance
 from cfmkit.elastica.model.contact import NodeOnObstacle, ObstacleEdge, Stop
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
+CLOSED_NODE = 3  # column of `contact_at`
 ROTATION_STOP, MOTION_STOP, NODE_PAD = range(3)
 
 
@@ -59,10 +62,12 @@ def contact_arrays(mesh: Discretisation) -> dict[str, Any]:
     }
 
 
+@lru_cache(maxsize=128)
 def edge_rows(edge: ObstacleEdge) -> FloatArray:
     """Return the segments of an outline, then its arcs, (parts, 6)."""
     segments = np.column_stack([edge.start, edge.along, edge.length, np.zeros(len(edge.length))])
-    return np.concatenate([segments, np.column_stack([edge.centre, edge.radius, edge.first, edge.sweep, edge.bulge])])
+    arcs = np.column_stack([edge.centre, edge.radius, edge.first, edge.sweep, edge.bulge])
+    return read_only(np.concatenate([segments, arcs]))
 
 
 def last_elements(mesh: Discretisation, leaves: Any) -> Any:

@@ -129,6 +129,10 @@ class NumpyEquations:
         """Return the equations of the same network with another flexibility along its beams."""
         return replace(self, mesh=mesh)
 
+    def exchange_contacts(self, mesh: Discretisation) -> NumpyEquations | None:
+        """Return the equations of the same network with other contacts closed; None if they must be made anew."""
+        return None
+
     def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
         """Replace the tables of some elements, in place: only of equations whose arrays are their own."""
         for name, values in tables.items():
@@ -162,7 +166,11 @@ class NumpyEquations:
         drive, share = self.factors(place)
         return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide) -> FloatArray | None:
+    def measure_nodes(self, z: FloatArray) -> FloatArray | None:
+        """Return the gaps of all contacts of nodes in states (n, size), (contacts, n); None without compiled code."""
+        return None
+
+    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide, watch: bool = False) -> FloatArray | None:
         """Return what compiled code finds of the gaps of a side, (n, 5): see `CompiledEquations`; None without it."""
         return None
 

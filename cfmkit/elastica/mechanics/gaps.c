@@ -12,6 +12,8 @@
 #define SLOPE_LEVEL 1e-9     /* of the gap where it is least: its square is the error */
 #define GAP_RESOLUTION 1e-13
 #define N_ROUNDS 20
+#define LOWEST_SHARE 0.75       /* of the least gap found, below which none is passed over */
+#define FASTER 1.05             /* than at Gauss points, by which a gap may change along a beam */
 #define WIDEST 0.1              /* share of an element between two places, and some more */
 
 /* Places along an element, and matrices from an element's unknowns and values at its Gauss points to these places. */
@@ -26,12 +28,14 @@ typedef struct {
     const GapTables *tables;
     Outline outline;
     double half, unit; /* half the thickness; unit of length [m] */
+    int watches;       /* far gaps may be lower bounds, of most places then none is measured */
 } Search;
 
 /* A line of an element in one state: start, slopes at Gauss points and their series, angle at rest, rotation. */
 typedef struct {
     double start[2], x[MAX_POINTS], y[MAX_POINTS], angle[MAX_POINTS], phi[MAX_SHAPES], speed[MAX_POINTS];
     double series[4][MAX_POINTS];
+    double fastest; /* way by the parameter of the element */
     int has_series;
 } Line;
 
@@ -44,6 +48,7 @@ static void trace_line(const Search *s, Int e, const double *z, Stage at, Line *
     const double qy = at.share * load[1] + at.drive * load[3];
     const Pose start = pose(m, z, m->ends[2 * e]);
     memcpy(line->start, start.place, sizeof start.place);
+    line->fastest = 0.0;
     for (Int k = 0; k < shapes; k++) line->phi[k] = z[own[local_shape(k)]];
     for (Int q = 0, o = e * m->points; q < m->points; q++, o++) {
         double turn = line->angle[q] = m->angle[o];
@@ -54,6 +59,7 @@ static void trace_line(const Search *s, Int e, const double *z, Stage at, Line *
         line->speed[q] = m->weight[o] / s->tables->weights[q];
         line->x[q] = (stretch * c - slip * n) * line->speed[q];
         line->y[q] = (stretch * n + slip * c) * line->speed[q];
+        line->fastest = fmax(line->fastest, FASTER * line->speed[q] * (fabs(stretch) + fabs(slip)));
     }
     line->has_series = 0;
 }
@@ -152,6 +158,16 @@ static void search_dips(const Search *s, Line *line, const Beside *seen, double 
     }
 }
 
+/* The next place at which the gap may be below a level: along a beam it changes by no more than the way. */
+static Int next_place(const Search *s, const Line *line, Int place, double gap, double level) {
+    const double *fractions = s->tables->fractions, reach = (gap - level) / line->fastest;
+    Int next = place + 1;
+    while (next < s->tables->along - 1 && fractions[next + 1] - fractions[place] <= reach) next++;
+    return next;
+}
+
+static const Beside PASSED = {HUGE_VAL, 0.0};
+
 /* One state: least gap with its slack, the gap itself, the row of its element, the place on it, range of gaps seen. */
 static void search(const Search *s, double *elements, Int count, const double *z, Stage at, double *found) {
     const GapTables *t = s->tables;
@@ -167,10 +183,13 @@ static void search(const Search *s, double *elements, Int count, const double *z
             double *nearest = elements + 3 * row + 2;
             if (pass && *nearest + slack - WIDEST * s->m->length[e] > limit) continue;
             trace_line(s, e, z, at, &line);
-            for (Int k = 0; k < t->along; k++) seen[k] = at_table_place(s, &line, k);
-            if (pass) { search_dips(s, &line, seen, limit, slack, row, found); continue; }
-            *nearest = HUGE_VAL;
+            Int next = 0;
+            if (!pass) *nearest = HUGE_VAL;
             for (Int k = 0; k < t->along; k++) {
+                if (k < next) { seen[k] = PASSED; continue; }
+                seen[k] = at_table_place(s, &line, k);
+                if (s->watches) next = next_place(s, &line, k, seen[k].gap, fmax(NEAR_GAP, LOWEST_SHARE * found[0]) - slack);
+                if (pass) continue;
                 *nearest = fmin(*nearest, seen[k].gap);
                 highest = fmax(highest, seen[k].gap);
                 if (seen[k].gap + slack >= found[0]) continue;
@@ -179,21 +198,24 @@ static void search(const Search *s, double *elements, Int count, const double *z
                 found[2] = (double)row;
                 found[3] = t->fractions[k];
             }
+            if (pass) search_dips(s, &line, seen, limit, slack, row, found);
             lowest = fmin(lowest, *nearest);
         }
     }
+    if (s->watches && found[0] > NEAR_GAP) found[0] = fmax(NEAR_GAP, LOWEST_SHARE * found[0]);
     found[4] = highest - lowest;
 }
 
 /* Least gaps in states (n, size) at stages (n, 2), drive and share, of elements (count, 3): number, slack, and memory;
  * found (n, 5). Return 0 if an element vanishes. */
 int side_gaps(const Model *m, const double *z, const double *stages, Int n, double *elements, Int count,
-              const double *edge, const double *numbers, const double *packed, double *found) {
+              const double *edge, const double *numbers, const double *packed, int watches, double *found) {
     const Int along = (Int)numbers[5], shapes = m->degree + 1, q = m->points;
     const double *values = packed + along + q, *integrals = values + along * shapes;
     const double *interpolation = integrals + along * q, *series = interpolation + along * q;
     const GapTables t = {along, packed, packed + along, values, integrals, interpolation, series};
-    const Search s = {m, &t, {edge, (Int)numbers[2], (Int)numbers[3], (Int)numbers[4]}, numbers[0], numbers[1]};
+    const Outline outline = {edge, (Int)numbers[2], (Int)numbers[3], (Int)numbers[4]};
+    const Search s = {m, &t, outline, numbers[0], numbers[1], watches};
     if (along > MAX_ALONG) return 0;
     for (Int k = 0; k < n; k++, z += m->size, found += 5) {
         const Stage at = {stages[2 * k], stages[2 * k + 1], 0.0, 0.0};
@@ -208,7 +230,7 @@ int side_gaps(const Model *m, const double *z, const double *stages, Int n, doub
 int side_places(const Model *m, const double *z, const double *stages, Int n, const double *places, Int count,
                 const double *weights, const double *series, double *found) {
     const GapTables t = {0, NULL, weights, NULL, NULL, NULL, series};
-    const Search s = {m, &t, {NULL, 0, 0, 0}, 0.0, 1.0};
+    const Search s = {m, &t, {NULL, 0, 0, 0}, 0.0, 1.0, 0};
     Line line;
     double angle;
     for (Int k = 0; k < n; k++, z += m->size) {

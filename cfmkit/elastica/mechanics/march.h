@@ -94,6 +94,7 @@ void term(const Model *m, Int number, const double *z, Stage at, int with_hessia
 Pose pose(const Model *m, const double *z, Int k);
 Distance outline_distance(const Outline *o, double x, double y);
 void contact_term(const Model *m, Int number, const double *z, Term *t);
+void contact_gaps(const Model *m, const double *z, Int n, double *gaps);
 
 int sides_move(const Model *m, const double *z);
 int side_presses(const Model *m, Int number, const double *z);
@@ -102,7 +103,7 @@ void sides_columns(const Model *m, const double *z, Stage at, Term *t, Factors *
 int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number);
 
 int side_gaps(const Model *m, const double *z, const double *stages, Int n, double *elements, Int count,
-              const double *edge, const double *numbers, const double *packed, double *found);
+              const double *edge, const double *numbers, const double *packed, int watches, double *found);
 
 int side_places(const Model *m, const double *z, const double *stages, Int n, const double *places, Int count,
                 const double *weights, const double *series, double *found);

@@ -5,7 +5,7 @@ Both give the same to rounding (tests/unit/test_elastica_march.py).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -74,7 +74,7 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None and plain and key[2] and are_sides_compiled(mesh):
-            mesh.known[key] = CompiledSides(with_own_tables(mesh), ramp)
+            mesh.known[key] = CompiledSides(with_own_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif plain and key[2] and are_compiled(mesh):
@@ -105,21 +105,19 @@ class CompiledSides(CompiledEquations):
         """Return whether some side lies on its obstacle in states (..., n)."""
         return np.rint(free[..., self._flags]).any(axis=-1)
 
-    def rebase(self, base: FloatArray) -> CompiledSides:
-        """Return the equations with other values of the unknowns that are held, (size,)."""
-        return CompiledSides(replace(self.mesh, base=base), self.ramp)
-
-    def stiffen(self, mesh: Discretisation) -> CompiledSides:
-        """Return the equations of the same network with another flexibility along its beams."""
-        return CompiledSides(mesh, self.ramp)
+    def _exchange(self, mesh: Discretisation, arrays: Mapping[str, Any]) -> CompiledEquations:
+        exchanged = super()._exchange(mesh, arrays)
+        for name in ("reference", "_flags"):
+            vars(exchanged).pop(name, None)
+        return exchanged
 
     def gradient(self, free: Any, place: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
         return self.reference.gradient(free, place)
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide) -> FloatArray | None:
+    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide, watch: bool = False) -> FloatArray | None:
         """Return the least gaps of a side in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().search_side(z, stages, side)
+        return None if self._lies(z[:, self.mesh.free]).any() else super().search_side(z, stages, side, watch)
 
     def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
         """Return places and rotations in n states; None where something lies on an obstacle."""

@@ -180,19 +180,34 @@ static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(code);
 }
 
-/* side_gaps(model, z, stages, elements, edge, numbers, tables, found) -> whether no element vanishes */
+/* side_gaps(model, z, stages, elements, edge, numbers, tables, found, watches) -> whether no element vanishes */
 static PyObject *py_side_gaps(PyObject *self, PyObject *arguments) {
     Buffers b;
+    double watches;
     int good;
     (void)self;
-    if (!take(arguments, 0, 8, &b)) return NULL;
+    if (!number(arguments, 8, &watches) || !take(arguments, 0, 8, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
     const Int wide = (Int)sizeof(double);
     good = side_gaps(at(&b, 0), at(&b, 1), at(&b, 2), b.view[2].len / (2 * wide), at(&b, 3), b.view[3].len / (3 * wide),
-                     at(&b, 4), at(&b, 5), at(&b, 6), at(&b, 7));
+                     at(&b, 4), at(&b, 5), at(&b, 6), watches != 0.0, at(&b, 7));
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(good);
+}
+
+/* contact_gaps(model, z, gaps) */
+static PyObject *py_contact_gaps(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    (void)self;
+    if (!take(arguments, 0, 3, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Model *m = at(&b, 0);
+    contact_gaps(m, at(&b, 1), b.view[1].len / (m->size * (Int)sizeof(double)), at(&b, 2));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    Py_INCREF(Py_None);
+    return Py_None;
 }
 
 /* side_places(model, z, stages, places, weights, series, found) -> whether no element vanishes */
@@ -215,7 +230,7 @@ static PyMethodDef methods[] = {
     {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
     {"solve_many", py_solve_many, METH_VARARGS, NULL}, {"soften", py_soften, METH_VARARGS, NULL},
     {"place", py_place, METH_VARARGS, NULL},
-    {"side_gaps", py_side_gaps, METH_VARARGS, NULL}, {"side_places", py_side_places, METH_VARARGS, NULL},
+    {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL}, {"side_places", py_side_places, METH_VARARGS, NULL},
     {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };

@@ -57,6 +57,15 @@ def cuts_at(mesh: Discretisation, z: Any) -> Any:
     return cuts
 
 
+def lengths_at(mesh: Discretisation, z: Any, number: int) -> Any:
+    """Return the length of an element in states (n, size), (n,) or a number."""
+    fitted = mesh.fits[mesh.elements.beam[number]]
+    if mesh.moving is None or not fitted.course.uniform:
+        return with_places(mesh, z).elements.length[..., number]
+    low, high = cuts_at(mesh, z)[:, number].T
+    return (high - low) * fitted.length / mesh.scales.length
+
+
 def with_own_tables(mesh: Discretisation) -> Discretisation:
     """Return the arrays with tables of the elements of their own, of several states those of the first."""
     e = mesh.elements

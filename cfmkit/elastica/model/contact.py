@@ -114,6 +114,8 @@ class ObstacleEdge(ShortRepr):
         """
         places = np.asarray(places)
         candidates = [*self._from_segments(places), *self._from_arcs(places)]
+        if len(candidates) == 1:
+            return candidates[0][0]
         far = np.array([np.where(near, np.abs(np.real(found.value)), np.inf) for found, near in candidates])
         pick = far.argmin(axis=0)
 
