@@ -29,7 +29,7 @@ from cfmkit.elastica.mechanics.element_cuts import (
 from cfmkit.elastica.mechanics.element_tables import element_tables
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
-from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import find_driven_node
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
@@ -240,7 +240,7 @@ class _ArrayBuilder:
         touching = [
             (number, self._attach(contact.node))
             for number, contact in enumerate(self.network.contacts)
-            if not isinstance(contact, BeamOnObstacle)
+            if not isinstance(contact, BeamSide)
         ]
         dofs, arms, origins, frames = zip(*self.places, strict=True)
         frame = np.array([(1.0, 0.0)] * len(frames)) if not any(frames) else _direction(np.array(frames))
