@@ -10,20 +10,22 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.edges import measure_distance
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows
-from cfmkit.elastica.mechanics.equations import BeamSide
+from cfmkit.elastica.mechanics.equations import SideData
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.contact import NodeOnBeam
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
-    from cfmkit.elastica.model.contact import BeamOnObstacle
+    from cfmkit.elastica.model.contact import BeamSide
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
 NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
@@ -145,10 +147,10 @@ class LeastGap(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SideGaps:
-    """Gaps of the side of one beam to one obstacle, away from where it touches already."""
+    """Gaps of the side of one beam to one obstacle or pad, away from where it touches already."""
 
     mesh: Discretisation
-    item: BeamOnObstacle
+    item: BeamSide
     touched: tuple[int, ...]  # elements that end where a node or the side touches this obstacle
     laid: tuple[int, ...] = ()  # elements that lie on it
 
@@ -190,14 +192,14 @@ class SideGaps:
     ) -> tuple[Any, Any, SideStates]:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
-        values = self.item.outline.distance(seen.place * self.mesh.scales.length)
+        values = measure_distance(self.mesh, self.item, seen.place, z)
         half = np.stack(
             [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
         )
         slope = values.normal[..., 0] * np.cos(seen.angle) + values.normal[..., 1] * np.sin(seen.angle)
         taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
         slope = slope - np.stack(taper, axis=1)
-        return values.value / self.mesh.scales.length - half, slope, seen
+        return values.value - half, slope, seen
 
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
@@ -248,15 +250,18 @@ class SideGaps:
         return equations(self.mesh).search_side(z, stage.rows(), self._side, watch)
 
     @cached_property
-    def _side(self) -> BeamSide | None:
+    def _side(self) -> SideData | None:
         """The side as compiled code takes it."""
-        mesh, edge = self.mesh, self.item.outline
-        if isinstance(mesh.fits.network.beams[self.item.beam].section.thickness, Taper):
+        mesh = self.mesh
+        if isinstance(self.item, NodeOnBeam) or isinstance(
+            mesh.fits.network.beams[self.item.beam].section.thickness, Taper
+        ):
             return None
+        edge = self.item.outline
         half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
         counts = len(edge.length), len(edge.radius), float(edge.closed), N_ALONG
         numbers = np.array([half, mesh.scales.length, *counts], float)
-        return BeamSide(self.elements, self.slack, edge_rows(edge), numbers, _packed_tables(mesh.degree))
+        return SideData(self.elements, self.slack, edge_rows(edge), numbers, _packed_tables(mesh.degree))
 
     def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""
@@ -304,6 +309,7 @@ class SideGaps:
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
         return _ElementStates(
             element,
+            z,
             poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
             fields.slope_x[:, element] * speed,
             fields.slope_y[:, element] * speed,
@@ -319,17 +325,17 @@ class SideGaps:
         y = states.start[:, 1] + (states.y * upto).sum(axis=1)
         angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
         parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
-        length = self.mesh.scales.length
-        edge = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
+        edge = measure_distance(self.mesh, self.item, np.stack([x, y], axis=-1), states.z)
         slope = edge.normal[:, 0] * np.cos(angle) + edge.normal[:, 1] * np.sin(angle)
         slope = slope - self._taper(parameter, states.element)
-        return _Beside(edge.value / length - self.half_thickness(parameter, states.element), slope, parameter)
+        return _Beside(edge.value - self.half_thickness(parameter, states.element), slope, parameter)
 
 
 class _ElementStates(NamedTuple):
     """One element in n states: its start, slopes of its line and angle at Gauss points, rotation, cuts."""
 
     element: int
+    z: FloatArray  # (n, size)
     start: FloatArray  # (n, 2)
     x: FloatArray  # (n, q)
     y: FloatArray
@@ -356,7 +362,7 @@ class _Beside(NamedTuple):
     parameter: FloatArray
 
 
-def least_side_gaps(mesh: Discretisation, item: BeamOnObstacle, z: FloatArray, drive: FloatArray) -> FloatArray:
+def least_side_gaps(mesh: Discretisation, item: BeamSide, z: FloatArray, drive: FloatArray) -> FloatArray:
     """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
     return SideGaps(mesh, item, ()).least(z, LoadStage(drive))
 

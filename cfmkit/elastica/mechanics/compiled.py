@@ -27,13 +27,13 @@ from cfmkit.elastica.mechanics.contact_arrays import (
 from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
-    BeamSide,
     LinearEquations,
     MarchCode,
     MarchPlan,
     MarchState,
     NaturalMarch,
     NumpyEquations,
+    SideData,
     SolvedStates,
     force_units,
 )
@@ -158,7 +158,7 @@ class CompiledEquations(NumpyEquations):
         self.code.contact_gaps(self.row, np.ascontiguousarray(z, float), gaps)
         return gaps
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide, watch: bool = False) -> FloatArray | None:
+    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
         """Return the least gaps of a side in n states, (n, 5); None if an element vanishes in one.
 
         Least gap with its slack, the gap, the row of its element, the place on it, and the range of all gaps seen. To

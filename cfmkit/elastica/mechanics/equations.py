@@ -67,7 +67,7 @@ class MarchState(NamedTuple):
     target: int = -1  # number of the target it lies at, -1 if at none
 
 
-class BeamSide(NamedTuple):
+class SideData(NamedTuple):
     """The side of a beam of one thickness, and an obstacle, as `gaps.c` takes them."""
 
     elements: FloatArray  # (m,)
@@ -170,7 +170,7 @@ class NumpyEquations:
         """Return the gaps of all contacts of nodes in states (n, size), (contacts, n); None without compiled code."""
         return None
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide, watch: bool = False) -> FloatArray | None:
+    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
         """Return what compiled code finds of the gaps of a side, (n, 5): see `CompiledEquations`; None without it."""
         return None
 
@@ -325,8 +325,9 @@ def force_units(mesh: Discretisation) -> FloatArray:
     bending = rigidity.sum(axis=1) * length
     unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / length**2)[:, None]
-    unit[[contact.unknown for contact in mesh.contacts]] = 1.0
-    unit[[contact.rub for contact in mesh.contacts if contact.rub >= 0]] = 1.0
+    if mesh.contacts:
+        unit[[contact.unknown for contact in mesh.contacts]] = 1.0
+        unit[[contact.rub for contact in mesh.contacts if contact.rub >= 0]] = 1.0
     return np.asarray(unit[mesh.free])
 
 

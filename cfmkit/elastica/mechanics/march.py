@@ -27,13 +27,13 @@ from cfmkit.elastica.mechanics.compiled_sides import are_sides_compiled
 from cfmkit.elastica.mechanics.contact_arrays import are_compiled, side_contacts
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import (
-    BeamSide,
     LinearEquations,
     MarchCode,
     MarchPlan,
     MarchState,
     NaturalMarch,
     NumpyEquations,
+    SideData,
     SolvedStates,
     begin,
 )
@@ -115,7 +115,7 @@ class CompiledSides(CompiledEquations):
         """Return the gradient by all unknowns, (size,)."""
         return self.reference.gradient(free, place)
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: BeamSide, watch: bool = False) -> FloatArray | None:
+    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
         """Return the least gaps of a side in n states; None where something lies on an obstacle."""
         return None if self._lies(z[:, self.mesh.free]).any() else super().search_side(z, stages, side, watch)
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
 from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.mechanics.polynomials import slopes_at_end
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.numerics.continuation.path import MarchedSteps
 from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -148,12 +149,10 @@ class NetworkProblem:
         flexibility, mode = self.equations.soften(at.x, at.drive, vector, rounds)
         return (1 / abs(flexibility) if flexibility else 0.0), mode
 
-    @cached_property
+    @property
     def _any_vector(self) -> FloatArray:
         """Unit vector that has a share of every mode."""
-        count = len(self.mesh.free)
-        vector = np.cos(np.arange(count) * np.arange(1, count + 1))
-        return np.asarray(vector / np.linalg.norm(vector))
+        return _any_vector(len(self.mesh.free))
 
     @cached_property
     def follows(self) -> bool:
@@ -196,8 +195,13 @@ class NetworkProblem:
         e = self.mesh.elements
         last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
         unknowns = e.unknowns[last][:, energy.rotation_columns(self.mesh.degree)]
-        _, slopes = shape_functions(self.mesh.degree, np.ones(1))
-        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes_at_end(self.mesh.degree), z[unknowns]))
+
+
+@lru_cache(maxsize=64)
+def _any_vector(count: int) -> FloatArray:
+    vector = np.cos(np.arange(count) * np.arange(1, count + 1))
+    return read_only(vector / np.linalg.norm(vector))
 
 
 def _state(at: PathEquilibrium) -> MarchState:
