@@ -16,7 +16,7 @@ from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
 from cfmkit.families.beam.strips_and_gaps import mirror_points, strips
-from cfmkit.families.beam.tip_on_uneven_surface import ride
+from cfmkit.families.beam.tip_on_uneven_surface import follow_surface
 from cfmkit.families.fem_results import number_fillets
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, color_key, value_text, write_heading
@@ -375,7 +375,7 @@ def frequencies(result: Result) -> Figure:
 
 def surface(result: Result) -> Figure:
     """Return the contact along the surface: its height, and the forces at the tip [Lan, Fig. 14]."""
-    found = ride(result.state)
+    found = follow_surface(result.state)
     if found is None:
         raise ValueError("there is no surface")
     way = Scale("along the surface", "length")
