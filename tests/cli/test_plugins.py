@@ -190,7 +190,8 @@ def test_control_c_while_a_package_is_imported_is_no_fault_of_the_package(site):
     """In a program that leaves signals to Python, and in the command line."""
     source = "import signal\nsignal.raise_signal(signal.SIGINT)\n"
     packages.install(site, "broken-one", source, "broken")
-    code = "from cfmkit import families\ntry:\n    families.skipped()\nexcept KeyboardInterrupt:\n    print('ended')\n"
+    body = "try:\n    list_skipped()\nexcept KeyboardInterrupt:\n    print('ended')\n"
+    code = f"from cfmkit.families import list_skipped\n{body}"
     environment = os.environ | {"PYTHONPATH": str(site)}
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60, env=environment

@@ -48,9 +48,11 @@ def check_rows_against_single_runs(spec, values):
     together = evaluate_rows(study, plan, 0, len(plan))
     sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
     kinds = [metric.dimension for metric in study.metrics]
-    for kind in ("force", "torque"):  # a column may vanish: it is the difference of others
-        same = [k for k, dimension in enumerate(kinds) if dimension == kind]
+    # a column may vanish: it is the difference of others
+    for group in (("force",), ("torque", "rotational_stiffness"), ("length",), ("angle",)):
+        same = [k for k, dimension in enumerate(kinds) if dimension in group]
         sizes[same] = sizes[same].max(initial=0.0)
+    sizes = np.where(np.equal(kinds, "ratio"), sizes * np.maximum(sizes, 1.0), sizes)  # large: of a mean that vanishes
     for k in range(len(plan)):
         alone = study.evaluate(plan.point(k))
         assert not alone.bug
