@@ -89,14 +89,6 @@ def test_nothing_is_followed_with_a_network_that_bears_something_at_rest_or_is_m
     assert follow_alike(trace(leaves, LEAVES), [leaves], Control()) is not None
 
 
-def test_a_network_that_cannot_exist_fails_alone() -> None:
-    closed = bent(2 * np.pi)
-    found = list(trace_many([bent(0.3), closed, bent(0.5)], DRIVE, Control(tolerance=1e-6)))
-    assert [outcome.status for outcome in found] == ["COMPLETE", "INVALID", "COMPLETE"]
-    assert "returns to its start" in found[1].message
-    assert found[1].value is None
-
-
 def test_two_processes_give_the_same_as_one() -> None:
     networks = [bent(s) for s in (0.2, 0.4, 0.6, 0.8)]
     one, two = (list(trace_many(networks, DRIVE, workers=w)) for w in (1, 2))

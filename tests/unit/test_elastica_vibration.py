@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import beam_networks
 import numpy as np
 import pytest
+from functional_paths import functional_path
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -289,3 +291,39 @@ def test_what_would_take_too_many_unknowns_is_refused(monkeypatch: pytest.Monkey
     monkeypatch.setattr("cfmkit.elastica.vibration.MAX_UNKNOWNS", 20)
     with pytest.raises(InputError, match="unknowns, more than 20: the beams have too many windings or too much"):
         frequencies(under(1e-9, beam()), WHOLE, 3)
+
+
+@pytest.mark.parametrize(("seed", "number"), [(4, 0), (4, 1), (4, 2), (8, 3)])
+def test_frequencies_of_networks_with_every_feature_do_not_depend_on_the_degree(seed: int, number: int) -> None:
+    """Loads that follow among them: held, free, and whether they flutter."""
+    net = beam_networks.network(seed)
+    drive = beam_networks.drives(net, seed)[number]
+    masses = NetworkMasses(dict.fromkeys(net.beams, 1000.0), {"b": (1e-3, 1e-7), "bb": (5e-4, 0.0)})
+    old = trace(net, drive, Control(tolerance=1e-9))
+    known = frequencies(old, masses, 4, [len(old) - 1])
+    found = frequencies(functional_path(net, drive, 14), masses, 4, [1])
+    assert found.free[0] == pytest.approx(known.free[0], rel=1e-6, nan_ok=True)
+    assert found.held[0] == pytest.approx(known.held[0], rel=1e-6, nan_ok=True)
+    assert (found.flutters[0], found.diverges[0]) == (known.flutters[0], known.diverges[0])
+
+
+def test_a_coil_of_many_turns_has_the_frequencies_of_seven_beams() -> None:
+    """The engine before this one had others for a coil of one beam, 1 % too high, and those of 7 beams are right."""
+    turns, pieces, section = 5.25, 7, Section(2e9, 1e-2, 1e-4)
+    sweep, drive = 2 * np.pi * turns, Rotation("b", np.array([0.5]))
+    angles = sweep * (np.arange(pieces + 1) / pieces - 0.5)
+    radius = 0.05 / np.sin(sweep / 2)
+    places = radius * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
+    names = ["a", *(f"m{k}" for k in range(1, pieces)), "b"]
+    nodes = {
+        name: Node(*place, CLAMPED_SUPPORT if name == "a" else FREE_SUPPORT)
+        for name, place in zip(names, (places - places[0]).tolist(), strict=True)
+    }
+    beams = {f"x{k}": Beam(names[k], names[k + 1], section, arc(sweep / pieces)) for k in range(pieces)}
+    chain = trace(Network(nodes, beams), drive, Control(tolerance=1e-9))
+    known = frequencies(chain, NetworkMasses(dict.fromkeys(beams, DENSITY)), 3, [len(chain) - 1])
+    ends = {"a": Node(0.0, 0.0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}
+    coil = functional_path(Network(ends, {"x": Beam("a", "b", section, arc(sweep))}), drive, 10)
+    found = frequencies(coil, WHOLE, 3)
+    assert found.held[0] == pytest.approx(known.held[0], rel=1e-6)
+    assert found.free[0] == pytest.approx(known.free[0], rel=1e-6)
