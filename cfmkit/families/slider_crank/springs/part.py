@@ -34,7 +34,7 @@ def part_over_motion(result: Result) -> PosedPart:
     depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0])
     joining = hardware(spec, solution)
     return PosedPart(
-        (*bodies(spec, solution, solution.units), *joining.bodies),
+        (*bodies(spec, solution, solution.unit_spring_curves), *joining.bodies),
         direction=0.0,
         depth=depth,
         pieces=3 + int(np.count_nonzero(rates)),
