@@ -21,7 +21,7 @@ from cfmkit.families.fem_results import number_fillets
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, color_key, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
@@ -105,7 +105,7 @@ def curve(result: Result) -> Figure:
         levels.append(Limit(nominal, f"F_d = {value_text(nominal, 'force')} at {value_text(end, 'length')}"))
     look = CurveLook(levels=tuple(levels), regions=tuple(regions))
     only = replace(result, curves=result.curves[:1])
-    return loop_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
+    return curve_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
 
 
 def stress_map(result: Result) -> Figure:

@@ -29,7 +29,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.end_stops import LARGEST_FORCE
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import format_short
 
@@ -101,7 +101,7 @@ def _of_file(given: FileProfile) -> SurfaceCourse:
     rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _N_SURFACE_ROWS)]))
     if given.between == "smooth":
         spline = CubicSpline(x, y)
-        least = LARGEST_HOLE * (x[-1] - x[0])
+        least = MAX_HOLE_SHARE * (x[-1] - x[0])
         holes = tuple((low, high) for low, high in holes_between(x, x[0], x[-1]) if high - low > least)
         return SurfaceCourse(spline, spline.derivative(), rows, np.zeros(0), holes)
     steps = np.diff(y) / np.diff(x)

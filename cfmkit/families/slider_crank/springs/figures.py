@@ -19,7 +19,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
@@ -191,7 +191,7 @@ def curve(result: Result) -> Figure:
     drive = solution.drive
     over = "crank angle" if drive == "torque" else "travel of the slider"
     heading = f"{drive} over {over}: {_kind(solution)}"
-    figure = loop_figure(result, None, heading)
+    figure = curve_figure(result, None, heading)
     for ax in figure.axes:
         _equilibria(ax, solution, lambda _motion, _energy: 0.0)
         _band(ax, solution)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.posed_part import PosedBody, clear_places, rectangle
+from cfmkit.export.posed_part import PosedBody, rectangle, screw_positions
 from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
@@ -78,7 +78,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     spare = 0.5 * np.maximum(LEAST_GROUND * screw.head - (high - low), 0.0)
     low, high = low - spare, high + spare
     ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
-    places = clear_places(ground, moving, screw.head)
+    places = screw_positions(ground, moving, screw.head)
     bodies = (
         PosedBody.polygon("ground", "held", ground),
         PosedBody.line("guide", "held", ends, 0.5 * rod.diameter),
