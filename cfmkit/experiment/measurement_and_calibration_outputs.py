@@ -258,8 +258,7 @@ def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tu
 def reading_line(decisions: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Return the paragraph on how a file was read, its columns and what was subtracted first; nothing of arrays."""
     columns = next((k for k, text in enumerate(decisions) if " = " in text), 0)
-    about_file = f" ({'; '.join(decisions[:columns])})" if columns else ""
-    return (("read", "; ".join(decisions[columns:]) + about_file),) if decisions else ()
+    return (("read", ", ".join((*decisions[columns:], *decisions[:columns]))),) if decisions else ()
 
 
 def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:

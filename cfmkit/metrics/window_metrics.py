@@ -245,7 +245,7 @@ def effort_after(branch: Branch, time: float) -> float:
 
 
 def _extreme(which: int, rows: RowsInWindow) -> FloatArray:
-    return rows.many.extremes[which]
+    return np.asarray(rows.many.extremes[which])
 
 
 def _of_spread(function: Callable[[spread.Spread], FloatArray], rows: RowsInWindow) -> FloatArray:
@@ -253,7 +253,7 @@ def _of_spread(function: Callable[[spread.Spread], FloatArray], rows: RowsInWind
 
 
 def _deviations_from_target(rows: RowsInWindow) -> FloatArray:
-    return spread.deviation_from_target(rows.many.spread, rows.curves.target)
+    return np.asarray(spread.deviation_from_target(rows.many.spread, rows.curves.target))
 
 
 def _where_known(function: Callable[[RowsInWindow], FloatArray], rows: RowsInWindow) -> FloatArray:

@@ -19,7 +19,7 @@ from cfmkit.elastica import Section, Taper
 from cfmkit.elastica.mechanics.march import engine
 from cfmkit.errors import DataError, InputError, SpecError
 from cfmkit.families import family
-from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
+from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.beam.tip_on_uneven_surface import TIP_DEFINITIONS as SURFACE
 from cfmkit.families.run_control import Run
 from cfmkit.results import Status
@@ -295,7 +295,7 @@ def test_a_beam_is_as_thick_as_on_the_thicker_side_of_a_step(thickness):
 @pytest.mark.parametrize("thickness", [(2.0, 1.0, 2.0, 2.0), (2.0, 2.0, 1.0, 2.0)])
 def test_a_beam_is_as_thin_as_on_the_thinner_side_of_a_step(thickness):
     section = Section(1e9, 10 * MM, Taper(np.array([0.0, 0.5, 0.5, 1.0]), np.array(thickness) * MM))
-    assert thinnest_of(section) == 1.0 * MM
+    assert section.thinnest == 1.0 * MM
 
 
 def test_slenderness_is_that_of_the_thickest_place_of_a_taper():

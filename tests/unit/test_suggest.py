@@ -707,6 +707,12 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
     assert any(all("needs" not in miss for miss in misses) for misses in missed)
 
 
+def test_a_missing_option_is_named_as_an_option():
+    with pytest.raises(SpecError) as caught:
+        read_request(None, {key: value for key, value in POM.items() if key != "envelope"})
+    assert str(caught.value) == "--envelope is missing"
+
+
 @pytest.mark.parametrize(
     ("material", "words"),
     [
