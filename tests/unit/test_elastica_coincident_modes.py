@@ -75,6 +75,7 @@ def test_equal_leaves_buckle_together_and_straighten_together(many: int, toleran
     [
         ((1, 1 + 1e-7), 7e-4, 8.0, 1e-5),
         ((1, 1 + 1e-6), 7e-4, 8.0, 1e-3),
+        ((1, 1 + 1e-4), 7e-4, 8.0, 1e-7),
         ((1, 1 + 1e-5, 1 + 1e-4), 7e-4, 8.0, 1e-6),
         (tuple(1 + 1e-3 * i for i in range(5)), 7e-4, 8.0, 1e-5),
         ((1, 1), 1e-4, 9.4, 1e-3),

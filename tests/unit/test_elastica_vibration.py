@@ -305,25 +305,3 @@ def test_frequencies_of_networks_with_every_feature_do_not_depend_on_the_degree(
     assert found.free[0] == pytest.approx(known.free[0], rel=1e-6, nan_ok=True)
     assert found.held[0] == pytest.approx(known.held[0], rel=1e-6, nan_ok=True)
     assert (found.flutters[0], found.diverges[0]) == (known.flutters[0], known.diverges[0])
-
-
-def test_a_coil_of_many_turns_has_the_frequencies_of_seven_beams() -> None:
-    """The engine before this one had others for a coil of one beam, 1 % too high, and those of 7 beams are right."""
-    turns, pieces, section = 5.25, 7, Section(2e9, 1e-2, 1e-4)
-    sweep, drive = 2 * np.pi * turns, Rotation("b", np.array([0.5]))
-    angles = sweep * (np.arange(pieces + 1) / pieces - 0.5)
-    radius = 0.05 / np.sin(sweep / 2)
-    places = radius * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
-    names = ["a", *(f"m{k}" for k in range(1, pieces)), "b"]
-    nodes = {
-        name: Node(*place, CLAMPED_SUPPORT if name == "a" else FREE_SUPPORT)
-        for name, place in zip(names, (places - places[0]).tolist(), strict=True)
-    }
-    beams = {f"x{k}": Beam(names[k], names[k + 1], section, arc(sweep / pieces)) for k in range(pieces)}
-    chain = trace(Network(nodes, beams), drive, Control(tolerance=1e-9))
-    known = frequencies(chain, NetworkMasses(dict.fromkeys(beams, DENSITY)), 3, [len(chain) - 1])
-    ends = {"a": Node(0.0, 0.0, CLAMPED_SUPPORT), "b": Node(0.1, 0.0)}
-    coil = functional_path(Network(ends, {"x": Beam("a", "b", section, arc(sweep))}), drive, 10)
-    found = frequencies(coil, WHOLE, 3)
-    assert found.held[0] == pytest.approx(known.held[0], rel=1e-6)
-    assert found.free[0] == pytest.approx(known.free[0], rel=1e-6)
