@@ -230,7 +230,7 @@ def test_a_leaf_that_cannot_lie_on_a_disc_ends_with_the_reason():
     assert "shear" in path.message
 
 
-@pytest.mark.slow  # a tenth of a second each, a minute together
+@pytest.mark.slow  # 200 layouts, a tenth of a second each
 @pytest.mark.parametrize("first", range(0, 200, 50))
 def test_random_layouts_of_discs_return_to_their_own_points_and_keep_every_condition(first):
     for seed in range(first, first + 50):

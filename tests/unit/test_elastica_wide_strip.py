@@ -25,8 +25,8 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.mechanics import energy as functional
-from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.compiled import CompiledEquations
+from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.wide_strip import curling_share
 from cfmkit.elastica.model.section import curl_hindered

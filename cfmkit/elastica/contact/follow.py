@@ -241,7 +241,7 @@ def _follow_part(
     `previous` is where the piece begins if that was yielded before.
     """
     waiting: list[PathEvent] = []
-    mesh = part.whole.mesh
+    mesh, last = part.whole.mesh, None
     for item in items:
         if isinstance(item, PathEvent):
             waiting.append(part.grow_event(item))
@@ -250,7 +250,7 @@ def _follow_part(
             found = find_change_before_end(part, previous, item)
             if found is None:
                 yield from waiting
-                return EndOfPiece(item, walk, previous or walk.here)
+                return EndOfPiece(item, _pass_point(walk, last), previous or walk.here)
             at, step = None, item.drive
         else:
             at, step = part.grow(item.at), item.at.drive
@@ -258,6 +258,7 @@ def _follow_part(
             found = None if quiet or previous is None else find_change(part, previous, at)
         if found is not None:
             assert previous is not None
+            walk = _pass_point(walk, last)
             if isinstance(found, PathStop):
                 lost = next((event for event in waiting if event.after > event.before), None)
                 if lost is None:
@@ -284,11 +285,20 @@ def _follow_part(
         assert at is not None
         yield item._replace(at=at)
         if previous is not None and part.is_locked(previous, at):
-            return EndOfPiece(PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED_MESSAGE), walk, at)
-        if item.target >= 0:
-            walk = replace(walk, number=item.target + 1)
-        walk, previous = replace(walk, branch=item.branch), at
+            stop = PathStop(WhyStopped.LIMIT_POINT, at.drive, LOCKED_MESSAGE)
+            return EndOfPiece(stop, _pass_point(walk, last), at)
+        reached = item.target if item.target >= 0 or last is None else last.target
+        last, previous = item._replace(target=reached), at
+    walk = _pass_point(walk, last)
     return EndOfPiece(PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}"), walk, walk.here)
+
+
+def _pass_point(walk: Walk, point: Point | None) -> Walk:
+    """Return the walk behind a point, whose target is the last that was reached."""
+    if point is None:
+        return walk
+    number = point.target + 1 if point.target >= 0 else walk.number
+    return replace(walk, number=number, branch=point.branch)
 
 
 def _enter(
