@@ -27,6 +27,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
+from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
@@ -144,6 +145,12 @@ def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known
         assert tip_at(path, point)[1] == pytest.approx(tip[1], abs=1e-10)
     bent = path.states("leaf").moment[at_drive(path, 4.0), :5]
     assert bent == pytest.approx(np.full(5, -1 / radius), rel=1e-9)  # along the drum it has its curvature
+
+
+def test_a_leaf_wraps_around_a_disc_without_compiled_code(monkeypatch):
+    monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
+    path = trace(leaf(side("drum", circle((0, -0.5), 0.5 - HALF))), Loading(TIP_LOAD, np.array([2.0, 4.0])), EXACT)
+    assert path.contact_places(0)[-1] == pytest.approx([0.0, 0.1998403214625088], rel=1e-10)
 
 
 @pytest.mark.slow  # it ends where a search for a path that goes on fails

@@ -74,7 +74,7 @@ def with_own_tables(mesh: Discretisation) -> Discretisation:
         first: dict[str, Any] = {name: getattr(e, name)[0] for name in names}
         e = e._replace(**first, moved_cuts=None)
     copies: dict[str, Any] = {name: np.array(getattr(e, name)) for name in names}
-    return replace(mesh, elements=e._replace(**copies))
+    return replace(mesh, elements=e._replace(**copies, laid=None))
 
 
 def move_elements(mesh: Discretisation, z: Any) -> BeamElements:
