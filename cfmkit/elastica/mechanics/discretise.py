@@ -30,7 +30,7 @@ from cfmkit.elastica.mechanics.element_tables import element_tables
 from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, number
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
-from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import find_driven_node
 from cfmkit.elastica.model.network import LineLoad, PointLoad, TorsionSpring, apart, spring_ends
@@ -239,7 +239,7 @@ class _ArrayBuilder:
         touching = [
             (contact_number, contact)
             for contact_number, contact in enumerate(self.network.contacts)
-            if not isinstance(contact, BeamOnObstacle)
+            if not isinstance(contact, BeamSide)
         ]
         numbering = number(self._topology(cuts, [load for load, _ in point_loads], [item.node for _, item in touching]))
         springs = tuple(map(Attached, self.network.springs, numbering.acting))

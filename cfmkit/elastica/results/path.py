@@ -18,7 +18,7 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.results import beam_states, stress_extremes
@@ -234,7 +234,7 @@ class EquilibriumPath(ShortRepr):
         Of the side of a beam it is the least, wherever along the beam that is.
         """
         item = self.network.contacts[number]
-        if isinstance(item, BeamOnObstacle):
+        if isinstance(item, BeamSide):
             return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
         mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length

@@ -17,7 +17,7 @@ from cfmkit.elastica.contact.joined_pieces import StatesOfPiece, join_pieces
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
@@ -313,7 +313,7 @@ def trace_on(
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
     arrays = resolution.arrays(network, drive, fits)
-    sides = any(isinstance(contact, BeamOnObstacle) for contact in network.contacts)
+    sides = any(isinstance(contact, BeamSide) for contact in network.contacts)
 
     def remesh(flanks: tuple[FlankPlace, ...]) -> Discretisation:
         return resolution.arrays(network, drive, arrays.fits, flanks)
