@@ -61,6 +61,7 @@ ADDRESS_FIELDS = (
     "unit_bend",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
+NO_NUMBERS = read_only([])
 OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESS_FIELDS)
 WHOLE_NUMBERS = frozenset(
     ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at", "contact_at", "side_at", "moved_at")
@@ -93,8 +94,8 @@ class CompiledEquations(NumpyEquations):
         """Collect the arrays."""
         super().__post_init__()
         arrays = model_arrays(self)
-        counts = model_counts(self.mesh, self.ramp)
-        row = np.array([*counts.values(), *(0 for _ in ADDRESS_FIELDS)], np.int64)
+        row = np.zeros(len(COUNT_FIELDS) + len(ADDRESS_FIELDS), np.int64)
+        row[: len(COUNT_FIELDS)] = list(model_counts(self.mesh, self.ramp).values())
         self.code.place(row, len(COUNT_FIELDS), tuple(arrays.get(name) for name in ADDRESS_FIELDS))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
@@ -215,13 +216,13 @@ class CompiledEquations(NumpyEquations):
         quick: bool = False,
     ) -> MarchState | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
-        nothing = np.empty(0)
-        inputs = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
-        if self.code.solve(self.row, x, at, *inputs, rate, outcome, level, tolerance, quick):
+        x, at, rate, outcome = np.array(free, float), np.array([way], float), np.empty(len(free)), np.empty(2)
+        row = NO_NUMBERS if border is None else np.ascontiguousarray(border, float)
+        force = NO_NUMBERS if push is None else np.ascontiguousarray(push, float)
+        if self.code.solve(self.row, x, at, row, force, rate, outcome, level, tolerance, quick):
             return None
-        way = float(at[0])
-        return MarchState(x, way, rate, self._unstable(x, way, int(outcome[0])), float(outcome[1]))
+        (way,), (unstable, effort) = at.tolist(), outcome.tolist()
+        return MarchState(x, way, rate, self._unstable(x, way, int(unstable)), effort)
 
     def solve_each(
         self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
@@ -248,7 +249,7 @@ class CompiledEquations(NumpyEquations):
         parity = start.unstable % 2 if self.follows else start.unstable
         plan_row = plan_row_of(plan, parity, False)
         before = plan.before
-        previous_row = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
+        previous_row = NO_NUMBERS if before is None else np.concatenate([before.free, before.rate, [before.way]])
         start_row = np.concatenate([start.free, start.rate, [start.way]])
         code = self.code.march(self.row, plan_row, start_row, previous_row, goals, rows, stored)
         rows = rows[: stored[0]].copy()
@@ -317,7 +318,7 @@ def free_arrays(mesh: Discretisation) -> dict[str, Any]:
     """Return the number of each unknown among the free ones, (size,), and the last element that holds it, (n,)."""
     slot = np.full(mesh.size, -1, np.int64)
     slot[mesh.free] = np.arange(len(mesh.free))
-    return {"slot": slot, "leaves": np.ascontiguousarray(_leaves(mesh), np.int64)}
+    return {"slot": slot, "leaves": np.ascontiguousarray(last_elements(mesh)[mesh.free], np.int64)}
 
 
 @lru_cache(maxsize=64)
@@ -333,13 +334,6 @@ def slope_products(degree: int) -> FloatArray:
     """Return the products of the slopes of two shape functions at the Gauss points, (q, triangle), by rows of it."""
     slopes, (i, j) = basis(degree).slopes, np.tril_indices(degree + 1)
     return read_only(slopes[:, i] * slopes[:, j])
-
-
-def _leaves(mesh: Discretisation) -> Any:
-    """Return the last element that holds each free unknown, -1 if none does."""
-    last, unknowns = np.full(mesh.size, -1, np.int64), mesh.elements.unknowns
-    last[unknowns.ravel()] = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])  # of several values the last stays
-    return (last_elements(mesh, last) if mesh.contacts else last)[mesh.free]
 
 
 def spring_row(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

@@ -70,12 +70,15 @@ def edge_rows(edge: ObstacleEdge) -> FloatArray:
     return read_only(np.concatenate([segments, arcs]))
 
 
-def last_elements(mesh: Discretisation, leaves: Any) -> Any:
+def last_elements(mesh: Discretisation) -> Any:
     """Return the last element that holds each unknown, (size,); forces and places of contacts as long as nodes."""
-    kept = np.array(leaves)
+    last = mesh.numbering.last_element
+    if not mesh.contacts:
+        return last
+    kept = np.append(last, np.full(mesh.size - len(last), -1))
     for contact in mesh.contacts:
         rows = [contact.unknown, contact.slide] if contact.slide >= 0 else [contact.unknown]
-        kept[rows] = leaves[mesh.attachments.unknowns[contact.place]].max()
+        kept[rows] = last[mesh.attachments.unknowns[contact.place]].max()
     return kept
 
 

@@ -14,8 +14,6 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.element_tables import plain_tables
-from cfmkit.elastica.model.contact import BeamSide
-from cfmkit.elastica.model.network import PointLoad, SlideSpring
 from cfmkit.elastica.model.plain_beams_at_once import (
     check_fits,
     chords,
@@ -118,15 +116,13 @@ def _plain(
     template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]
 ) -> NetworkDesigns:
     scales, e = template.scales, template.elements
-    names = list(template.nodes)
+    n = template.numbering
+    names, node, master, ends, inside = list(n.topology.nodes), n.node, n.master, n.beam_ends, n.inside
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
     beams = [list(net.beams.values()) for net, _ in pairs]
     offsets = np.array([[(b.start_offset, b.end_offset) for b in each] for each in beams]) / scales.length
-    row, ends, inside = _number_ends(template, list(origin[0].beams))
-    node, master = _whose(origin, names, inside, ends)
     arm = spots[:, node] - spots[:, master]
     arm[:, ends] += offsets
-    arm[:, inside] = 0.0
     place = spots[:, master]
     reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
     every = [beam for each in beams for beam in each]
@@ -139,7 +135,7 @@ def _plain(
     rigidities = rigidities_of(every).reshape(3, *shape)
 
     def tables_at(mesh: Discretisation) -> dict[str, Any]:
-        tables = plain_tables(turned, length * scales.length, rigidities, scales, mesh.degree, row, e.cuts)
+        tables = plain_tables(turned, length * scales.length, rigidities, scales, mesh.degree, n.row, e.cuts)
         if np.any(template.floored):
             tables["axial"] = tables["axial"] + template.floor[:, None]
         return tables
@@ -162,33 +158,6 @@ def raise_designs(designs: NetworkDesigns, fine: Discretisation) -> NetworkDesig
     assert designs.tables_at is not None
     assert designs.base is None
     return replace(designs, template=fine, tables=designs.tables_at(fine))
-
-
-def _number_ends(template: Discretisation, names: list[str]) -> tuple[Any, Any, Any]:
-    """Return the number of each element's beam, the attachments of the ends of beams (b, 2), and those inside beams."""
-    e = template.elements
-    row = np.array([names.index(name) for name in e.beam])
-    first, last = e.cuts[:, 0] == 0.0, e.cuts[:, 1] == 1.0
-    return row, np.stack([e.ends[first, 0], e.ends[last, 1]], axis=1), e.ends[~last, 1]
-
-
-def _whose(origin: tuple[Network, Drive], names: list[str], inside: Any, ends: Any) -> tuple[Any, Any]:
-    """Return which node each attachment is at and which moves it, in the order of `discretise`.
-
-    Those inside beams lie at no node: any will do.
-    """
-    network, drive = origin
-    at = [names[0]] * (2 * len(ends) + len(inside))
-    for beam, own in zip(network.beams.values(), ends.tolist(), strict=True):
-        at[own[0]], at[own[1]] = beam.start, beam.end
-    for spring in network.springs:
-        at += [spring.node] if isinstance(spring, SlideSpring) else [n for n in (spring.start, spring.end) if n]
-    at += [load.node for load in (*network.loads, *drive.loads) if isinstance(load, PointLoad)]
-    at += names
-    at += [contact.node for contact in network.contacts if not isinstance(contact, BeamSide)]
-    number = {name: k for k, name in enumerate(names)}
-    node = np.array([number[name] for name in at])
-    return node, np.array([number[network.master_of(name)] for name in at])
 
 
 def _supports(

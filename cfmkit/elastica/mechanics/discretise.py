@@ -27,12 +27,13 @@ from cfmkit.elastica.mechanics.element_cuts import (
     turns_little,
 )
 from cfmkit.elastica.mechanics.element_tables import element_tables
+from cfmkit.elastica.mechanics.numbering import Numbering, Topology, find_free, number
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import find_driven_node
-from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
+from cfmkit.elastica.model.network import LineLoad, PointLoad, TorsionSpring, apart, spring_ends
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.errors import InputError
 
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Drive
-    from cfmkit.elastica.model.network import Network, Spring
+    from cfmkit.elastica.model.network import Network
 
 FLOOR_UNDER_MOTION = 3e-12
 """1/EA [L^2/EI] of a straight beam that does not stretch: at rest nothing else determines the force along it."""
@@ -114,8 +115,7 @@ class Discretisation:
     base: Any  # (size,) values of the held ones
     rate: Any  # (size,) their change with the drive
     scales: MechanicsUnits
-    bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
-    nodes: Mapping[str, int]  # attachment of every node
+    numbering: Numbering
     fits: BeamFits
     floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
     pieces: int = 1  # elements for every smooth piece of a beam, at least
@@ -131,6 +131,16 @@ class Discretisation:
     def __getstate__(self) -> dict[str, Any]:
         """Return what is sent to another process."""
         return {name: value for name, value in self.__dict__.items() if name != "known"}
+
+    @property
+    def bodies(self) -> Mapping[str, tuple[int, int, int]]:
+        """Unknowns of nodes that no link moves."""
+        return self.numbering.bodies
+
+    @property
+    def nodes(self) -> Mapping[str, int]:
+        """Attachment of every node."""
+        return self.numbering.nodes
 
     @property
     def axial(self) -> FloatArray:
@@ -153,7 +163,7 @@ class Discretisation:
     @property
     def n_motions(self) -> int:
         """Number of unknowns that are motions; forces come behind them."""
-        return int(self.elements.unknowns[:, -2:].min())
+        return self.numbering.n_motions
 
 
 def discretise(
@@ -198,23 +208,18 @@ def discretise(
 
 
 class _ArrayBuilder:
-    """Numbers unknowns and attachments and collects the elements."""
+    """Collects attachments, elements and what is held."""
 
     def __init__(
         self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any,
         fits: BeamFits,
     ) -> None:  # fmt: skip
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
-        self.count = 0
-        self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
         self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
-        self.bodies = {name: self._body() for name in network.nodes if not network.is_moved_by_link(name)}
         self.driven = find_driven_node(network, drive)
         along = self.driven is not None and self.driven[1] == FRAME_OF_DRIVE
         self.turned = {drive.node: drive.direction} if along else {}  # type: ignore[union-attr]
-        self.turns = {name: body[2] for name, body in self.bodies.items()}
-        self.own = {name: self._own_place(name) for name in network.nodes}
 
     def build(
         self, given_cuts: Mapping[str, list[float]] | None, flanks: tuple[FlankPlace, ...] = ()
@@ -229,34 +234,33 @@ class _ArrayBuilder:
             name: laws[name].evaluate(touched[name]) if name in laws else self._cuts(name, beam)
             for name, beam in beams.items()
         }
-        tables = element_tables(self.fits, self.scales, self.degree, cuts)
-        ends = np.array([pair for name, beam in beams.items() for pair in self._beam(beam, cuts[name], tables)])
-        springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
         given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
-        loads = tuple(
-            Attached(load, (self._attach(load.node),), grows) for load, grows in given if isinstance(load, PointLoad)
-        )
-        nodes = {name: self._attach(name) for name in self.network.nodes}
+        point_loads = [(load, grows) for load, grows in given if isinstance(load, PointLoad)]
         touching = [
-            (number, self._attach(contact.node))
-            for number, contact in enumerate(self.network.contacts)
+            (contact_number, contact)
+            for contact_number, contact in enumerate(self.network.contacts)
             if not isinstance(contact, BeamSide)
         ]
-        dofs, arms, origins, frames = zip(*self.places, strict=True)
-        frame = np.array([(1.0, 0.0)] * len(frames)) if not any(frames) else _direction(np.array(frames))
-        attachments = Attachments(np.array(dofs), np.array(arms), np.array(origins), frame)
+        numbering = number(self._topology(cuts, [load for load, _ in point_loads], [item.node for _, item in touching]))
+        springs = tuple(map(Attached, self.network.springs, numbering.acting))
+        at_loads = numbering.acting[len(springs) :]
+        loads = tuple(
+            Attached(load, places, grows) for (load, grows), places in zip(point_loads, at_loads, strict=True)
+        )
+        places = np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)])
+        tables = element_tables(self.fits, self.scales, self.degree, numbering.row, places)
+        attachments = self._attachments(numbering, tables)
         floors = np.array([self._floor(name, beam) for name, beam in beams.items()])
-        each = np.array([len(own) - 1 for own in cuts.values()])
-        elements, size = self._elements(cuts, tables, ends, attachments, np.repeat(floors, each))
+        elements, size = self._elements(places, tables, numbering, attachments, floors[numbering.row]), numbering.size
         contacts = tuple(
-            ContactAt(self.network.contacts[number], place, size + k, number)
-            for k, (number, place) in enumerate(touching)
+            ContactAt(item, place, size + k, contact_number)
+            for k, ((contact_number, item), place) in enumerate(zip(touching, numbering.touching, strict=True))
         )
         behind = size + len(contacts) + 3 * len(flanks)
         contacts, n_friction = _number_friction(contacts, behind)
         contacts += self._flank_contacts(flanks, elements, size + len(contacts))
         acting = [*springs, *loads, *(Attached(contact.item, (contact.place,)) for contact in contacts)]
-        free, base, rate = self._constraints(size, elements, attachments, acting)
+        free, base, rate = self._constraints(numbering, attachments, acting)
         if contacts:
             sides = [contact for contact in contacts if contact.slide >= 0]
             more = (
@@ -270,7 +274,7 @@ class _ArrayBuilder:
             base, rate = (np.append(values, np.zeros(len(more))) for values in (base, rate))
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension, contacts,
+            numbering, self.fits, (floors > 0)[numbering.row], self.pieces, self.tension, contacts,
             join_cut_laws(laws, elements.beam, _sides(contacts))
             if flanks
             else None,
@@ -307,52 +311,60 @@ class _ArrayBuilder:
             rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
         return MechanicsUnits(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
 
-    def _number(self, more: int) -> int:
-        self.count += more
-        return self.count - more
+    def _topology(self, cuts: Mapping[str, list[float]], loads: list[PointLoad], touching: list[str]) -> Topology:
+        """Return what the numbers of unknowns and attachments depend on."""
+        network = self.network
+        self._check_arms()
+        beams = zip(network.beams.values(), cuts.values(), strict=True)
+        return Topology(
+            self.degree,
+            tuple(network.nodes),
+            network.links,
+            tuple(link.node for link in network.links if apart(network, link.node)),
+            tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(own) - 1) for b, own in beams),
+            tuple(tuple(spring_ends(spring)) for spring in network.springs) + tuple((load.node,) for load in loads),
+            tuple(touching),
+        )
 
-    def _body(self) -> tuple[int, int, int]:
-        first = self._number(3)
-        return first, first + 1, first + 2
-
-    def _own_place(self, name: str) -> tuple[Any, Any, Any, Any]:
-        """Return unknowns, arm, origin and frame of a node.
-
-        Its arm swings with its master's body, or with the pin between the two if that is where the master is.
-        """
-        master, carrier = self.network.master_of(name), self.network.body_of(name)
-        node, at = self.network.nodes[name], self.network.nodes[master]
-        turn, pinned = self._turn_of(carrier), carrier != master
-        swing = turn if pinned and not apart(self.network, carrier) else self.bodies[master][2]
-        frame, length = self.turned.get(master, at.support.direction), self.scales.length
-        arm = ((node.x - at.x) / length, (node.y - at.y) / length)
-        return (*self.bodies[master][:2], swing, turn), arm, (at.x / length, at.y / length), frame
-
-    def _turn_of(self, carrier: str) -> int:
-        if carrier not in self.turns:
-            self.turns[carrier] = self._number(1)
-        return self.turns[carrier]
-
-    def _attach(self, name: str, offset: Any = (0.0, 0.0), pin: bool = False) -> int:
-        """Return a new attachment at a node: with a rigid offset, behind a pin."""
-        unknowns, arm, origin, frame = self.own[name]
-        carrier = self.network.body_of(name)
-        if carrier not in self.bodies and apart(self.network, carrier):
-            node, body = self.network.nodes[name], self.network.nodes[carrier]
-            if any(offset) or node.x != body.x or node.y != body.y:
+    def _check_arms(self) -> None:
+        """Refuse what hangs at a distance from a node that is pinned to a rigid arm."""
+        network = self.network
+        for link in network.links:
+            carrier, node = network.body_of(link.node), network.nodes[link.node]
+            if not network.is_moved_by_link(carrier) or not apart(network, carrier):
+                continue
+            ends = [((b.start, b.start_offset), (b.end, b.end_offset)) for b in network.beams.values()]
+            offsets = [offset for pair in ends for name, offset in pair if name == link.node]
+            if np.any(offsets) or node.x != network.nodes[carrier].x or node.y != network.nodes[carrier].y:
                 raise InputError(
                     f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own"
                 )
-        if pin:
-            unknowns = (*unknowns[:3], self._number(1))
-        length = self.scales.length
-        self.places.append((unknowns, (arm[0] + offset[0] / length, arm[1] + offset[1] / length), origin, frame))
-        return len(self.places) - 1
 
-    def _spring_places(self, spring: Spring) -> tuple[int, ...]:
-        if isinstance(spring, SlideSpring):
-            return (self._attach(spring.node),)
-        return tuple(self._attach(name) for name in (spring.start, spring.end) if name is not None)
+    def _attachments(self, numbering: Numbering, tables: Mapping[str, Any]) -> Attachments:
+        """Return where springs, loads and ends of elements act; those inside beams are bodies of their own."""
+        nodes, beams, length = self.network.nodes, self.network.beams.values(), self.scales.length
+        spots = np.array([(node.x, node.y) for node in nodes.values()])
+        origin = spots[numbering.master] / length
+        arm = (spots[numbering.node] - spots[numbering.master]) / length
+        if any(any(b.start_offset) or any(b.end_offset) for b in beams):
+            offsets = np.array([(b.start_offset, b.end_offset) for b in beams]) / length
+            arm = arm.astype(np.result_type(arm, offsets))
+            arm[numbering.beam_ends] += offsets
+        if numbering.inside.size:
+            chords = [(tables["weight"] * turn(tables["angle"])).sum(axis=1) for turn in (np.cos, np.sin)]
+            ahead = np.stack(chords, axis=1)
+            origin = origin.astype(np.result_type(origin, arm, ahead))
+            for number_of_beam, first in enumerate(numbering.beam_ends[:, 0]):
+                own = np.flatnonzero(numbering.row == number_of_beam)[:-1]
+                origin[numbering.ends[own, 1]] = origin[first] + arm[first] + np.cumsum(ahead[own], axis=0)
+        angles = [self.turned.get(name, node.support.direction) for name, node in nodes.items()]
+        if not any(angles):
+            frame = np.zeros(arm.shape)
+            frame[:, 0] = 1.0
+            return Attachments(numbering.places, arm, origin, frame)
+        angle = np.array(angles)[numbering.master]
+        angle[numbering.inside] = 0.0
+        return Attachments(numbering.places, arm, origin, _direction(angle))
 
     # -- elements --------------------------------------------------------------------------------------------------
     def _cuts(self, name: str, beam: Beam) -> list[float]:
@@ -360,26 +372,6 @@ class _ArrayBuilder:
         tautness = self.tension.get(name, 0.0)
         whole = self.pieces == 1 and tautness <= TAUT_RATIO and turns_little(beam)
         return [0.0, 1.0] if whole and is_plain(beam) else find_cuts(beam, self.fits[name], self.pieces, tautness)
-
-    def _beam(self, beam: Beam, cuts: list[float], tables: Mapping[str, Any]) -> list[tuple[int, int]]:
-        """Return the attachments of the ends of a beam's elements; those inside the beam are bodies of their own."""
-        start = self._attach(beam.start, beam.start_offset, beam.start_joint == "pin")
-        end = self._attach(beam.end, beam.end_offset, beam.end_joint == "pin")
-        inner, count = len(cuts) - 2, len(self.places)
-        if inner:
-            first = self._elements_before
-            rows = slice(first, first + inner)
-            chords = [(tables["weight"][rows] * turn(tables["angle"][rows])).sum(axis=1) for turn in (np.cos, np.sin)]
-            _, arm, origin, _ = self.places[start]
-            x, y = ((origin[k] + arm[k] + np.cumsum(chords[k])).tolist() for k in (0, 1))
-            for place in zip(x, y, strict=True):
-                body = self._body()
-                self.places.append(((*body, body[2]), (0.0, 0.0), place, 0.0))
-        self._elements_before += inner + 1
-        marks = [start, *range(count, count + inner), end]
-        return list(itertools.pairwise(marks))
-
-    _elements_before = 0  # of the beams that are attached
 
     def _floor(self, name: str, beam: Beam) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
@@ -390,22 +382,18 @@ class _ArrayBuilder:
         return float(floor * self.scales.force * self.scales.length**2 / rigidity)
 
     def _elements(
-        self, cuts: Mapping[str, list[float]], tables: dict[str, Any], ends: Any, attachments: Attachments, floors: Any
-    ) -> tuple[BeamElements, int]:
-        """Return the elements and the number of unknowns: bubbles and forces are numbered behind motions of ends."""
-        count = len(ends)
-        bubbles = self._number(count * (self.degree - 1)) + np.arange(count * (self.degree - 1)).reshape(count, -1)
-        forces = self._number(2 * count) + np.arange(2 * count).reshape(count, 2)
-        whole = attachments.unknowns
-        unknowns = np.concatenate([whole[ends[:, 0]], whole[ends[:, 1]], bubbles, forces], axis=1)
+        self, cuts: FloatArray, tables: dict[str, Any], numbering: Numbering, attachments: Attachments, floors: Any
+    ) -> BeamElements:  # fmt: skip
+        """Return the elements."""
         if floors.any():
             tables = tables | {"axial": tables["axial"] + floors[:, None]}
-        beams = tuple(name for name, own in cuts.items() for _ in own[1:])
+        names = list(self.network.beams)
+        beams = tuple(names[k] for k in numbering.row.tolist())
         elements = BeamElements(
-            **tables, line=self._line_loads(beams), gap=np.zeros((count, 2)), ends=ends, unknowns=unknowns, beam=beams,
-            cuts=np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)]),
+            **tables, line=self._line_loads(beams), gap=np.zeros((len(beams), 2)), ends=numbering.ends,
+            unknowns=numbering.unknowns, beam=beams, cuts=cuts,
         )  # fmt: skip
-        return elements._replace(gap=self._gaps(elements, attachments)), self.count
+        return elements._replace(gap=self._gaps(elements, attachments))
 
     def _line_loads(self, beams: tuple[str, ...]) -> Any:
         """Return the line loads of every element: constant and growing with the drive."""
@@ -432,28 +420,25 @@ class _ArrayBuilder:
 
     # -- what is held ----------------------------------------------------------------------------------------------
     def _constraints(
-        self, size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]
+        self, numbering: Numbering, attachments: Attachments, acting: list[Attached]
     ) -> tuple[Any, Any, Any]:
         """Return the free unknowns, the values of held ones and their change with the drive."""
-        displaced = [value for node in self.network.nodes.values() for value in node.support.displacement]
-        held, base, rate = (
-            np.zeros(size, bool),
-            np.zeros(size, np.result_type(float, np.asarray(displaced))),
-            np.zeros(size),
-        )
-        for name, body in self.bodies.items():
+        rate, held = np.zeros(numbering.size), dict[int, Any]()
+        for name, body in numbering.bodies.items():
             support = self.network.nodes[name].support
             flags = support.along, support.across, support.rotation
             for flag, unknown, value in zip(flags, body, support.displacement, strict=True):
                 if flag:
-                    held[unknown] = True
-                    base[unknown] = value / (1.0 if unknown == body[2] else self.scales.length)
-        held |= ~_used(size, elements, attachments, acting)
+                    held[unknown] = value / (1.0 if unknown == body[2] else self.scales.length)
         if self.driven is not None:
             node, local, sense = self.driven
-            unknown = self.bodies[node][local % FRAME_OF_DRIVE]
-            held[unknown], rate[unknown], base[unknown] = True, sense, 0.0
-        return np.flatnonzero(~held), base, rate
+            unknown = numbering.bodies[node][local % FRAME_OF_DRIVE]
+            rate[unknown], held[unknown] = sense, 0.0
+        base = np.zeros(numbering.size, np.result_type(float, *{type(value) for value in held.values()}))
+        base[list(held)] = list(held.values())
+        arms = (attachments.arm != 0).any(axis=1).tobytes()
+        acts = tuple((attached.places, *_acts_on(attached.item)) for attached in acting)
+        return find_free(numbering, tuple(held), arms, acts), base, rate
 
 
 def _number_friction(contacts: tuple[ContactAt, ...], first: int) -> tuple[tuple[ContactAt, ...], int]:
@@ -479,20 +464,10 @@ def _direction(angle: Any) -> Any:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
-    """Return which unknowns anything acts on: a rotation that nothing resists or turns is none of them."""
-    used = np.zeros(size, bool)
-    used[elements.unknowns[:, [0, 1, 3, 4, 5, *range(7, elements.unknowns.shape[1])]]] = True
-    arms = np.abs(attachments.arm).max(axis=1) > 0
-    used[elements.unknowns[:, [2, 6]][arms[elements.ends]]] = True
-    for item, places, _ in acting:
-        for unknowns, has_arm in zip(attachments.unknowns[list(places)], arms[list(places)], strict=True):
-            if isinstance(item, TorsionSpring):
-                used[unknowns[3]] = True
-                continue
-            if isinstance(item, Stop) and item.turns:  # alone it holds no rotation
-                continue
-            used[unknowns[:2]] = True
-            used[unknowns[2]] |= has_arm
-            used[unknowns[3]] |= isinstance(item, PointLoad) and (item.follows or item.moment != 0)
-    return used
+def _acts_on(item: Any) -> tuple[bool, bool]:
+    """Return whether something acts on the place of an attachment, and whether on its rotation."""
+    if isinstance(item, TorsionSpring):
+        return False, True
+    if isinstance(item, Stop) and item.turns:  # alone it holds no rotation
+        return False, False
+    return True, isinstance(item, PointLoad) and bool(item.follows or item.moment != 0)

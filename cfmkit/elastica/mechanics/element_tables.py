@@ -15,7 +15,7 @@ from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, sl
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.units import MechanicsUnits
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
-def element_tables(
-    fits: BeamFits, scales: MechanicsUnits, degree: int, cuts: Mapping[str, list[float]]
-) -> dict[str, Any]:
+def element_tables(fits: BeamFits, scales: MechanicsUnits, degree: int, row: Any, cuts: FloatArray) -> dict[str, Any]:
     """Return the tables of the elements between cuts of the beams, one beam after the other.
 
     Parameters
@@ -38,28 +36,27 @@ def element_tables(
         Units of the tables.
     degree : int
         Of the rotation on an element.
-    cuts : mapping
-        Parameters of a beam's shape between which its elements lie, ascending, by the beam's name.
+    row, cuts : (e,), (e, 2) arrays
+        Number of each element's beam, ascending, and the parameters of its shape between which it lies.
     """
     beams, bundle = fits.network.beams, fits.bundle
     wide = any(beam.section.wide for beam in beams.values())
-    plain = [] if wide else [bundle.names[k] for k in bundle.plain]
-    counts = [len(cuts[name]) - 1 for name in plain]
-    together = {}
+    plain, together, first = [] if wide else bundle.plain, dict[str, Any](), 0
     if plain:
-        own = np.array([pair for name in plain for pair in itertools.pairwise(cuts[name])])
-        row = np.repeat(np.arange(len(plain)), counts)
-        together = plain_tables(bundle.coefficients, bundle.length, bundle.rigidities, scales, degree, row, own)
-    if len(plain) == len(cuts):
-        return together
-    ends = np.cumsum(counts).tolist()
-    of_beam = {name: slice(end - count, end) for name, count, end in zip(plain, counts, ends, strict=True)}
+        rows = np.isin(row, plain) if bundle.others else slice(None)
+        number = np.searchsorted(plain, row[rows]) if bundle.others else row
+        shapes = bundle.coefficients, bundle.length, bundle.rigidities
+        together = plain_tables(*shapes, scales, degree, number, cuts[rows])
+        if not bundle.others:
+            return together
     parts: list[dict[str, Any]] = []
-    for name, beam in beams.items():
-        if name in of_beam:
-            parts.append({column: values[of_beam[name]] for column, values in together.items()})
+    for k, (name, beam) in enumerate(beams.items()):
+        between = cuts[row == k]
+        if k in plain:
+            parts.append({column: values[first : first + len(between)] for column, values in together.items()})
+            first += len(between)
         else:
-            parts += _smooth_tables(beam, fits[name], scales, degree, cuts[name], wide)
+            parts += _smooth_tables(beam, fits[name], scales, degree, between.tolist(), wide)
     return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
 
 
@@ -95,11 +92,11 @@ def plain_tables(
 
 
 def _smooth_tables(
-    beam: Beam, fitted: Fit, scales: MechanicsUnits, degree: int, cuts: list[float], wide: bool
+    beam: Beam, fitted: Fit, scales: MechanicsUnits, degree: int, cuts: list[list[float]], wide: bool
 ) -> Iterator[dict[str, Any]]:
     """Yield the tables of the elements in each smooth part of a beam."""
     for begin, end in itertools.pairwise(smooth_marks(beam, fitted)):
-        own = np.array([pair for pair in itertools.pairwise(cuts) if begin <= 0.5 * sum(pair) < end])
+        own = np.array([pair for pair in cuts if begin <= 0.5 * sum(pair) < end])
         if len(own):  # else the marks are at one place but for rounding
             yield smooth_tables(beam, fitted, scales, degree, own, 0.5 * (begin + end), wide)
 

@@ -82,16 +82,13 @@ class NetworkProblem:
         """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
         row, level = (None, 0.0) if border is None else border
         state = self.equations.solve(x, drive, row, level, push)
-        if state is None or not np.isfinite(state.rate).all():
-            return None
-        return _equilibrium(state)
+        return None if state is None else _equilibrium(state)
 
     def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
         """Return the equilibria near guesses at their drives, in compiled code."""
         found = self.equations.solve_each(np.array(guesses), np.array(drives))
-        good = found.converged & np.isfinite(found.rate).all(axis=1)
         each = zip(found.free, drives, found.rate, found.unstable.tolist(), found.effort.tolist(), strict=True)
-        return [PathEquilibrium(*values) if well else None for values, well in zip(each, good, strict=True)]
+        return [PathEquilibrium(*values) if well else None for values, well in zip(each, found.converged, strict=True)]
 
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
@@ -165,13 +162,13 @@ class NetworkProblem:
         The motion of a node that changes most goes to the negative side; modes that move no node are told by the
         moments at the beams' ends. With several modes that is repeated on the rest, whatever spans them.
         """
-        nodes, ends = modes[self._node_rows], self._end_moments(modes)
+        nodes = modes[self._node_rows]
         size = np.abs(modes[self.motions]).max()
         rest, amounts = np.eye(modes.shape[1]), np.zeros(modes.shape[1])
         for _ in range(modes.shape[1]):
             parts = nodes @ rest
             if not np.abs(parts).max(initial=0.0) > NO_MOTION * size:
-                parts = ends @ rest
+                parts = self._end_moments(modes) @ rest
             sizes = np.linalg.norm(parts, axis=1)
             if not sizes.max(initial=0.0) > 0:
                 break
@@ -185,8 +182,7 @@ class NetworkProblem:
     @cached_property
     def _node_rows(self) -> Any:
         """Which free unknowns move nodes."""
-        named = [unknown for body in self.mesh.bodies.values() for unknown in body]
-        return np.flatnonzero(np.isin(self.mesh.free, named))
+        return np.flatnonzero(self.mesh.free < 3 * len(self.mesh.bodies))  # they come first
 
     def _end_moments(self, modes: FloatArray) -> FloatArray:
         """Return the moments at the ends of the beams in modes, (beams, k)."""

@@ -29,8 +29,8 @@ class BeamFits(Mapping[str, Fit]):
 
     def __init__(self, network: Network) -> None:
         """Fit the plain beams, all at once."""
-        ends = np.array([beam_end_at(network, name, side) for name in network.beams for side in (0, 1)])
-        self.network, self.bundle = network, Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
+        ends = np.array([[beam_end_at(network, name, side) for side in (0, 1)] for name in network.beams])
+        self.network, self.bundle = network, Bundle(network, ends)
         self._known: dict[str, Fit] = {}
 
     def __getitem__(self, name: str) -> Fit:

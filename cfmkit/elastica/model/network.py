@@ -186,7 +186,7 @@ class Network(ShortRepr):
                 self._require_node(beam.start, f"beam {name!r}")
                 self._require_node(beam.end, f"beam {name!r}")
         for spring in self.springs:
-            for end in _ends(spring):
+            for end in spring_ends(spring):
                 self._require_node(end, "a spring")
         for load in self.loads:
             self.check_load(load)
@@ -252,7 +252,7 @@ class Network(ShortRepr):
             raise InputError("a node can be moved by one link only")
 
 
-def _ends(spring: Spring) -> list[str]:
+def spring_ends(spring: Spring) -> list[str]:
     """Return the names of the nodes at a spring."""
     if isinstance(spring, SlideSpring):
         return [spring.node]

@@ -42,20 +42,19 @@ class Bundle:
         Of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them.
     """
 
-    def __init__(self, network: Network, ends: Any, beam_end: Any) -> None:
-        """Fit the plain beams; `ends` (places, 2) [m] has the attachments, `beam_end` those of each beam."""
+    def __init__(self, network: Network, ends: Any) -> None:
+        """Fit the plain beams; `ends` (b, 2, 2) [m] has the places of their ends."""
         self.names, self.beams = list(network.beams), list(network.beams.values())
         plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
         self.plain = plain
         self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
         if plain:
-            self._fit_plain(ends, beam_end if not self.others else beam_end[plain])
+            self._fit_plain(ends if not self.others else ends[plain])
 
-    def _fit_plain(self, ends: Any, beam_end: Any) -> None:
+    def _fit_plain(self, ends: Any) -> None:
         beams = [self.beams[k] for k in self.plain]
         c = coefficients_of(beams) + 0.0
-        both = ends[beam_end]
-        reach = both[:, 1] - both[:, 0]
+        reach = ends[:, 1] - ends[:, 0]
         distance = np.sqrt(reach[:, 0] * reach[:, 0] + reach[:, 1] * reach[:, 1])
         cx, cy = chords(c)
         own = np.sqrt(cx * cx + cy * cy)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.mechanics.refine import embed, n_end_motions
+from cfmkit.elastica.mechanics.refine import embed
 from cfmkit.elastica.results.path import largest_force, work_with_drive
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -26,7 +26,7 @@ MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 ERROR_SAFETY = 1.5
 ROUNDING_ERROR = 1e-13
-ROUNDING = float(np.finfo(float).eps)
+MACHINE_EPSILON = float(np.finfo(float).eps)
 ROUNDED_PLACES = 4.0  # roundings of a place by which a nearly rigid network's effort is uncertain
 CRITICAL_STIFFNESS = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
@@ -46,11 +46,12 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
         return np.zeros(len(indices))
     chosen, own, mesh = list(indices), path.at, path.mesh
     problem, z, drives = NetworkProblem(finer), own.z[chosen], own.drive[chosen]
-    n_bodies, guesses = n_end_motions(mesh), embed(mesh, finer, z)
-    solved = problem.equations.solve_each(guesses[:, finer.free], drives, NEXT_CORRECTION, quick=True)
-    states = guesses.copy()
-    states[:, finer.free] = np.where(solved.converged[:, None], solved.free, guesses[:, finer.free])
-    moved = np.abs(states[:, : finer.n_motions] - guesses[:, : finer.n_motions]).max(axis=1)
+    n_bodies, guesses = mesh.numbering.n_ends, embed(mesh, finer, z)
+    free, states = guesses[:, finer.free], guesses
+    solved = problem.equations.solve_each(free, drives, NEXT_CORRECTION, quick=True)
+    states[:, finer.free] = np.where(solved.converged[:, None], solved.free, free)
+    n_free_motions = int(np.searchsorted(finer.free, finer.n_motions))
+    moved = np.abs(solved.free[:, :n_free_motions] - free[:, :n_free_motions]).max(axis=1, initial=0.0)
     known = solved.converged & (moved <= MAX_CHANGE)
     for row in np.flatnonzero(known & (solved.unstable != path.unstable[chosen])):
         at = PathEquilibrium(solved.free[row], float(drives[row]), solved.rate[row], int(solved.unstable[row]))
@@ -73,7 +74,7 @@ def _rises(path: Path) -> FloatArray:
     drive, effort, slope = path.at.drive, path.effort, np.zeros(len(path) + 1)
     change = np.abs(drive[1:] - drive[:-1])
     np.divide(np.abs(effort[1:] - effort[:-1]), change, out=slope[1:-1], where=change > 0)
-    return np.maximum(slope[1:], slope[:-1]) * ROUNDING
+    return np.maximum(slope[1:], slope[:-1]) * MACHINE_EPSILON
 
 
 def polish(path: Path) -> Path:

@@ -185,7 +185,7 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
 
 def is_stretched(mesh: Discretisation, z: np.ndarray) -> bool:
     """Return True if a beam that does not stretch was stretched through its floor at any of k states, (k, size)."""
-    if not len(z) or not np.any(mesh.floored):
+    if not len(z) or not mesh.floored.any():
         return False
     elements = np.flatnonzero(mesh.floored)
     force = np.abs(z[:, mesh.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))

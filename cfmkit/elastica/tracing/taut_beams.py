@@ -39,16 +39,16 @@ def _tautness(path: Path) -> FloatArray:
     e = path.mesh.elements
     force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=-1) * e.length
-    lengths = dict.fromkeys(e.beam, 0.0)
-    for beam, length in zip(e.beam, e.length.reshape(-1, len(e.beam))[0].tolist(), strict=True):
-        lengths[beam] += length
-    return np.asarray(np.sqrt(force / bending) * [lengths[beam] for beam in e.beam])
+    row = path.mesh.numbering.row
+    return np.asarray(np.sqrt(force / bending) * np.bincount(row, e.length.reshape(-1, len(row))[0])[row])
 
 
 def drop_locked_points(path: Path) -> Path:
     """Return a path that ends early up to where a beam that does not stretch is pulled straight: there forces soar."""
+    if path.status is PathStatus.COMPLETE or not len(path):
+        return path
     rigid = ~path.mesh.axial.any(axis=1)
-    if path.status is PathStatus.COMPLETE or not len(path) or not rigid.any():
+    if not rigid.any():
         return path
     locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
     return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

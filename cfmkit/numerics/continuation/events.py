@@ -118,18 +118,21 @@ def _interpolate(
     nearest = near[0]
     if len({sample.value for sample in near}) < 3:
         near = near[:1]
-    if not low.share <= _interpolate_at_root(near, [sample.share for sample in near]) <= high.share:
+    weights = _root_weights(near)
+    share = float(weights @ [sample.share for sample in near])
+    if not low.share <= share <= high.share:
         near = [low, high]  # the third lies on another path
-    x = _interpolate_at_root(near, np.array([sample.at.x for sample in near]))
-    drive = float(_interpolate_at_root(near, [sample.at.drive for sample in near]))
-    share = float(_interpolate_at_root(near, [sample.share for sample in near]))
+        weights = _root_weights(near)
+        share = float(weights @ [sample.share for sample in near])
+    x, drive = weights @ [sample.at.x for sample in near], float(weights @ [sample.at.drive for sample in near])
     return Located(x, drive, nearest.at, low.at, high.at, share, within)
 
 
-def _interpolate_at_root(near: list[_Sample], values: Any) -> Any:
-    """Return Lagrange's interpolation of values at samples to where their function vanishes."""
-    weights = [math.prod(other.value / (other.value - own.value) for other in near if other is not own) for own in near]
-    return np.array(weights) @ np.asarray(values)
+def _root_weights(near: list[_Sample]) -> FloatArray:
+    """Return the weights of samples in Lagrange's interpolation to where their function vanishes."""
+    return np.array(
+        [math.prod(other.value / (other.value - own.value) for other in near if other is not own) for own in near]
+    )
 
 
 def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) -> Callable[[PathEquilibrium], float]:
