@@ -118,13 +118,16 @@ def link_width(force: float, thickness: float, hole: float, strength: PartStreng
 
 
 def screw_for(load: float, thickness: float, count: int, strength: PartStrength) -> Screw:
-    """Return the smallest screw that a plate bears when so many share a load: bearing, and shear of the screw."""
+    """Return the smallest screw that is usual in a plate and bears its share of a load."""
+    usual = [entry for entry in SOCKET_SCREWS if entry.diameter >= LEAST_SCREW]
+    return next((screw for screw in usual if screw_bears(screw, load, thickness, count, strength)), usual[-1])
+
+
+def screw_bears(screw: Screw, load: float, thickness: float, count: int, strength: PartStrength) -> bool:
+    """Return True if so many equal screws in a plate share a load: bearing, and shear of the screw."""
     share = load / count
-    for screw in (entry for entry in SOCKET_SCREWS if entry.diameter >= LEAST_SCREW):
-        shear = share / (0.25 * math.pi * screw.diameter**2)
-        if share / (screw.diameter * thickness) <= strength.allowable and shear <= strength.pins / math.sqrt(3.0):
-            return screw
-    return SOCKET_SCREWS[-1]
+    shear = share / (0.25 * math.pi * screw.diameter**2)
+    return share / (screw.diameter * thickness) <= strength.allowable and shear <= strength.pins / math.sqrt(3.0)
 
 
 @dataclass(frozen=True)

@@ -75,3 +75,49 @@ def test_no_stored_shape_touches_itself():
     for kept in kept_shapes():
         result = cfmkit.analyze(kept.spec.replace({"analysis.fidelity": "reissner", "analysis.points": 11}))
         assert "beams_touch" not in {one.name for one in result.warnings}, kept.name
+
+
+def test_a_cam_for_a_large_force_has_a_plate_pins_and_springs_that_fit():
+    """500 N over 250 mm: with a plate for 4.5 times the force on each roller, whatever its path, there was none."""
+    keys = {"force": "500 N", "travel": "250 mm", "ripple": "4 %", "envelope": "[600 mm, 900 mm, 200 mm]"}
+    asked, candidates = offered("cam", **keys, material="steel-s235", safety="1.5")
+    made = [make_proposal(ProposalJob("cam", one, asked, 0)) for one in candidates if one.springs == "custom"]
+    assert any(one.good for one in made), [one.missed for one in made]
+    factors = [one.numbers["safety_factor"] for one in made if one.text]
+    assert all(1.5 <= factor < 1.8 for factor in factors), factors
+
+
+def test_the_pins_of_a_cam_with_friction_bear_its_braces():
+    keys = {"force": "120 N", "travel": "60 mm", "ripple": "3 %", "envelope": "[250 mm, 350 mm, 80 mm]"}
+    asked, candidates = offered("cam", **keys, hysteresis="6 %", material="steel-s235", safety="1.5")
+    made = [make_proposal(ProposalJob("cam", one, asked, 0)) for one in candidates[:6]]
+    assert any(one.good for one in made)
+    assert not any("slider pin" in text for one in made for text in one.missed)
+
+
+def test_catalogue_springs_get_a_plate_that_bears_their_rollers():
+    keys = {"force": "5 N", "travel": "40 mm", "ripple": "3 %", "envelope": "[120 mm, 160 mm, 25 mm]"}
+    asked, candidates = offered("cam", **keys, springs="catalogue", material="steel-s235", safety="1.5")
+    made = [make_proposal(ProposalJob("cam", one, asked, 0)) for one in candidates if one.springs == "catalogue"]
+    assert any(one.good for one in made)
+    assert not any("stress" in one.fails for one in made)
+
+
+def test_springs_above_each_other_count_in_the_height_of_a_cam():
+    spec, wound = cfmkit.load("configs/cam.yaml"), {"wire": "1 mm", "coil": "12 mm", "turns": 40}
+    heights = {}
+    for count in (4, 20, 40):
+        result = cfmkit.analyze(spec.replace({"mechanism.springs": {"wound": wound, "count": count}}))
+        heights[count] = family("cam").envelope(result).along
+    # half of them on either side, of 13 mm each, around the axis of the rollers
+    assert heights[40] - heights[20] == pytest.approx(0.5 * 10 * 13e-3)
+    assert heights[20] > heights[4]
+
+
+def test_a_thin_screw_that_bears_its_share_is_no_fault():
+    spec = cfmkit.load("configs/cam.yaml")
+    faults = [
+        family("cam").envelope(cfmkit.analyze(spec.replace({"mechanism.plate.hole_diameter": hole}))).faults
+        for hole in ("2.9 mm", "6.6 mm")
+    ]
+    assert faults[0] == faults[1]

@@ -28,6 +28,7 @@ from cfmkit.families.hardware import (
     mm,
     pin_for,
     pin_part,
+    screw_bears,
     screw_for,
     screw_part,
     with_faults,
@@ -83,9 +84,10 @@ def hardware(solution: Solution) -> Hardware:
     travel, radius = float(np.ptp(solution.travel)), mechanism.roller_radius
     rod = guide_rod(across, force, travel, 2.0 * radius, mechanism.guide, system, strength)
     holes = [edge for contour in _plate(solution)[1:] for edge in contour.edges if isinstance(edge, Arc)]
-    needed = screw_for(force, thick, max(len(holes), 2), strength)
+    count = max(len(holes), 2)
+    needed = screw_for(force, thick, count, strength)
     screw = (screw_through(plate.hole_diameter) if holes else None) or needed
-    if screw.diameter < needed.diameter:
+    if not screw_bears(screw, force, thick, count, strength):
         faults["plate to its base"] = (
             f"too weak for {newton(force)}: use {needed.name}, with holes of {length_in_words(needed.hole)} "
             "('mechanism.plate.hole_diameter')"

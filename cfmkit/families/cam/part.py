@@ -12,11 +12,22 @@ from cfmkit.export.contours import polygons
 from cfmkit.export.posed_part import PosedBody, PosedPart, box, rectangle
 from cfmkit.families.cam.hardware import hardware
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.part_sizes import BRACE_WIDTH, PLATE_THICKNESS, count_of, depth_of, pin_path, roller_path
+from cfmkit.families.cam.part_sizes import (
+    BRACE_WIDTH,
+    PLATE_THICKNESS,
+    coil_diameter,
+    count_of,
+    depth_of,
+    pin_path,
+    roller_path,
+    stack_height,
+)
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
     from cfmkit.families.cam.solution import Solution
@@ -31,14 +42,16 @@ MIN_ASPECT_RATIO = 0.2
 def part_over_motion(result: Result) -> PosedPart | None:
     """Return a solved mechanism over its travel; None of a motion in time, or of a cam as built.
 
-    In the depth there are the plate, a brace on both sides of it, and outside of these the springs.
+    In the depth there are the plate, a brace on both sides of it, and outside of these the springs, which stand above
+    each other.
     """
     solution = result.state
     if not hasattr(solution, "states"):
         return None
     mechanism = result.spec.get_value("mechanism")
     thick = PLATE_THICKNESS if mechanism.contact is None else mechanism.contact.width
-    depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
+    stretch = float(solution.elongation.max())
+    depth = depth_of(thick, mechanism.springs, stretch, mechanism.rest_half_width)
     wound = (
         f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
     )
@@ -48,7 +61,7 @@ def part_over_motion(result: Result) -> PosedPart | None:
     # plate, two rollers, two braces, slider
     pieces = 6 + count_of(mechanism.springs)
     joining = hardware(solution)
-    all_bodies = (*bodies(solution), *joining.bodies)
+    all_bodies = (*bodies(solution), *joining.bodies, *_stacked_springs(solution, stretch))
     return PosedPart(all_bodies, depth=depth, pieces=pieces, assumed=reported, pin=joining.pin, faults=joining.faults)
 
 
@@ -58,6 +71,18 @@ def bodies(solution: Solution) -> tuple[PosedBody, ...]:
     plate = [PosedBody.polygon("plate", "held", rectangle(*contour.extents)) for contour in _plate(solution)]
     right = PosedBody.line("roller", "contact", roller_path(solution)[:, None], radius)
     return (*plate, right, right.mirror(), PosedBody.line("slider", "driven", pin_path(solution)[:, None], radius))
+
+
+def _stacked_springs(solution: Solution, stretch: float) -> Iterator[PosedBody]:
+    """Yield the box of the springs between the rollers' axes, as high as those on one side above each other."""
+    mechanism = solution.assembly.spec.mechanism
+    outer = coil_diameter(mechanism.springs, stretch, mechanism.rest_half_width)
+    if outer is None:
+        return
+    half = 0.5 * stack_height(outer, count_of(mechanism.springs))
+    x, y = roller_path(solution).T
+    corners = np.stack([[-x, y - half], [x, y - half], [x, y + half], [-x, y + half]])
+    yield PosedBody.polygon("springs", "free", corners.transpose(2, 0, 1))
 
 
 def _plate(solution: Solution) -> tuple[Contour, ...]:

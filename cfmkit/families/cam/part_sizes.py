@@ -44,15 +44,28 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
     stretch, half_width : float
         Their largest elongation, and half their length at rest [m].
     """
-    count = count_of(springs)
+    outer = coil_diameter(springs, stretch, half_width)
+    return None if outer is None else thick + 2.0 * min(thick, BRACE_WIDTH) + min(count_of(springs), 2) * outer
+
+
+def coil_diameter(springs: Springs, stretch: float, half_width: float) -> float | None:
+    """Return the outer diameter of each spring, of its known wire or else wound of steel wire [m]; None if none fits.
+
+    `stretch`, `half_width`: as of `depth_of`.
+    """
     if springs.wound is not None:
-        outer = springs.wound.coil + springs.wound.wire
-    else:
-        coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
-        if coil is None:
-            return None
-        outer = coil.outer_diameter
-    return thick + 2.0 * min(thick, BRACE_WIDTH) + min(count, 2) * outer
+        return springs.wound.coil + springs.wound.wire
+    coil = extension_spring(springs.total / count_of(springs), stretch, 2.0 * half_width)
+    return None if coil is None else coil.outer_diameter
+
+
+def stack_height(outer: float, count: int) -> float:
+    """Return how high springs of an outer diameter stand above each other, half of them on either side [m].
+
+    >>> stack_height(0.01, 4), stack_height(0.01, 5)
+    (0.02, 0.03)
+    """
+    return outer * ((count + 1) // 2)
 
 
 def count_of(springs: Springs) -> int:

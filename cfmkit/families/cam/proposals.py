@@ -2,7 +2,8 @@
 
 With D = x - x0 the travel is s = D^2/(2A), the springs are stretched by 2D and add up to K = F/(4A) [SS, eq. 1].
 Friction makes F/F0 = 1 +- mu (1 + f^2) A/D with the path's slope f = D/A + tan a; the roller fits the path's start if
-its radius is below 1/(cos^3 a0/A + 1/l).
+its radius is below 1/(cos^3 a0/A + 1/l). Without friction a roller presses on the cam with (F/2) sqrt(1 + f^2): half of
+the force along the travel, f times as much across it.
 
 Reference
 ---------
@@ -19,11 +20,11 @@ import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.hardware import SHAFT_IN_ROLLER
-from cfmkit.families.cam.part_sizes import count_of, depth_of
+from cfmkit.families.cam.part_sizes import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
-from cfmkit.families.hardware import PIN_STRENGTH
+from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, pin_for
 from cfmkit.families.suggestion_request import Candidate, FamilyOffer, name_variant
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
@@ -42,7 +43,10 @@ SLIDING_FRICTION = 0.1
 required: greased steel; assumed."""
 
 PIN_SHARE = 0.25
-"""Diameter of the slider pin and of the pins that springs hook on, over that of a roller: assumed."""
+"""Diameter of the slider pin and of the pins that springs hook on, over that of a roller, at least: assumed."""
+
+PULL_MARGIN, CONTACT_MARGIN = 1.1, 1.1
+"""On the pull of a brace, and on the force between roller and cam: friction adds to them."""
 
 N_PROPORTIONS = 60_000
 """Proportions that are looked at."""
@@ -53,8 +57,8 @@ MAX_PROPOSALS = 16
 TAB_HEIGHT_RATIO, TOP_MARGIN_RATIO, MAX_HOLE_DIAMETER = 0.06, 0.02, 0.0066
 """Height of the plate's tab and of its margin above the flanks over that of the envelope; largest fixing hole [m]."""
 
-PLATE_MIN, CONTACT_LIMITS = 0.002, 4.5
-"""Thinnest plate [m]; largest force between roller and cam over the mechanism's, as in [SS]'s, where it is 4.1."""
+PLATE_MIN = 0.002
+"""Thinnest plate [m]."""
 
 ROLLER_MIN = 0.0015
 """Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
@@ -93,7 +97,8 @@ def propose(request: Request, run: Run) -> FamilyOffer:
             break
     if not candidates:
         depth = "" if request.depth is None else f" within a depth of {mm(request.depth)}"
-        return FamilyOffer(reason=f"no steel spring of this force and stretch fits between the rollers{depth}")
+        text = "no rollers have room between them for steel springs, and around pins and shafts that bear this force"
+        return FamilyOffer(reason=f"{text}{depth}")
     return FamilyOffer(tuple(candidates))
 
 
@@ -121,15 +126,16 @@ def _size_proportions(request: Request, draw: FloatArray) -> dict[str, Any]:
     tab = TAB_HEIGHT_RATIO * along
     width = 2.0 * (end + roller)
     height = stroke + rise + roller + np.maximum(roller, tab)
-    shaft = np.cbrt(32.0 * CONTACT_LIMITS * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
-    least = max(ROLLER_MIN, 0.5 * float(shaft) / SHAFT_IN_ROLLER)
+    contact = 0.5 * np.hypot(1.0, slope.max(axis=0))
+    shaft = np.cbrt(32.0 * contact * request.target * SHAFT_ARM * request.safety / (np.pi * PIN_STRENGTH))
+    least = np.maximum(ROLLER_MIN, 0.5 * shaft / SHAFT_IN_ROLLER)
     there = (end < 0.97 * brace) & (roller > least) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
     ripple = np.where(there, np.maximum(ripple, down), np.inf)
     hysteresis = np.where(there, 2.0 * loss.mean(axis=0), np.inf)
     return {
         "brace": brace, "start": start, "constant": constant, "roller": roller, "run_in": run_in, "end": end,
         "width": width, "height": height, "ripple": ripple, "hysteresis": hysteresis, "loss": loss.mean(axis=0),
-        "there": there,
+        "there": there, "contact": contact,
         "fits": there & (width < RESERVE_SHARES * across) & (height < RESERVE_SHARES * along),
         "flat": there & (ripple < FLAT_RESERVE * request.ripple) & (loss.max(axis=0) < 0.2),
         "lossless": there & (hysteresis < RESERVE_SHARES * (request.hysteresis or np.inf)),
@@ -161,19 +167,41 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
             continue
         modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
         bearable = YIELD_PRESSURE * material.yield_strength / request.safety
-        thick = max(PLATE_MIN, 1.1 * CONTACT_LIMITS * request.target * modulus / (np.pi * size["roller"] * bearable**2))
-        depths = {}
-        for count in SPRING_COUNTS:
+        press = CONTACT_MARGIN * size["contact"] * request.target
+        thick = max(PLATE_MIN, press * modulus / (np.pi * size["roller"] * bearable**2))
+        depths: dict[int, float] = {}
+        pin = _slider_pin(request, size, thick, material)
+        for count in SPRING_COUNTS if pin is not None else ():
             springs = Springs(stiffness=total / count, count=count)
             depth = depth_of(thick, springs, stretch, size["start"])
-            if depth is not None and depth <= (request.depth or sum(request.envelope)):
+            if depth is None or depth > (request.depth or sum(request.envelope)):
+                continue
+            stack = stack_height(coil_diameter(springs, stretch, size["start"]) or 0.0, count)
+            below = 0.5 * stack - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
+            if size["height"] + max(below, 0.0) <= request.envelope[1]:
                 depths[count] = depth
         if depths:
             # as few springs as there is room for; without a depth they may be as deep as the envelope is wide
             modest = [count for count, depth in depths.items() if request.depth or depth <= max(request.envelope)]
             count = modest[0] if modest else min(depths, key=lambda one: depths[one])
-            return _write_candidate(request, size, dict(block), thick, count, total)
+            return _write_candidate(request, size | {"pin": float(pin or 0.0)}, dict(block), thick, count, total)
     return None
+
+
+def _slider_pin(request: Request, size: dict[str, float], thick: float, material: MaterialSpec) -> float | None:
+    """Return the slider's pin, for the pull of a brace at the end of the travel [m].
+
+    None if it, or the shaft of a roller, is too thick for roller and slider.
+    """
+    strength = PartStrength.from_material(material, 1.0)
+    brace = min(thick, BRACE_WIDTH)
+    arm = 0.5 * (thick + brace)
+    rise = np.sqrt(size["brace"] ** 2 - size["end"] ** 2)
+    pull = PULL_MARGIN * 0.5 * request.target * size["brace"] / float(rise)
+    pin, pin_bears = pin_for(pull, arm, brace, strength, None)
+    shaft, shaft_bears = pin_for(CONTACT_MARGIN * size["contact"] * request.target, arm, thick, strength, None)
+    most = SHAFT_IN_ROLLER * 2.0 * size["roller"]
+    return max(pin, PIN_SHARE * 2.0 * size["roller"]) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
 
 
 def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
@@ -194,6 +222,20 @@ def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
     return spec.replace({f"mechanism.springs.{key}": value for key, value in as_stated(coil).items()})
 
 
+def with_plate(spec: CamSpec, request: Request) -> CamSpec:
+    """Return a designed cam whose plate bears its rollers: the pressure goes with the root of force over thickness."""
+    from cfmkit.families.cam.model import analyze
+    from cfmkit.families.run_control import Run
+    from cfmkit.metrics import evaluate
+
+    factor = evaluate(analyze(spec, Run()), ["safety_factor"])["safety_factor"].value
+    if factor is None or factor >= request.safety or spec.mechanism.contact is None:
+        return spec
+    return spec.replace(
+        {"mechanism.contact.width": spec.mechanism.contact.width * CONTACT_MARGIN * (request.safety / factor) ** 2}
+    )
+
+
 def _from_catalogue(made: Candidate) -> Candidate:
     """Return the same proportions with springs of the generic series; from these the force constant follows."""
     spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
@@ -201,7 +243,7 @@ def _from_catalogue(made: Candidate) -> Candidate:
         made,
         variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
         spec=spec,
-        finish="",
+        finish=f"{__name__}:with_plate",
         springs="catalogue",
     )
 
@@ -229,7 +271,7 @@ def _write_candidate(
     }
     if request.hysteresis is not None:
         mechanism |= {
-            "pins": {"diameter": PIN_SHARE * 2.0 * size["roller"], "friction": SLIDING_FRICTION},
+            "pins": {"diameter": size["pin"], "friction": SLIDING_FRICTION},
             "guide": {"friction": SLIDING_FRICTION},
         }
     data = {
