@@ -18,7 +18,7 @@ from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Me
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import flat_metrics, metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
@@ -141,7 +141,7 @@ def report_on(
     source: MeasuredCurves,
     frame: MeasuringFrame | None = None,
     window: Window | None = None,
-    largest_hole: float = LARGEST_HOLE,
+    largest_hole: float = MAX_HOLE_SHARE,
 ) -> MeasureReport:
     """Return the report on a measured mechanism."""
     return MeasureReport(source, numbers_of(source, frame, window, largest_hole))

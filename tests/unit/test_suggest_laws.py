@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from suggest_support import propose
 
 import cfmkit
-from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.beam.proposals import kept_shapes
-from cfmkit.families.run_control import Run
 from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, judge_proposal, make_proposal
 
@@ -17,7 +15,7 @@ ABS = "{youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}
 
 def offered(name, **keys):
     asked = read_request(None, {"safety": "1", **keys}).request()
-    return asked, function_named(family(name).propose)(asked, Run()).candidates
+    return asked, propose(name, asked).candidates
 
 
 def test_a_diamond_shorter_than_the_leaves_stands_close_below_them():
