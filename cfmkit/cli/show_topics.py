@@ -184,9 +184,10 @@ def family_page(name: str) -> Document:
         ("references", references, (field("reference", "", wraps=True),)),
     )
     data = {"keys": spec_keys, "values": values, "findings": findings, "references": references}
-    drawn = f"; `cfmkit show {name} --figure` draws it with its dimensions named" if record.dimension_drawing else ""
-    text = f"{record.summary}. `cfmkit new {name}` starts a file{drawn}"
-    return _page(name, text, sections, data)
+    starts = f"`cfmkit new {name}` starts a file" if record.template else ""
+    drawn = f"`cfmkit show {name} --figure` draws it with its dimensions named" if record.dimension_drawing else ""
+    commands = "; ".join(filter(None, (starts, drawn)))
+    return _page(name, f"{record.summary}. {commands}" if commands else record.summary, sections, data)
 
 
 READ_FIRST = {name: place for place, name in enumerate(("mechanism", "design", "analysis", "requirements"))}

@@ -52,10 +52,16 @@ def document_of(
         exit_code=code,
         title=message(entries),
         summary=f"{reused} reused" if reused else "",
+        verdict=_count_changes(compared) if compared else "",
         tables=(PageTable("", columns, tuple(_row(one) for one in entries)), *_warnings(entries)),
         notes=(*_missed_notes(entries), *(_changes(compared) if compared else ())),
         files=files,
     )
+
+
+def _count_changes(compared: BatchComparison) -> str:
+    count = len(compared.beyond)
+    return f"{count} value{'s' * (count != 1)} changed" if count else ""
 
 
 def _warnings(entries: Sequence[Entry]) -> Iterator[PageTable]:
@@ -81,6 +87,8 @@ def _changes(compared: BatchComparison) -> Iterator[Note]:
         yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD_TONE, whole=True)
     if len(beyond) > MAX_CHANGES:
         yield Note("changed", f"{len(beyond) - MAX_CHANGES} more values in changes.csv", tone=FAINT_TONE)
+    if compared.gone:
+        yield Note("missing", f"not in this batch: {', '.join(map(visible, compared.gone))}", tone=BAD_TONE, whole=True)
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:

@@ -192,11 +192,12 @@ def fault_of_record(record: Family, needs_interface: bool = True) -> str:
     """Return why a record cannot be used; empty if it can. A record that is made now need not state its interface."""
     from cfmkit.families.base import INTERFACE_VERSION, Family, read_packaged
 
-    if record.interface != INTERFACE_VERSION and (needs_interface or record.interface is not None):
-        made = "does not state its interface" if record.interface is None else f"is for interface {record.interface}"
+    if record.interface is None and needs_interface:
+        return f"its record does not state its interface; this cfmkit has 'interface={INTERFACE_VERSION}'"
+    if record.interface not in (None, INTERFACE_VERSION):
         return (
-            f"its record {made}, this cfmkit has interface {INTERFACE_VERSION}; another version of one "
-            f"of them is needed"
+            f"its record is for interface {record.interface}, this cfmkit has interface {INTERFACE_VERSION}; another "
+            "version of one of them is needed"
         )
     for one in fields(Family):
         if not _is_of_kind(getattr(record, one.name), str(one.type)):

@@ -13,12 +13,13 @@ import yaml
 
 import cfmkit
 from cfmkit.cli.main import main
+from cfmkit.documents import batch_document
 from cfmkit.documents.annotations import workflow_commands
 from cfmkit.documents.markdown import summary
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.metrics.compare import MetricChange
 from cfmkit.studies.batch_sources_and_outcomes import Entry
-from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, Earlier, changes
 
 ROOT = Path(__file__).parents[2]
 SPEC = (ROOT / "configs" / "vcfm_ding2022.yaml").read_text()
@@ -155,6 +156,14 @@ def test_a_specification_has_one_annotation_that_says_all_of_it():
     (line,) = workflow_commands([entry], lambda name, number: (7 + number, 3))
     assert line.startswith("::error file=a.yaml,line=7,col=3,title=requirement missed::")
     assert line.endswith("::force_ripple%0Adeviation")
+
+
+def test_the_page_counts_changes_and_names_specifications_that_are_missing():
+    changed = tuple(MetricChange("a.yaml", f"metric_{number}", 1.0, 2.0, "N", 1.0, True) for number in range(20))
+    compared = BatchComparison("accepted", 1e-6, changed, ("b", "c"))
+    document = batch_document.document_of([one()], ExitCode.REQUIREMENT_MISSED, compared=compared)
+    assert document.verdict == "20 values changed"
+    assert document.notes[-1].text == "not in this batch: b, c"
 
 
 def test_an_annotation_of_many_changes_lists_eight_and_counts_the_others():

@@ -79,7 +79,7 @@ def test_of_a_package_that_is_on_the_path_twice_the_first_one_counts(site, tmp_p
         ("FAMILY = {}\n", "broken_one:FAMILY is a dict, not a Family"),
         (packages.record("other"), "its record is called 'other'"),
         (packages.record("broken", 99), f"is for interface 99, this cfmkit has interface {INTERFACE_VERSION}"),
-        (packages.record("broken", None), "its record does not state its interface"),
+        (packages.record("broken", None), "its record does not state its interface; this cfmkit has 'interface=1'"),
         (packages.RECORD + "FAMILY = replace(SPARE, wheels=3)\n", "unexpected keyword argument 'wheels'"),
     ],
     ids=["module", "error", "exit", "nothing", "kind", "name", "newer", "unstated", "field"],

@@ -14,6 +14,7 @@ import spare_family
 
 import cfmkit
 from cfmkit import families
+from cfmkit.cli.main import main
 
 pytestmark = pytest.mark.lists
 
@@ -126,6 +127,14 @@ def test_a_registered_family_is_one_like_any_other_until_another_of_its_name_is(
     assert "spare" in families.names()
     cfmkit.register(replace(spare_family.FAMILY, summary="another"))
     assert families.family("spare").summary == "another"
+
+
+def test_the_page_of_a_family_names_no_command_for_which_it_has_no_file(capsys):
+    cfmkit.register(spare_family.FAMILY)
+    assert main(["show", "spare"]) == 0
+    assert "cfmkit new" not in capsys.readouterr().out
+    assert main(["show", "cam"]) == 0
+    assert "cfmkit new cam" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
