@@ -214,14 +214,19 @@ class Solution(ShortRepr):
         return self.assembly.units(self.motion)
 
     @cached_property
+    def forces(self) -> FloatArray:
+        """Efforts of `units` alone, (4, m, n)."""
+        return self.assembly.forces(self.motion)
+
+    @cached_property
     def shares(self) -> FloatArray:
         """Effort of each spring, (4, m, n) [N m or N]."""
-        return self.assembly.weigh(self.units.effort)
+        return self.assembly.weigh(self.forces)
 
     @cached_property
     def effort(self) -> FloatArray:
         """Torque [N m] or force [N], without friction."""
-        return np.asarray(self.broadcast(self.assembly.total(self.units.effort)))
+        return np.asarray(self.broadcast(self.assembly.total(self.forces)))
 
     @cached_property
     def stiffness(self) -> FloatArray:
