@@ -18,9 +18,10 @@ from cfmkit.errors import CfmError
 from cfmkit.numerics.roots import bracketed_root, bracketed_roots
 from cfmkit.results import Quantity
 from cfmkit.specs.spec import Model
+from cfmkit.specs.yamlio.allowed_at_path import slots_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -293,8 +294,8 @@ R = TypeVar("R", bound=RowsSolution)
 class Variants(Sequence[Any]):
     """Variants of a specification that differ in some values; each is validated when it is read, not before.
 
-    Reading one raises `CfmError` if its values are not valid. A family that knows what its numbers may be reads
-    `values`, and needs no specification of each.
+    Reading one raises `CfmError` if its values are not valid. A family that knows which of its numbers need not agree
+    with anything else reads `values`, and asks whether each keeps the bounds that the specification's type sets.
 
     Parameters
     ----------
@@ -306,11 +307,20 @@ class Variants(Sequence[Any]):
         Returns the specification of one of them, by its index.
     size : int
         Number of variants.
+    as_made : bool, optional
+        Whether they are manufactured parts, whose values need not agree as stated ones do.
     """
 
-    def __init__(self, spec: Any, values: Mapping[str, NDArray[Any]], make: Callable[[int], Any], size: int) -> None:
+    def __init__(
+        self,
+        spec: Any,
+        values: Mapping[str, NDArray[Any]],
+        make: Callable[[int], Any],
+        size: int,
+        as_made: bool = False,
+    ) -> None:
         """Make nothing yet."""
-        self.spec, self.values, self._make, self._size = spec, values, make, size
+        self.spec, self.values, self._make, self._size, self.as_made = spec, values, make, size, as_made
         self._made: dict[int, Any] = {}
 
     def __len__(self) -> int:
@@ -322,6 +332,26 @@ class Variants(Sequence[Any]):
         if index not in self._made:
             self._made[index] = self._make(index)
         return self._made[index]
+
+    def keep_bounds(self, paths: Iterable[str]) -> NDArray[np.bool_]:
+        """Return which variants have values at some paths that are within bounds, (k,)."""
+        kept = np.ones(len(self), dtype=bool)
+        for path in paths:
+            number = next(slot for slot in slots_at(type(self.spec), path) if slot.origin in (float, int))
+            kept &= number.allows(self.values[path].astype(np.float64))
+        return kept
+
+    def of_plain_numbers(self, plain: Collection[str]) -> Iterator[tuple[int, Any]]:
+        """Yield (index, specification) of valid ones; not validated where nothing but plain numbers varies.
+
+        `plain`: paths of numbers that need not agree with anything else.
+        """
+        if not self.values.keys() <= set(plain):
+            yield from valid(self)
+            return
+        columns = {path: values.astype(np.float64).tolist() for path, values in self.values.items()}
+        for index in np.flatnonzero(self.keep_bounds(columns)).tolist():
+            yield index, with_values(self.spec, {path: column[index] for path, column in columns.items()})
 
 
 def valid(specs: Sequence[T], indices: Iterable[int] | None = None) -> Iterator[tuple[int, T]]:

@@ -10,6 +10,7 @@ from study_rows import compare_rows_with_runs, study_of
 
 import cfmkit
 from cfmkit import api
+from cfmkit.families.rows import Variants
 from cfmkit.families.slider_crank.springs.model import solve_rows
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
@@ -29,6 +30,12 @@ SPRUNG = (
     "li2019_from_singularity", "li2019_full_turn", "li2019_prototype", "li2019_widest", "paper_ranges", "rising",
 )  # fmt: skip
 """Configurations with springs at joints."""
+
+
+def variants(spec, changes):
+    """Return a specification with some changes each, of which the family is told nothing."""
+    unknown = {"mechanism.legs": np.ones(len(changes))}
+    return Variants(spec, unknown, lambda index: spec.replace(changes[index]), len(changes))
 
 
 def test_the_drop_of_a_swept_stiffness_is_that_of_a_run():
@@ -141,7 +148,7 @@ def test_rows_have_the_warnings_of_single_runs(name, changes, expected):
 def test_what_cannot_be_solved_in_rows_is_left_out():
     spec = config("li2019")
     changes = ({}, {PATHS[3]: 0.0, PATHS[2]: 0.0}, {"mechanism.offset": 1.0}, {"mechanism.crank_length": 3.0}, {})
-    found = [indices.tolist() for indices, _ in solve_rows([spec.replace(change) for change in changes])]
+    found = [indices.tolist() for indices, _ in solve_rows(variants(spec, changes))]
     assert found == [[0, 4]]
 
 
@@ -150,7 +157,7 @@ def test_the_map_has_the_thresholds_to_six_digits():
     spec = config("li2019", mechanism__springs={"slider": "1 N/cm"})
     fold, per_degree = 0.1489334776, 180 / np.pi * 1e-2
     rates = fold * per_degree * (1 + np.linspace(-1e-6, 1e-6, 5))
-    ((_, found),) = solve_rows([spec.replace({PATHS[2]: rate}) for rate in rates.tolist()])
+    ((_, found),) = solve_rows(variants(spec, [{PATHS[2]: rate} for rate in rates.tolist()]))
     words = [api.family("slider-crank").words["stiffness_class"][int(kind)] for kind in found.value("stiffness_class")]
     assert words[:2] == ["bistable"] * 2
     assert words[3:] == ["local negative"] * 2

@@ -6,6 +6,7 @@ import pytest
 from suggest_support import propose
 
 import cfmkit
+from cfmkit.families import family
 from cfmkit.families.beam.proposals import kept_shapes
 from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, judge_proposal, make_proposal

@@ -64,21 +64,20 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
     """Yield (indices, mechanisms that are solved together) of those that go through all of the travel."""
     if _is_left_out(variants.spec):
         return
-    plain, rows = _plain_numbers(variants.spec), np.arange(len(variants))
-    checks = [plain[path](values) for path, values in variants.values.items() if path in plain]
-    rows = rows[np.logical_and.reduce([np.ones(len(rows), dtype=bool), *checks])]
+    plain = _plain_numbers(variants.spec)
+    rows = np.flatnonzero(variants.keep_bounds(variants.values.keys() & plain))
     moving = [path for path in variants.values if path not in plain or not BESIDE_THE_CAM.fullmatch(path)]
     beside = [path for path in variants.values if path not in moving]
     mixed: list[int] = []
     for members in _alike([variants.values[path] for path in moving], rows):
         if len(members) < MIN_SHARED_CAMS:
             mixed += members.tolist()
-        elif plain.keys() >= set(moving):
+        elif plain >= set(moving):
             yield from _in_parcels(members, partial(_with_columns, variants, [*moving, *beside], variants.spec))
         elif (first := dict(valid(variants, members[:1].tolist()))) and not _is_left_out(first[members[0]]):
             yield from _in_parcels(members, partial(_with_columns, variants, beside, first[members[0]]))
     rest = np.array(sorted(mixed), dtype=np.intp)
-    if plain.keys() >= set(moving):
+    if plain >= set(moving):
         yield from _in_parcels(rest, partial(_with_columns, variants, [*moving, *beside], variants.spec))
         return
     kinds: dict[str, list[int]] = {}
@@ -96,47 +95,28 @@ def _is_left_out(spec: CamSpec) -> bool:
     return spec.fidelity != "quasi-static" or analysis.manufacturing is not None or curves or other
 
 
-def _plain_numbers(spec: CamSpec) -> dict[str, Callable[[NDArray[Any]], NDArray[np.bool_]]]:
-    """Return the numbers for which it is enough to be within bounds of their own, and which values are."""
-    mechanism, found = spec.mechanism, {"mechanism.brace_length": _is_positive}
+def _plain_numbers(spec: CamSpec) -> set[str]:
+    """Return the numbers for which it is enough to be within bounds of their own."""
+    mechanism, found = spec.mechanism, {"mechanism.brace_length", "mechanism.rolling_friction"}
     springs, profile = mechanism.springs, mechanism.profile
-    found["mechanism.rolling_friction"] = _is_friction
     if springs.wound is None and not springs.initial_tension:
         several = range(len(springs.each)) if isinstance(springs.each, tuple) else ()
-        names = [f"mechanism.springs.stiffness.{k}" for k in several] or ["mechanism.springs.stiffness"]
-        found |= dict.fromkeys(names, _is_positive)
+        found |= {f"mechanism.springs.stiffness.{k}" for k in several} or {"mechanism.springs.stiffness"}
         if not several:
-            found["mechanism.springs.count"] = _is_count
+            found.add("mechanism.springs.count")
     if mechanism.masses is not None:
-        found |= dict.fromkeys([f"mechanism.masses.{name}" for name in ("slider", "brace", "roller")], _is_mass)
+        found |= {f"mechanism.masses.{name}" for name in ("slider", "brace", "roller")}
     if mechanism.contact is not None:
-        found["mechanism.contact.width"] = _is_positive
+        found.add("mechanism.contact.width")
     if spec.design is not None and spec.design.force is not None:
-        found["design.force"] = _is_positive
+        found.add("design.force")
     lengths = ["force_constant", "stroke", "brace_length"]
     if mechanism.plate.base_width is None:
         lengths += ["rest_half_width", "roller_radius"]
-        found["mechanism.roller_radius"] = _is_positive
+        found.add("mechanism.roller_radius")
         if springs.rest_length is None and springs.preload is None:
-            found["mechanism.rest_half_width"] = _is_positive
-    stated = [name for name in lengths if getattr(profile, name) is not None]
-    return found | dict.fromkeys([f"mechanism.profile.{name}" for name in stated], _is_positive)
-
-
-def _is_positive(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray((values > 0) & np.isfinite(values))
-
-
-def _is_mass(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray((values >= 0) & np.isfinite(values))
-
-
-def _is_friction(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray((values >= 0) & (values < 1))
-
-
-def _is_count(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray((values >= 1) & (values <= 1000) & (values == np.rint(values)))
+            found.add("mechanism.rest_half_width")
+    return found | {f"mechanism.profile.{name}" for name in lengths if getattr(profile, name) is not None}
 
 
 def _alike(columns: list[NDArray[Any]], rows: Rows) -> list[Rows]:

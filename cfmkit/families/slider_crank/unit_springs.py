@@ -215,7 +215,8 @@ class SliderPath:
         """Return the unit curves at some travels."""
         travel = np.asarray(travel, dtype=np.float64)
         state, beyond = self.evaluate(travel), self.is_unreachable(travel)
-        effort, stiffness = (np.where(beyond, np.nan, item) for item in self.efforts(state))
+        effort, stiffness = self.efforts(state)
+        effort[:, beyond] = stiffness[:, beyond] = np.nan
         angle = self.unloaded + state.turn[0]
         if self.is_mirrored:
             return UnitCurves(math.pi - angle, -state.position, -state.turn, effort, stiffness)
@@ -251,9 +252,12 @@ class SliderPath:
         position = self.x0 - travel
         ahead, behind = self._to_stretched(travel)
         share = np.sqrt(ahead * behind / (4.0 * link.crank * link.coupler))
-        other = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
-        folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(other, 0.0), 1.0)))
-        knee = self.side * np.where(share > NEARLY_FOLDED, folding, 2.0 * np.arcsin(np.minimum(share, 1.0)))
+        knee = 2.0 * np.arcsin(np.minimum(share, 1.0))
+        if (is_folding := share > NEARLY_FOLDED).any():
+            other = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
+            folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(other, 0.0), 1.0)))
+            knee = np.where(is_folding, folding, knee)
+        knee = self.side * knee
         e = link.offset
         view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
         sine, cosine = np.sin(knee), np.cos(knee)
@@ -265,8 +269,10 @@ class SliderPath:
 
     def forces(self, state: _SliderState) -> FloatArray:
         """Return q q' by the travel, (4, n)."""
+        return self._forces(state, *self._by_knee(state.cosine))
+
+    def _forces(self, state: _SliderState, d2: FloatArray, by_knee: FloatArray) -> FloatArray:
         link = self.linkage
-        d2, by_knee = self._by_knee(state.cosine)
         lever = state.position / (link.crank * link.coupler)  # psi' = lever / sin psi
         ratio = state.turn[:3] / state.sine
         relaxed = (np.equal(self.start, 0.0) | np.equal(np.abs(self.start), math.pi)) & (state.knee == self.start)
@@ -295,16 +301,16 @@ class SliderPath:
         view1, view2 = e / d2, 2.0 * e * x / d2**2
         lever = x / (r1 * r2)
         bend = r1 * r2 * (r2**2 - r1**2) * sine / d2**2
-        bends = np.stack([bend, np.zeros_like(knee), bend])
         knee1 = lever / sine
         knee2 = (-1.0 / (r1 * r2) - knee1**2 * cosine) / sine
-        first, second = by_knee * knee1, bends * knee1**2 + by_knee * knee2
+        first, second = by_knee * knee1, by_knee * knee2
         first[::2] += view1
+        second[::2] += bend * knee1**2
         second[::2] += view2
-        stiffness = np.ones((4, *np.shape(knee)))
-        stiffness[:3] = first**2 + state.turn[:3] * second
+        stiffness = np.empty((4, *np.shape(knee)))
+        stiffness[:3], stiffness[3] = first**2 + state.turn[:3] * second, 1.0
         stiffness[:3, (sine == 0.0) | (np.abs(knee) == math.pi)] = np.nan
-        return self.forces(state), stiffness
+        return self._forces(state, d2, by_knee), stiffness
 
 
 @lru_cache(maxsize=8)

@@ -7,6 +7,8 @@ that the user gets the path he wrote.
 
 from __future__ import annotations
 
+import math
+import operator
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,10 +16,21 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 from pydantic import BaseModel
 
-from cfmkit.specs.units.fields import PLACE_FIELD, MetricValue, Place, UnitField
+from cfmkit.specs.units.fields import (
+    MAX_QUANTITY,
+    MIN_QUANTITY,
+    MOST_TURNS,
+    PLACE_FIELD,
+    MetricValue,
+    Place,
+    UnitField,
+)
 from cfmkit.specs.units.quantities import describe_dimensions, example
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from cfmkit.specs.yamlio.path_notation import Path
 
 _PRIMITIVE_WORDS = {int: "a whole number", float: "a number", str: "text", bool: "true or false", dict: "a block"}
@@ -59,6 +72,18 @@ class Slot:
         """The bounds gt, ge, lt, le that the annotations set."""
         names = ("gt", "ge", "lt", "le")
         return {name: getattr(item, name) for item in self.metadata for name in names if hasattr(item, name)}
+
+    def allows(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which SI numbers may stand here."""
+        import numpy as np
+
+        sizes, most = np.abs(values), MAX_QUANTITY
+        if self.quantity is not None and "angle" in self.quantity.dimensions:
+            most = MOST_TURNS * math.tau
+        allowed: NDArray[np.bool_] = (values == 0.0) | ((sizes >= MIN_QUANTITY) & (sizes <= most))
+        for name, bound in self.bounds.items():
+            allowed &= getattr(operator, name)(values, bound)
+        return allowed & (values == np.rint(values)) if self.origin is int else allowed
 
     def child(self, key: str | int) -> tuple[Slot, ...]:
         """Return what is allowed below a key or index; nothing if it does not exist."""
@@ -124,6 +149,15 @@ def slots(annotation: Any, metadata: tuple[Any, ...] = ()) -> tuple[Slot, ...]:
     if hasattr(annotation, "__value__"):
         return slots(annotation.__value__, metadata)
     return () if annotation is type(None) else (Slot(annotation, metadata),)
+
+
+def slots_at(model: type[BaseModel], path: str) -> tuple[Slot, ...]:
+    """Return every type that is allowed at a dotted path of a block; none if there is nothing."""
+    here: tuple[Slot, ...] = (Slot(model),)
+    for part in path.split("."):
+        key: str | int = int(part) if part.isdecimal() and part.isascii() and len(part) < 10 else part
+        here = tuple(inner for slot in here for inner in slot.child(key))
+    return here
 
 
 def _flat(extra: list[Any]) -> tuple[Any, ...]:

@@ -25,7 +25,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import SolvedRows, drop_numbers, findings_of_one, valid, values_of_one, without_values
+from cfmkit.families.rows import SolvedRows, drop_numbers, findings_of_one, values_of_one, without_values
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
@@ -42,11 +42,12 @@ from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Hashable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.rows import Variants
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
@@ -59,7 +60,7 @@ Ends = tuple[float, float]
 RATE_KEYS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINT_NAMES)}
 """Where a specification has the rates, and the rows of the springs."""
 
-ROWS_TOGETHER = 96
+ROWS_TOGETHER = 32
 """Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
 ROW_COLUMNS = without_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
@@ -111,11 +112,13 @@ def _hardware_parts(spec: SliderCrankSpec, solution: Solution) -> tuple[ListedPa
     return tuple(hardware(spec, solution).parts)
 
 
-def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
+def solve_rows(variants: Variants) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
     """Yield (indices, mechanisms that are solved together) of those that go through all of the motion."""
-    alike: dict[str, list[int]] = {}
+    alike: dict[Hashable, list[int]] = {}
     built: dict[int, tuple[SliderCrankSpec, Assembly, Ends]] = {}
-    for index, spec in valid(specs):
+    plain = _plain_numbers(variants.spec, variants.as_made)
+    kind = repr(_kind(variants.spec)) if plain >= variants.values.keys() else None
+    for index, spec in variants.of_plain_numbers(plain):
         if spec.fidelity != "prb" or spec.target_curve is not None or not any(spec.mechanism.springs.rates):
             continue
         try:
@@ -126,7 +129,8 @@ def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.in
         asked = asked_motion(resolved, assembly)
         if assembly.clip_motion(*asked) == asked:
             built[index] = resolved, assembly, asked
-            alike.setdefault(repr(_kind(*built[index])), []).append(index)
+            own = repr(_kind(resolved)) if kind is None else kind
+            alike.setdefault((own, *_flags(assembly), is_wide(assembly, *asked)), []).append(index)
     for members in alike.values():
         for start in range(0, len(members), ROWS_TOGETHER):
             chosen = members[start : start + ROWS_TOGETHER]
@@ -134,11 +138,27 @@ def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.in
             yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, rules_of(solution), _is_complete(solution))
 
 
-def _kind(spec: SliderCrankSpec, assembly: Assembly, asked: Ends) -> tuple[Any, ...]:
+def _plain_numbers(spec: SliderCrankSpec, as_made: bool) -> set[str]:
+    """Return the numbers for which it is enough to be within bounds of their own."""
+    mechanism, springs = spec.mechanism, spec.mechanism.springs
+    if mechanism.flexures is not None or mechanism.beam is not None:
+        return set()
+    lengths = ("crank_length", "coupler_length", "stretched_position", "offset", "unloaded_angle", "unloaded_offset")
+    wound = set() if as_made else {spring.at for spring in springs.bought}
+    rates = springs.model_fields_set & set(JOINT_NAMES) - wound
+    stated = {f"mechanism.{name}" for name in lengths if getattr(mechanism, name) is not None}
+    return stated | {f"mechanism.springs.{name}" for name in rates} | {"analysis.tolerance"}
+
+
+def _kind(spec: SliderCrankSpec) -> tuple[Any, ...]:
     """Return what mechanisms that are solved together have in common: all but the values of numbers."""
-    rubbing, blocks = assembly.rubbing, (spec.mechanism, spec.analysis, spec.design)
-    rubs = rubbing.there, rubbing.guide.friction > 0, rubbing.pin > 0
-    return (*map(drop_numbers, blocks), *rubs, spec.analysis.band, is_wide(assembly, *asked))
+    return (*map(drop_numbers, (spec.mechanism, spec.analysis, spec.design)), spec.analysis.band)
+
+
+def _flags(assembly: Assembly) -> tuple[bool, ...]:
+    """Return what rubs: it decides which formulas hold."""
+    rubbing = assembly.rubbing
+    return rubbing.there, rubbing.guide.friction > 0, rubbing.pin > 0
 
 
 def _solution(specs: Sequence[SliderCrankSpec], assemblies: Sequence[Assembly], motions: Sequence[Ends]) -> Solution:

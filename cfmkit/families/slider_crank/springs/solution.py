@@ -220,14 +220,19 @@ class Solution(ShortRepr):
         return self.assembly.units(self.motion)
 
     @cached_property
+    def unit_efforts(self) -> FloatArray:
+        """Efforts of `unit_spring_curves` alone, (4, m, n)."""
+        return self.assembly.forces(self.motion)
+
+    @cached_property
     def spring_efforts(self) -> FloatArray:
         """Effort of each spring, (4, m, n) [N m or N]."""
-        return self.assembly.weigh(self.unit_spring_curves.effort)
+        return self.assembly.weigh(self.unit_efforts)
 
     @cached_property
     def effort(self) -> FloatArray:
         """Torque [N m] or force [N], without friction."""
-        return np.asarray(self.broadcast(self.assembly.total(self.unit_spring_curves.effort)))
+        return np.asarray(self.broadcast(self.assembly.total(self.unit_efforts)))
 
     @cached_property
     def stiffness(self) -> FloatArray:

@@ -144,7 +144,13 @@ class Assembly(ShortRepr):
         """Return the sum of rates times unit curves over the springs that are there, (..., n)."""
         if unit.ndim == 3 and unit.shape[1] == 1 and np.isfinite(unit).all():  # of one linkage: a product
             return np.asarray(self.rates.reshape(4, -1).T @ unit[:, 0])
-        return np.asarray(self.weigh(unit).sum(axis=0))
+        rates = self.rates_over(unit)
+        there = [(rate, row) for rate, row in zip(rates, unit, strict=True) if rate.any()]
+        sums = np.zeros(np.broadcast_shapes(rates.shape[1:], unit.shape[1:]))
+        with np.errstate(invalid="ignore"):
+            for rate, row in there:
+                sums += rate * row if rate.all() else np.where(rate == 0.0, 0.0, rate * row)
+        return sums
 
     def efforts(self, motion: FloatArray) -> FloatArray:
         """Return torque [N m] or force [N] at some places."""

@@ -1,0 +1,109 @@
+"""Whatever number of a closed model a study varies, with the requirements of the configuration: rows, equal to runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from given_points import GivenPoints
+
+import cfmkit
+from cfmkit.metrics import split_name
+from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.variable_paths import FIXED_BLOCKS, CannotVary, leaf
+from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+
+CLOSED_FIDELITIES = ("quasi-static", "truss", "analytic", "prb")
+
+ENDS_OF_WINDOWS = ("analysis.window.1", "analysis.travel", "analysis.travel.1", "mechanism.profile.stroke")
+"""Half of the variants have a curve that ends before a window does: a run of each says so."""
+
+
+CLOSED = (
+    "cam", "cam_catalogue", "cam_friction", "cam_gravity", "cam_no_undercut", "cam_preloaded",
+    "cam_six_springs", "make_finger", "slider_crank_bilancia2019", "slider_crank_bilancia2019_optimum",
+    "slider_crank_bought", "slider_crank_friction", "slider_crank_li2019", "slider_crank_li2019_bistable",
+    "slider_crank_li2019_from_singularity", "slider_crank_li2019_full_turn", "slider_crank_li2019_prototype",
+    "slider_crank_li2019_widest", "studies/cam_bought_parts", "studies/cam_radius_and_constant",
+    "studies/cam_rest_length", "studies/cam_tolerance", "studies/slider_crank_bilancia2019_start",
+    "studies/slider_crank_class_map", "studies/slider_crank_li2019_fig10", "studies/slider_crank_li2019_fig11",
+    "studies/slider_crank_li2019_fig14", "studies/slider_crank_li2019_fig5", "studies/slider_crank_li2019_fig6",
+    "studies/slider_crank_li2019_fig7", "studies/slider_crank_li2019_fig8", "studies/slider_crank_li2019_fig9",
+    "studies/slider_crank_li2019_fig9_two", "studies/vcfm_adjustability", "studies/vcfm_fig9_l1",
+    "studies/vcfm_fig9_t1", "studies/vcfm_fig9_t2", "studies/vcfm_fig9_theta2", "studies/vcfm_sobol",
+    "studies/vcfm_sobol_10_percent", "studies/vcfm_structures", "vcfm_aluminium", "vcfm_bought_springs",
+    "vcfm_cosine", "vcfm_ding2022", "vcfm_folded", "vcfm_pa12", "vcfm_pla", "vcfm_pla_adjustable",
+    "vcfm_straight", "vcfm_titanium", "vcfm_u_shape",
+)  # fmt: skip
+"""Configurations whose model is closed, and whose force is to be constant."""
+
+
+def is_closed(spec):
+    """Return True if the model of a specification is closed, and its force is to be constant."""
+    profile = getattr(spec.mechanism, "profile", None)
+    follows_curve = spec.target_curve is not None or (profile is not None and profile.curve is not None)
+    measured = profile is not None and profile.file is not None
+    return getattr(spec, "fidelity", None) in CLOSED_FIDELITIES and not follows_curve and not measured
+
+
+def own_metrics(spec):
+    """Return the metrics that the requirements of a specification name."""
+    curve = cfmkit.analyze(spec).curve
+    names = [one.metric for one in spec.part_requirements] or [f"{curve.kind}_mean"]
+    return metrics_of(spec, dict.fromkeys(names), curve)
+
+
+def numbers_that_vary(spec):
+    """Return the numbers with a fraction that a study of a specification may vary: path -> value."""
+    found = {}
+    for path, value in spec.leaves():
+        if path.split(".")[0] in FIXED_BLOCKS or path in ENDS_OF_WINDOWS or not value:
+            continue
+        try:
+            kind = leaf(type(spec), path).kind
+        except CannotVary:
+            continue
+        if kind in ("quantity", "number"):
+            found[path] = float(value)
+    return found
+
+
+def test_no_closed_configuration_is_left_out():
+    found = [*Path("configs").glob("*.yaml"), *Path("configs/studies").glob("*.yaml")]
+    closed = {str(path.relative_to("configs").with_suffix("")) for path in found if is_closed(cfmkit.load(path))}
+    assert closed == set(CLOSED)
+
+
+@pytest.mark.parametrize("stem", CLOSED)
+def test_a_sweep_over_any_number_with_the_requirements_of_its_own_is_solved_in_rows(stem):
+    spec = cfmkit.load(f"configs/{stem}.yaml")
+    metrics, alone = own_metrics(spec), []
+    for path, value in numbers_that_vary(spec).items():
+        plan = GivenPoints({path: value * np.array([1.0, 1.0 + 1e-4, 1.0 - 1e-4])})
+        study = Study(spec, plan.paths, metrics)
+        usable = [study.evaluate(plan.point(k)).status.usable for k in range(3)]
+        if all(usable) and not are_solved_together(study, plan):
+            alone.append(path)
+    assert alone == []
+
+
+@pytest.mark.parametrize("stem", CLOSED)
+def test_rows_have_the_requirements_that_runs_of_their_own_have(stem):
+    spec = cfmkit.load(f"configs/{stem}.yaml")
+    numbers, draw = numbers_that_vary(spec), np.random.default_rng(39)
+    chosen = draw.choice(sorted(numbers), min(3, len(numbers)), replace=False).tolist()
+    plan = GivenPoints({path: numbers[path] * draw.uniform(0.99, 1.01, 5) for path in chosen})
+    study = Study(spec, plan.paths, own_metrics(spec))
+    together = evaluate_rows(study, plan, 0, len(plan))
+    largest = np.nanmax(np.abs(np.nan_to_num(together.values)), axis=0)
+    for k in range(len(plan)):
+        alone = study.evaluate(plan.point(k))
+        assert together.status(k) == (alone.status, alone.message)
+        if alone.values:
+            own = np.array([np.nan if value is None else value for value in alone.values])
+            np.testing.assert_array_equal(np.isnan(own), np.isnan(together.values[k]))
+            wrong = np.abs(together.values[k] - own) > 1e-12 * largest
+            assert not wrong.any(), [split_name(study.names[m]) for m in np.flatnonzero(wrong)]
+            assert tuple(together.met[k].tolist()) == alone.met
