@@ -74,7 +74,7 @@ def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
 
 def _changes(compared: BatchComparison) -> Iterator[Note]:
     """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
-    beyond = compared.beyond
+    beyond = compared.changes_beyond_tolerance
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
     yield Note("compared", text, tone=BAD_TONE if beyond else GOOD_TONE, whole=True)
     for one in beyond[:MAX_CHANGES]:

@@ -268,7 +268,7 @@ def test_accepted_results_are_the_reference_that_the_next_batch_is_compared_with
     thicker = ["mechanism.positive.width=10.01 mm"]
     assert batch(compare="reference", changes=thicker).exit_code is ExitCode.REQUIREMENT_MISSED
     accepted = batch(compare="reference", changes=thicker, accept=True)
-    assert accepted.compared.beyond
+    assert accepted.compared.changes_beyond_tolerance
     assert accepted.exit_code is ExitCode.OK
     again = batch(compare="reference", changes=thicker)
     assert again.compared.changes == ()

@@ -539,6 +539,19 @@ def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
     assert (answer.made, len(answer.nearest), len(made)) == (0, 2, 2)
 
 
+def test_the_laws_of_a_family_out_of_reach_are_asked_once_for_each_key_and_factor(monkeypatch):
+    asked = []
+    monkeypatch.setattr(relaxed_requests, "_offer", lambda relaxed, *_: asked.append(relaxed))
+    assert list(edges(request(), ("beam",), 0, UNLIMITED_CLOCK)) == []
+    relaxed_keys = {"force", "travel", "ripple", "envelope"}
+    assert len(relaxed_keys) < len(asked) <= 1 + len(relaxed_keys) * len(relaxed_requests.RELAXATION_FACTORS)
+
+
+def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeypatch):
+    monkeypatch.setattr(relaxed_requests, "_offer", lambda *_: ("a candidate",))
+    assert {edge.factor for edge in edges(request(), ("beam",), 0, UNLIMITED_CLOCK)} == {1.0}
+
+
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
 def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
     keys = {"force": "1.8 N", "travel": "12.8 mm", "envelope": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
