@@ -37,6 +37,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.model.beam_fits import BeamFits
+from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle
 from cfmkit.errors import InputError
 
 TIGHT = Control(tolerance=1e-10)
@@ -114,6 +115,39 @@ def test_a_scaled_network_has_scaled_forces(reference: Path, size: float) -> Non
     """All lengths times k (width too): forces times k^2, torsion springs times k^3, line springs times k."""
     p = driven(frame(size=size), TRAVEL * size)
     np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested] * size**2, rtol=1e-8)
+
+
+def rubbing(size: float) -> Path:
+    """Return the path of a cantilever whose clamp is lowered and raised, and whose round tip rubs on a disc."""
+    nodes = {"root": Node(0, 0, slider_support(UP)), "tip": Node(size, 0)}
+    disc = NodeOnObstacle("disc", "tip", circle((1.1 * size, -0.4 * size), 0.3 * size), 0.05 * size, friction=0.2)
+    beam = Beam("root", "tip", Section(1.0, 12.0 * size, size, axial=False))
+    drive = Displacement("root", -UP, size * np.array([0.2, 0.3, 0.1]))
+    return trace(Network(nodes, {"b": beam}, contacts=(disc,)), drive, TIGHT)
+
+
+def wrapping(size: float) -> Path:
+    """Return the path of a leaf whose side a force at its tip presses onto a disc."""
+    nodes = {"root": Node(0, 0, CLAMPED_SUPPORT), "tip": Node(size, 0)}
+    disc = BeamOnObstacle("disc", "b", circle((0.5 * size, -0.1 * size), 0.045 * size))
+    beam = Beam("root", "tip", Section(1.2e7, size, 0.01 * size, axial=False))
+    drive = Loading((PointLoad("tip", fy=-(size**2)),), np.array([0.4, 1.0, 3.0, 0.4]))
+    return trace(Network(nodes, {"b": beam}, contacts=(disc,)), drive, TIGHT)
+
+
+@pytest.mark.parametrize("size", [0.02, 30.0])
+@pytest.mark.parametrize(("build", "by_motion"), [(rubbing, True), (wrapping, False)])
+def test_contacts_of_another_size_have_scaled_forces_and_change_at_the_same_share(
+    build: object, by_motion: bool, size: float
+) -> None:
+    """All lengths times k: forces times k^2."""
+    one, other = build(1.0), build(size)  # type: ignore[operator]
+    force = one.contact_force(0)[one.at_requested]
+    assert force.max() > 0.1
+    np.testing.assert_allclose(other.contact_force(0)[other.at_requested], force * size**2, rtol=1e-7, atol=1e-12)
+    assert [event.kind for event in other.contact_events] == [event.kind for event in one.contact_events]
+    drives = [event.drive * (size if by_motion else 1.0) for event in one.contact_events]
+    assert [event.drive for event in other.contact_events] == pytest.approx(drives, rel=1e-7)
 
 
 def test_the_reported_error_bounds_the_true_one() -> None:

@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -146,43 +147,32 @@ def test_where_arcs_do_not_do_the_cut_is_a_polyline_within_four_micrometres():
 # ---- refusals
 
 
-def refused(contours, kerf):
-    with pytest.raises(GeometryError) as caught:
-        with_kerf(outlines(Drawing("part", contours)), kerf)
-    return str(caught.value)
-
-
 SQUARE = polygon([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1)], "cut")
+NEAR = polygon([(0.1001, 0), (0.2, 0), (0.2, 0.1), (0.1001, 0.1)], "cut")
+BONE = [(0.01, 0.01), (0.03, 0.01), (0.03, 0.0199), (0.05, 0.0199), (0.05, 0.01), (0.07, 0.01)]
+BONE += [(0.07, 0.03), (0.05, 0.03), (0.05, 0.0201), (0.03, 0.0201), (0.03, 0.03), (0.01, 0.03)]
+SLOT = [(0, 0), (0.1, 0), (0.1, 0.1), (0.0501, 0.1), (0.0501, 0.08), (0.06, 0.08), (0.06, 0.04)]
+SLOT += [(0.04, 0.04), (0.04, 0.08), (0.0499, 0.08), (0.0499, 0.1), (0, 0.1)]
+REFUSED = {
+    "a hole that would vanish": (
+        (SQUARE, circle((0.05, 0.05), 1e-4, "cut", hole=True)), 2e-4,
+        "contour 2 on layer 'cut', a hole at (50.1, 50) mm, vanishes with a kerf of 0.2 mm",
+    ),
+    "a hole that would fall in two": (
+        (SQUARE, polygon(BONE, "cut", hole=True)), 3e-4, "hole falls into pieces where it is narrower than the kerf",
+    ),
+    "a slot that the kerf would close": ((polygon(SLOT, "cut"),), 4e-4, "narrower than the kerf of 0.4 mm"),
+    "parts closer than the kerf": (
+        (SQUARE, NEAR), 2e-4, "with a kerf of 0.2 mm, contour 1 on layer 'cut' and contour 2 on layer 'cut' cross",
+    ),
+    **{f"{kerf}": ((SQUARE,), kerf, "the kerf must be a length above zero") for kerf in (0.0, -1e-4, np.nan, np.inf)},
+}  # fmt: skip
 
 
-def test_a_hole_that_would_vanish_is_refused():
-    message = refused((SQUARE, circle((0.05, 0.05), 1e-4, "cut", hole=True)), 2e-4)
-    assert message.startswith("contour 2 on layer 'cut', a hole at (50.1, 50) mm, vanishes with a kerf of 0.2 mm")
-
-
-def test_a_hole_that_would_fall_in_two_is_refused():
-    bone = [(0.01, 0.01), (0.03, 0.01), (0.03, 0.0199), (0.05, 0.0199), (0.05, 0.01), (0.07, 0.01)]
-    bone += [(0.07, 0.03), (0.05, 0.03), (0.05, 0.0201), (0.03, 0.0201), (0.03, 0.03), (0.01, 0.03)]
-    assert "hole falls into pieces where it is narrower than the kerf" in refused(
-        (SQUARE, polygon(bone, "cut", hole=True)), 3e-4
-    )
-
-
-def test_a_slot_that_the_kerf_would_close_is_refused():
-    slot = [(0, 0), (0.1, 0), (0.1, 0.1), (0.0501, 0.1), (0.0501, 0.08), (0.06, 0.08), (0.06, 0.04)]
-    slot += [(0.04, 0.04), (0.04, 0.08), (0.0499, 0.08), (0.0499, 0.1), (0, 0.1)]
-    assert "narrower than the kerf of 0.4 mm" in refused((polygon(slot, "cut"),), 4e-4)
-
-
-def test_parts_closer_than_the_kerf_are_refused():
-    near = polygon([(0.1001, 0), (0.2, 0), (0.2, 0.1), (0.1001, 0.1)], "cut")
-    message = refused((SQUARE, near), 2e-4)
-    assert message.startswith("with a kerf of 0.2 mm, contour 1 on layer 'cut' and contour 2 on layer 'cut' cross")
-
-
-@pytest.mark.parametrize("kerf", [0.0, -1e-4, np.nan, np.inf])
-def test_a_kerf_that_is_no_width_is_refused(kerf):
-    assert "the kerf must be a length above zero" in refused((SQUARE,), kerf)
+@pytest.mark.parametrize(("contours", "kerf", "reported"), REFUSED.values(), ids=REFUSED)
+def test_what_a_kerf_cannot_cut_is_refused(contours, kerf, reported):
+    with pytest.raises(GeometryError, match=re.escape(reported)):
+        with_kerf(outlines(Drawing("part", contours)), kerf)
 
 
 # ---- the parallel chain itself

@@ -138,9 +138,28 @@ def usable(of, frame=BARE, window=None):
     return tuple(value(f"usable_{end}", of, frame, window) for end in ("start", "end", "stroke"))
 
 
-def test_usable_stroke_runs_from_band_to_band():
-    # enters 95 at 0.95; leaves 105 at 3.25
-    assert usable(HUMP, MeasuringFrame(target=100.0)) == pytest.approx((0.95, 3.25, 2.30))
+FLAT = curve(([0, 1, 2, 3, 4], [100] * 5))
+USABLE = {
+    "from band to band": (HUMP, {}, (0.95, 3.25, 2.30)),  # enters 95 at 0.95; leaves 105 at 3.25
+    "up to the allowable stress": (
+        curve(([0, 1, 2, 3, 4], [100] * 5), stress=[0, 10, 20, 30, 40]), {"allowable_stress": 25.0}, (0, 2.5, 2.5),
+    ),
+    "in the longest valid interval": (FLAT, {"valid": ((0.0, 1.0), (1.5, 3.75))}, (1.5, 3.75, 2.25)),
+    "in a valid interval beyond the travel": (FLAT, {"valid": ((-5.0, 9.0),)}, (0, 4, 4)),
+    "where all branches keep the band": (curve(([0, 4], [100, 100]), ([4, 3, 0], [80, 100, 100])), {}, (0, 3.25, 3.25)),
+    "where a step goes through the band between samples": (curve(([0, 1], [0, 200])), {}, (0.475, 0.525, 0.05)),
+    # forward to 3 at 100 N, back to 1 at 50 N, forward again at 100 N: nothing between 1 and 3 can be relied on
+    "where all states of a fold are": (curve(([0, 3, 3, 1, 1, 6], [100, 100, 50, 50, 100, 100])), {}, (3, 6, 3)),
+    # leaves the band at 3, wanders back to 0.5 and returns into it at 2: all of 0.5 to 3 is lost
+    "beyond the bad states of a fold": (
+        curve(([0, 3, 3, 0.5, 2, 2, 4], [100, 100, 50, 50, 50, 100, 100])), {}, (3, 4, 1),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("of", "frame", "ends"), USABLE.values(), ids=USABLE)
+def test_a_curve_is_usable(of, frame, ends):
+    assert usable(of, MeasuringFrame(target=100.0, **frame)) == pytest.approx(ends)
 
 
 def test_usable_stroke_without_a_target_is_around_the_mean_in_the_window():
@@ -148,45 +167,7 @@ def test_usable_stroke_without_a_target_is_around_the_mean_in_the_window():
     assert value("usable_end", HUMP, window=(1, 3)) == pytest.approx(3 + (1.05 * mean - 100) / 20)
 
 
-def test_the_allowable_stress_cuts_the_usable_stroke():
-    stressed = curve(([0, 1, 2, 3, 4], [100] * 5), stress=[0, 10, 20, 30, 40])
-    assert usable(stressed, MeasuringFrame(target=100.0, allowable_stress=25.0)) == pytest.approx((0, 2.5, 2.5))
-
-
-def test_the_valid_intervals_cut_the_usable_stroke():
-    flat = curve(([0, 1, 2, 3, 4], [100] * 5))
-    assert usable(flat, MeasuringFrame(target=100.0, valid=((0.0, 1.0), (1.5, 3.75)))) == pytest.approx(
-        (1.5, 3.75, 2.25)
-    )
-
-
-def test_every_branch_must_keep_the_band():
-    loop = curve(([0, 4], [100, 100]), ([4, 3, 0], [80, 100, 100]))
-    assert usable(loop, MeasuringFrame(target=100.0)) == pytest.approx((0, 3.25, 3.25))
-
-
 def test_a_mechanism_that_is_usable_nowhere_has_stroke_zero_and_no_ends():
     far = curve(([0, 1], [1, 2]))
     assert value("usable_stroke", far, MeasuringFrame(target=100.0)) == 0
     assert "no part of the travel" in reason("usable_start", far, MeasuringFrame(target=100.0))
-
-
-def test_a_step_right_through_the_band_between_two_samples_is_usable_there():
-    assert usable(curve(([0, 1], [0, 200])), MeasuringFrame(target=100.0)) == pytest.approx((0.475, 0.525, 0.05))
-
-
-def test_a_fold_is_usable_only_where_all_its_states_are():
-    # forward to 3 at 100 N, back to 1 at 50 N, forward again at 100 N: nothing between 1 and 3 can be relied on
-    fold = curve(([0, 3, 3, 1, 1, 6], [100, 100, 50, 50, 100, 100]))
-    assert usable(fold, MeasuringFrame(target=100.0)) == pytest.approx((3, 6, 3))
-
-
-def test_a_fold_is_unusable_as_far_as_its_bad_states_reach():
-    # leaves the band at 3, wanders back to 0.5 and returns into it at 2: all of 0.5 to 3 is lost
-    fold = curve(([0, 3, 3, 0.5, 2, 2, 4], [100, 100, 50, 50, 50, 100, 100]))
-    assert usable(fold, MeasuringFrame(target=100.0)) == pytest.approx((3, 4, 1))
-
-
-def test_a_valid_interval_beyond_the_travel_is_cut_to_it():
-    flat = curve(([1, 2, 3], [100] * 3))
-    assert usable(flat, MeasuringFrame(target=100.0, valid=((-5.0, 9.0),))) == pytest.approx((1, 3, 2))

@@ -127,25 +127,27 @@ def test_a_value_on_its_bound_is_within_it():
     assert outcome(result(values={"gap": Quantity(0.3 - 0.1, "length", "d")}), metric="gap", min="200 mm").ok
 
 
-def test_the_sentence_of_a_met_requirement():
-    sentence = outcome(metric="force_ripple", max="5 %", over=["20 mm", "180 mm"]).sentence
-    assert sentence == "force ripple 1.603 % over 20 ... 180 mm, allowed <= 5 %: ok"
+SENTENCES = {
+    "force ripple 1.603 % over 20 ... 180 mm, allowed <= 5 %: ok": (
+        {"metric": "force_ripple", "max": "5 %", "over": ["20 mm", "180 mm"]}, {}),
+    "force mean on unload 49.5 N over the full travel, required 50 N ... 52 N: missed": (
+        {"metric": "force_mean[unload]", "min": "50 N", "max": "52 N"}, {}),
+    # a miss too small for four digits is shown with more
+    "gap 50.0004 mm, allowed <= 50 mm: missed": (
+        {"metric": "gap", "max": "50 mm"}, {"gap": Quantity(0.0500004, "length", "d")}),
+    # a ratio is shown as its bound is written
+    "factor 1.5, required >= 0.8: ok": ({"metric": "factor", "min": 0.8}, {"factor": Quantity(1.5, "ratio", "d")}),
+    "factor 150 %, required >= 120 %: ok": (
+        {"metric": "factor", "min": "120 %"}, {"factor": Quantity(1.5, "ratio", "d")}),
+    "gap: no value (the roller fits), allowed <= 1 mm: missed": (
+        {"metric": "gap", "max": "1 mm"}, {"gap": Quantity(None, "length", "d", "the roller fits")}),
+}  # fmt: skip
 
 
-def test_the_sentence_of_a_missed_requirement_on_one_branch_over_everything():
-    sentence = outcome(metric="force_mean[unload]", min="50 N", max="52 N").sentence
-    assert sentence == "force mean on unload 49.5 N over the full travel, required 50 N ... 52 N: missed"
-
-
-def test_a_miss_too_small_for_four_digits_is_shown_with_more():
-    loop = result(values={"gap": Quantity(0.0500004, "length", "d")})
-    assert outcome(loop, metric="gap", max="50 mm").sentence == "gap 50.0004 mm, allowed <= 50 mm: missed"
-
-
-def test_a_ratio_is_shown_as_its_bound_is_written():
-    loop = result(values={"factor": Quantity(1.5, "ratio", "d")})
-    assert outcome(loop, metric="factor", min=0.8).sentence == "factor 1.5, required >= 0.8: ok"
-    assert outcome(loop, metric="factor", min="120 %").sentence == "factor 150 %, required >= 120 %: ok"
+@pytest.mark.parametrize("sentence", SENTENCES)
+def test_the_sentence_of_a_requirement(sentence):
+    entry, values = SENTENCES[sentence]
+    assert outcome(result(values=values), **entry).sentence == sentence
 
 
 @pytest.mark.parametrize(
@@ -167,13 +169,6 @@ def test_a_metric_without_a_value_misses_its_requirement_and_says_why(entry, wor
 def test_without_a_curve_every_requirement_is_missed_for_the_reason_of_the_run():
     failed = Result(spec=None, status=Status.NO_EQUILIBRIUM, message="jammed")  # type: ignore[arg-type]
     assert "no value (jammed)" in outcome(failed, metric="force_mean", min="1 N").sentence
-
-
-def test_a_value_that_the_family_could_not_give_misses_its_requirement():
-    loop = result(values={"gap": Quantity(None, "length", "d", "the roller fits")})
-    assert (
-        outcome(loop, metric="gap", max="1 mm").sentence == "gap: no value (the roller fits), allowed <= 1 mm: missed"
-    )
 
 
 def test_an_outcome_for_a_file_is_in_border_units():

@@ -126,20 +126,13 @@ def test_constraints_that_contradict_each_other_have_no_optimum():
     assert not found.feasible
 
 
-def test_the_steps_allowed_are_kept_and_the_best_point_seen_is_returned():
+@pytest.mark.parametrize(("steps", "seen"), [(3, None), (None, 1), (None, 5)])
+def test_steps_and_time_allowed_are_kept_and_the_best_point_seen_is_returned(steps, seen):
     program = rosenbrock()
-    found = minimize(program, np.array([-1.2, 1.0]), FREE, Effort(steps=3))
-    assert found.ending is SearchEnding.STEPS
-    assert found.objective == min(program.objective(z) for z in program.asked)
-    assert found.evaluations == len(program.asked)
-
-
-@pytest.mark.parametrize("count", [1, 5])
-def test_the_time_allowed_is_kept_and_the_best_point_seen_is_returned(count):
-    program = rosenbrock()
-    found = minimize(program, np.array([-1.2, 1.0]), FREE, Effort(stop=lambda: len(program.asked) >= count))
-    assert found.ending is SearchEnding.OUT_OF_TIME
-    assert found.evaluations == len(program.asked) == count
+    effort = Effort(steps=steps) if steps else Effort(stop=lambda: len(program.asked) >= seen)
+    found = minimize(program, np.array([-1.2, 1.0]), FREE, effort)
+    assert found.ending is (SearchEnding.STEPS if steps else SearchEnding.OUT_OF_TIME)
+    assert found.evaluations == len(program.asked) == (seen or found.evaluations)
     assert found.objective == min(program.objective(z) for z in program.asked)
 
 
