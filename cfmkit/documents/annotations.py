@@ -1,4 +1,4 @@
-"""Annotations for GitHub: one for each specification of a batch, beside the line that its problem is in."""
+"""Annotations of GitHub for a batch in continuous integration: each problem at the line of its specification."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outcome of a run, as one value: `report_on` gathers metrics, requirements and warnings of a result."""
+"""Outcome of a run as one value (`Report`): a result with its metrics, requirements, warnings, status and exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The document of a sweep: how many points meet what, the best of them, and the range of each result."""
+"""The document that `cfmkit sweep` prints: how many points meet the requirements, the best one, ranges of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Corrections of zeros and signs of a recording, made before anything is read off it."""
+"""Corrections of a recording of a test: zero readings of the sensors (`--tare`, `--zero`) and signs (`--flip`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A closed frame around a part, to which everything that is held is joined by bars: what stands as one piece.
+"""Frame around a mechanism that is cut from one piece: a closed rectangle, joined by bars to everything that is held.
 
 The frame is a rectangle along the axes of the drawing, outside of all that the part covers at rest and as it moves,
 by a clearance. A bar leads from every held pad to that side of the frame to which it is shortest without coming near

@@ -1,8 +1,9 @@
-"""Means and extremes over a window of a model that is known at every place: for one curve, or for many at once.
+"""Mean, largest and smallest value of an effort over a window, for metrics: of one curve, or of many at once.
 
-An extreme lies between the neighbours of the largest or smallest sample. There the model is asked at the vertex of the
-parabola through these three and on either side of it, and again between the neighbours of the best; the largest value
-that was seen counts.
+They need a model that gives the effort at every place, so that they do not depend on how densely a curve is sampled. An
+extreme lies between the neighbours of the largest or smallest sample: the model is evaluated at the vertex of the
+parabola through these three and on either side of it, then again between the neighbours of the best; the largest value
+found counts.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
-"""Of each step between two places: polynomials of degree seven are integrated exactly."""
+"""Gauss points in each step between two places: polynomials of degree seven are integrated exactly."""
 
 
 FEW_SAMPLES = 100
@@ -105,18 +106,18 @@ def extremes(
     rounds, beside = (N_PARABOLAS, VERTEX_OFFSETS) if few.any() else (1, np.zeros(1))
     beside = np.where(few[:, None, None], beside, 0.0)
     for number in range(rounds):
-        places = _next(x, y, beside)
+        places = _vertex_places(x, y, beside)
         found = sign[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
         found = np.where(np.isfinite(found), found, -np.inf)
         counts = few[:, None] if number else True  # of many samples one parabola is enough
         best = np.where(counts, np.maximum(best, found.max(axis=-1)), best)
         if number < rounds - 1:
-            x, y = _three_around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
+            x, y = _points_around_largest(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
     curved = end >= 2
     return np.where(curved, best[:, 0], top), np.where(curved, -best[:, 1], bottom)
 
 
-def _next(x: FloatArray, y: FloatArray, beside: FloatArray) -> FloatArray:
+def _vertex_places(x: FloatArray, y: FloatArray, beside: FloatArray) -> FloatArray:
     """Return where the parabola through three points is largest, between the outer two, and places next to it."""
     (a, b, c), (fa, fb, fc) = np.moveaxis(x, -1, 0), np.moveaxis(y, -1, 0)
     with np.errstate(all="ignore"):
@@ -126,7 +127,7 @@ def _next(x: FloatArray, y: FloatArray, beside: FloatArray) -> FloatArray:
     return np.asarray(np.clip(places, np.minimum(a, c)[..., None], np.maximum(a, c)[..., None]))
 
 
-def _three_around(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _points_around_largest(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the three of all points that surround the largest."""
     order = np.argsort(x, axis=-1)
     x, y = np.take_along_axis(x, order, -1), np.take_along_axis(y, order, -1)

@@ -1,7 +1,7 @@
-"""Extremes of sampled smooth functions, with derivatives: the vertex of the parabola through the best three samples.
+"""Largest values of sampled smooth functions with derivatives, for optimisation: a parabola through three samples.
 
-By the envelope theorem the derivative of an extreme is that of the function at a fixed place, so that the same
-three weights give both.
+By the envelope theorem the derivative of an extreme is that of the function at a fixed place, so the weights that give
+the extreme from three samples also give its derivative from the derivatives of these samples.
 """
 
 from __future__ import annotations

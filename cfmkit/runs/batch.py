@@ -1,4 +1,4 @@
-"""Batches: many specifications, one after the other or in parallel, each as a single run, and their outcomes."""
+"""Batches, for `cfmkit batch` and `cfmkit.batch`: many specifications, each run as alone, serially or in parallel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cfmkit.metrics.compare import COMPARISON_RTOL
 from cfmkit.plots.figure_options import DEFAULT_FORM, FigureForm
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
-from cfmkit.runs.run import carry_out as carried_out
+from cfmkit.runs.run import carry_out as carry_out_run
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, list_gone, read_earlier_batch
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
@@ -85,7 +85,7 @@ class BatchWork:
         name = " ".join(spec.name.split())
         known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec, entry.spec))
         try:
-            outcome = carried_out(verb, wanted, self.arguments)
+            outcome = carry_out_run(verb, wanted, self.arguments)
         except CfmError as error:
             return _failed_entry(known, error)
         return _entry_of(known, outcome)
@@ -101,13 +101,13 @@ def _natural(spec: Spec) -> str:
 
 def _data_of(spec: Spec, file: str) -> tuple[tuple[str, str | None], ...]:
     """Return the files that a specification takes values and data from, and the hashes of their content."""
-    from cfmkit.specs.data_file_paths import named_in
+    from cfmkit.specs.data_file_paths import list_data_files
     from cfmkit.specs.yamlio.base_file import base_files
     from cfmkit.store import file_hash
 
     folder = os.path.dirname(file) or "."
     bases = tuple((os.path.relpath(base, folder), file_hash(base.resolve())) for base in base_files(file))
-    return (*bases, *((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump())))
+    return (*bases, *((str(source), file_hash(source.path.resolve())) for source in list_data_files(spec.model_dump())))
 
 
 def _verb(name: str, fresh: bool) -> Verb:
@@ -120,14 +120,14 @@ def _verb(name: str, fresh: bool) -> Verb:
 def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:
     """Return the outcome of a specification that was computed."""
     data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
-    reported = [one["sentence"] for one in data["requirements"] if not one["ok"]]
+    sentences = [one["sentence"] for one in data["requirements"] if not one["ok"]]
     if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
-        reported = [data["message"]]
+        sentences = [data["message"]]
     return replace(
         entry,
         status=data["status"],
         code=code,
-        message="; ".join(reported),
+        message="; ".join(sentences),
         requirements=tuple(data["requirements"]),
         warnings=tuple(data["warnings"]),
         written=True,
@@ -137,8 +137,8 @@ def _entry_of(entry: Entry, outcome: FinishedRun) -> Entry:
 def _failed_entry(entry: Entry, error: Exception) -> Entry:
     code, complaints = code_of(error), tuple(_of_one(entry, error))
     first, *more = complaints
-    reported = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
-    return replace(entry, status=code.name.lower(), code=code, message=reported, errors=complaints)
+    message = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
+    return replace(entry, status=code.name.lower(), code=code, message=message, errors=complaints)
 
 
 def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
@@ -174,7 +174,7 @@ class BatchMonitor(Protocol):
 
 
 @dataclass
-class Unwatched:
+class SilentMonitor:
     """A monitor that does nothing."""
 
     stopped: bool = False
@@ -191,16 +191,16 @@ class Unwatched:
 
 
 @dataclass(frozen=True)
-class Crew:
-    """Execution of a batch: executor, deadline and progress callback."""
+class BatchExecution:
+    """Execution of a batch."""
 
-    executor: Executor
-    fail_fast: bool
+    executor: Executor  # runs jobs in this process or in several
+    fail_fast: bool  # whether the first failure ends the batch
     progress: BatchMonitor
-    kept: KeptRuns
+    kept: KeptRuns  # finished runs of an earlier batch in the same folder
 
 
-def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[Entry, ...]:
+def carry_out(work: BatchWork, jobs: Sequence[BatchJob], execution: BatchExecution) -> tuple[Entry, ...]:
     """Return the outcome of every specification, in their order; those that were not run are skipped.
 
     What an earlier batch has finished and nobody has changed since is not computed again.
@@ -208,18 +208,18 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[En
     found: dict[int, Entry] = {}
 
     def stopping() -> bool:
-        failed = crew.fail_fast and any(one.code is not ExitCode.OK for one in found.values())
-        return failed or crew.progress.stopping()
+        failed = execution.fail_fast and any(one.code is not ExitCode.OK for one in found.values())
+        return failed or execution.progress.stopping()
 
     def note(job: BatchJob, entry: Entry) -> None:
         found[job.index] = entry
-        crew.progress.add_finished(1, int(entry.code is not ExitCode.OK), entry.reused)
+        execution.progress.add_finished(1, int(entry.code is not ExitCode.OK), entry.reused)
 
     def new() -> Iterator[BatchJob]:
         for job in jobs:
             if stopping():
                 return
-            entry = crew.kept.recall(job.spec, job.folder)
+            entry = execution.kept.recall(job.spec, job.folder)
             if entry is not None and not entry.verb:
                 entry = work.refusal(job)
             if entry is None:
@@ -227,22 +227,22 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[En
             else:
                 note(job, entry)
 
-    crew.progress.total(len(jobs))
-    for job, outcome in crew.executor(work, new(), stopping):
+    execution.progress.total(len(jobs))
+    for job, outcome in execution.executor(work, new(), stopping):
         entry = outcome if isinstance(outcome, Entry) else lost_entry(job, outcome)
-        crew.kept.keep(entry)
+        execution.kept.keep(entry)
         note(job, entry)
-    reported = "not run: interrupted" if crew.progress.stopped else SKIPPED_MESSAGE
-    return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=reported) for job in jobs)
+    message = "not run: interrupted" if execution.progress.stopped else SKIPPED_MESSAGE
+    return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=message) for job in jobs)
 
 
-def executor_for(jobs: int | None, count: int, timeout: float | None) -> Executor:
-    """Return what gets specifications done: this process, or several.
+def choose_executor(jobs: int | None, count: int, timeout: float | None) -> Executor:
+    """Return the executor of the jobs: this process, or a pool of several.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If the time allowed is none.
+        If the timeout is not above zero.
     """
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores, serial
@@ -424,9 +424,9 @@ def batch(
     common = RunTask("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or DEFAULT_FORM)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
-    executor = executor_for(jobs, len(todo), timeout_per_point)
+    executor = choose_executor(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepare_file(junit)
-    reported = None if summary is None else prepare_file(summary, "--summary")
+    write_summary = None if summary is None else prepare_file(summary, "--summary")
     tolerance = COMPARISON_RTOL if compare_tolerance is None else compare_tolerance
     if not 0 <= tolerance < 1:
         meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
@@ -434,10 +434,12 @@ def batch(
     reference = "" if compare is None else os.fspath(compare)
     begins = accept and batch_output_files.check_reference(reference, place)
     before = None if compare is None or begins else read_earlier_batch(reference)
-    watched = monitor or Unwatched()
+    watched = monitor or SilentMonitor()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
-        entries = carry_out(work, todo, Crew(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal)))
+        entries = carry_out(
+            work, todo, BatchExecution(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal))
+        )
         compared = None
         if before is not None:
             changed = changes_of(before, entries, place, tolerance)
@@ -456,10 +458,10 @@ def batch(
         batch_output_files.write_reference(reference, place, entries, work.arguments)
     if report is not None:
         report(junit_of(entries))
-    if reported is not None:
+    if write_summary is not None:
         from cfmkit.documents.markdown import summary as in_markdown
 
-        reported(in_markdown(entries, compared))
+        write_summary(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared, reference if accepted else "")
 
 

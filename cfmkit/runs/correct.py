@@ -1,4 +1,7 @@
-"""Report and files of ``cfmkit correct``: the corrected design, a table of before, after and predicted."""
+"""``cfmkit correct``: a design changed so that the next part has the force that a measured part missed.
+
+Report and files of the run: the corrected design, and a table of values before, after, and predicted for the next part.
+"""
 
 from __future__ import annotations
 

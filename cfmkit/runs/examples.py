@@ -136,12 +136,12 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     from cfmkit import api
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import write_schema
-    from cfmkit.specs.data_file_paths import named_in
+    from cfmkit.specs.data_file_paths import list_data_files
     from cfmkit.store.safe_disk_changes import discard, make_folders, remove_empty, reporting, write_new
 
     chosen = example(name)
     target = Path(out) / chosen.path.name
-    data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
+    data = sorted({str(source): source.path for source in list_data_files(api.load(chosen.path).model_dump())}.items())
     # what is there already and says the same stays: two examples may name the same data
     missing = [(text, path) for text, path in data if not _same(target.parent / text, path)]
     wanted = {target: chosen.path, **{target.parent / text: path for text, path in missing}}

@@ -96,9 +96,9 @@ def files(
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
     """Yield the data files that a specification names, under the same names: resolved.yaml names them, too."""
-    from cfmkit.specs.data_file_paths import named_in
+    from cfmkit.specs.data_file_paths import list_data_files
 
-    for source in named_in(spec.model_dump()):
+    for source in list_data_files(spec.model_dump()):
         yield str(source), source.path.read_bytes()
 
 

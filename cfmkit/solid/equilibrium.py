@@ -1,4 +1,8 @@
-"""Equilibrium of a part at a given travel, and whether it is stable."""
+"""Equilibrium of a part of plane finite elements at a given travel, by Newton's method, and its stability.
+
+`SolidProblem` (elements, supports, obstacles) is the problem that the path-following of `cfmkit.numerics.continuation`
+calls; `Balance` is an equilibrium. Loose displacements are those that no support holds.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +31,13 @@ ROUGH_RESIDUAL, ROUGH_CORRECTION = 1e-8, 1e-11
 """Force out of balance and correction, in the same parts, at which both are rounding if the force falls no more: in
 that strip, bent to a large angle, corrections of 1e-12 are made over and over, while 1.5e-9 stays out of balance."""
 MAX_NEWTON_STEPS = 12
-"""Of Newton's method; steps that need more are too long: from a predictor three to five are usual."""
+"""Most steps of Newton's method; a travel that needs more was too long a step: three to five are usual."""
 MAX_CORRECTIONS, CORRECTION_RATIO = 10, 0.25
-"""With the factors of one tangent, and how much smaller each must be: one costs a sixth of new factors."""
+"""Most corrections with the factors of one tangent, and by what factor each must be smaller than the one before: a
+correction costs a sixth of new factors."""
 MAX_REFINEMENTS, REFINEMENT_RTOL = 6, 1e-5
-"""Of the path's slope with factors of a tangent nearby, until the last changes it by less than this part. It predicts
-poses and motions between them; the stiffness is known more closely than it."""
+"""Most refinements of the path's slope with factors of a tangent nearby, and the relative change at which they end. The
+slope predicts poses and motions between them; the stiffness is more accurate than it."""
 PANEL_COLUMNS = 1
 """Columns that SuperLU updates together: in slender parts a column has few others beside it, and the 20 of the default
 take a third more time."""

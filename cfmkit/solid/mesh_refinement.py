@@ -1,4 +1,4 @@
-"""Meshes whose marked triangles are split, each inside its parent.
+"""Refinement of a finite-element mesh: marked triangles are split, each inside its parent, for estimates of errors.
 
 Assumes six-node triangles that meet along whole sides. A marked triangle is split in four by the nodes in the middle of
 its sides; its neighbours are split in two or three, always through their longest side, so that no angle gets smaller

@@ -1,4 +1,4 @@
-"""Data files that a specification names: relative to its folder, and below it."""
+"""Names of data files in a specification (recordings, profiles): relative to its folder, and never outside of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 TAKEN_NAMES = ("curve.csv", "data.csv", "residuals.csv", "parameters.csv", "cycles.csv", "results.csv")
-"""Names under which runs write files of their own."""
+"""Names that data files may not have, because runs write files of these names."""
 
 
 class DataSource(str):
@@ -46,13 +46,13 @@ class DataSource(str):
         return Path(self.folder) / str(self)
 
 
-def named_in(tree: Any) -> Iterator[DataSource]:
+def list_data_files(tree: Any) -> Iterator[DataSource]:
     """Yield every data file that a nested specification names."""
     if isinstance(tree, DataSource):
         yield tree
     elif isinstance(tree, Mapping):
         for item in tree.values():
-            yield from named_in(item)
+            yield from list_data_files(item)
     elif isinstance(tree, list | tuple):
         for item in tree:
-            yield from named_in(item)
+            yield from list_data_files(item)

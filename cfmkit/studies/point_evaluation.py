@@ -21,7 +21,7 @@ from cfmkit.families import origin as family_origin
 from cfmkit.families.run_control import Run
 from cfmkit.metrics import check, evaluate, gaps, metrics_by_name, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
-from cfmkit.specs.data_file_paths import named_in
+from cfmkit.specs.data_file_paths import list_data_files
 from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
 from cfmkit.studies.serial_and_cluster_executors import lost_to
@@ -130,7 +130,7 @@ class Study:
         """
         spec = self.spec.model_dump(mode="json", exclude=NOT_DECIDING)
         noted = [(one.name, one.over) for one in self.metrics]
-        data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
+        data = [[str(source), file_hash(source.path.resolve())] for source in list_data_files(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
         about = [
             RECORD_VERSION,

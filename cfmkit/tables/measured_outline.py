@@ -1,4 +1,7 @@
-"""Points of a measured outline or profile from a lab file: columns x and y with units, and perhaps a side."""
+"""Reader of measured outlines (of a cam) and profiles (of a surface): points [m] from a file with columns x and y.
+
+Units are in the header; a third column may say to which side of an outline a point belongs.
+"""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
-from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
+from cfmkit.elastica.results.equilibria_near_known_path import drive_slope, solve_near_known_path
 from cfmkit.errors import InputError
 
 DOWN = Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 9e-3]))
@@ -105,7 +105,7 @@ def test_elements_refuse_what_they_do_not_have() -> None:
 def test_neighbours_are_the_equilibria_of_the_other_network(path: Path) -> None:
     other = frame(1.35e-3, 0.72)
     again = trace(other, DOWN, Control(tolerance=1e-9))
-    found = neighbouring(path, other, DOWN)
+    found = solve_near_known_path(path, other, DOWN)
     assert found.status is PathStatus.COMPLETE
     np.testing.assert_allclose(found.effort, again.effort[again.at_requested], rtol=1e-8)
     np.testing.assert_allclose(found.motion("bb"), again.motion("bb")[again.at_requested], atol=1e-9)
@@ -113,7 +113,7 @@ def test_neighbours_are_the_equilibria_of_the_other_network(path: Path) -> None:
 
 
 def test_a_neighbour_too_far_away_is_lost_and_not_made_up(path: Path) -> None:
-    found = neighbouring(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 70e-3])))
+    found = solve_near_known_path(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 70e-3])))
     assert found.status is PathStatus.LOST
     assert "0.07" in found.message
     assert len(found) == 2
@@ -121,7 +121,7 @@ def test_a_neighbour_too_far_away_is_lost_and_not_made_up(path: Path) -> None:
 
 def test_neighbours_must_be_of_one_kind(path: Path) -> None:
     with pytest.raises(InputError, match="same kind"):
-        neighbouring(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3])))
+        solve_near_known_path(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3])))
 
 
 def test_slope_of_the_force_is_that_of_differences(path: Path) -> None:

@@ -94,7 +94,7 @@ def test_a_derivative_is_taken_to_the_side_that_has_equilibria_and_is_never_zero
     form, place = Form(3, (1,), width=WIDTH), 0.45
     task = StripTask(corners()[[0, -1]], np.pi, ABS, 1.5, MM, 10 * MM, 0.01)
     program, z = StripProgram(task, form), np.array([0.95, 0.9, 1.0, place, 1.0])
-    exact, near = program.slopes(z), sqp_program.neighbouring
+    exact, near = program.slopes(z), sqp_program.solve_near_known_path
     assert exact is not None
 
     def other(path: Any, network: Any, drive: Any) -> Any:
@@ -102,7 +102,7 @@ def test_a_derivative_is_taken_to_the_side_that_has_equilibria_and_is_never_zero
         found = near(path, network, drive)
         return replace(found, status=PathStatus.LOST) if int(side) in lost else found
 
-    monkeypatch.setattr(sqp_program, "neighbouring", other)
+    monkeypatch.setattr(sqp_program, "solve_near_known_path", other)
     again = program.slopes(z)
     if len(lost) == 2:
         assert again is None

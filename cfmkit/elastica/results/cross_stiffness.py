@@ -1,4 +1,4 @@
-"""Stiffness of the driven node across its drive, along a path: what resists when it is pushed off its axis.
+"""Stiffness of a driven node against motions across its drive, at each point of an equilibrium path [N/m].
 
 With the node's motions along the drive, across it and its rotation, the tangent of the network is condensed to them
 (Schur complement); along the drive the node is held, its rotation is left as its support leaves it. What guides the

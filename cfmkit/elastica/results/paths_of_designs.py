@@ -19,10 +19,10 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.results.between_points import MAX_RELATIVE_STRAY, MIN_STRAY_DISTANCE, N_EXTREME_ROUNDS, PLACE_RTOL
 from cfmkit.elastica.results.stress_between_points import (
-    few_points,
+    choose_few_points,
+    find_near_largest,
     insert_knots,
     largest_of_runs,
-    near_largest,
     runs_of_points,
     solve_all_extremes,
 )
@@ -157,9 +157,9 @@ class PathsOfDesigns:
         ends = np.stack([low, high], axis=1) / self._scale[:, None]
         every = range(len(self.laws))
         free, found, _ = self._solve(np.arange(len(self.laws)), ends)
-        chosen = [few_points(self._own(k), *ends[k]) for k in every]
+        chosen = [choose_few_points(self._own(k), *ends[k]) for k in every]
         known = self._evaluate_stresses(chosen)
-        more = [near_largest(self._own(k), few, known[k], *ends[k]) for k, few in enumerate(chosen)]
+        more = [find_near_largest(self._own(k), few, known[k], *ends[k]) for k, few in enumerate(chosen)]
         dense = self._evaluate_stresses(more)
         both = [self._merge_points(*pairs) for pairs in zip(chosen, known, more, dense, strict=True)]
         at_ends = self._stresses(np.repeat(every, 2), free.reshape(2 * len(every), -1), ends.ravel())

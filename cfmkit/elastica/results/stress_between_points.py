@@ -1,6 +1,7 @@
-"""Knots of the stress of each beam between the points of a path: its extremes, and where it passes a limit.
+"""Extremes of the stress of each beam between the points of an equilibrium path, and where it passes a limit.
 
-They are solved for: a cubic through the points alone has errors where the stress of a beam turns.
+A cubic through the points alone is wrong where the stress of a beam has an extreme, so the equilibrium is solved there.
+The places and stresses of a beam, with those solved ones inserted, are called its knots.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ if TYPE_CHECKING:
     Solve = Callable[[FloatArray], tuple[FloatArray, Any]]
 
 N_EXTREME_ROUNDS = 3
-"""Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
+"""Rounds in which extremes are located and solved for: the third moves them by less than rounding."""
 
 CANDIDATE_SHARE = 0.9
 """Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
-N_FEW = 24  # points that are looked at first
+N_FIRST_POINTS = 24  # points at which the stress is computed first
 NEIGHBOUR_SHARE = 0.95  # share of the largest stress at these from which on the largest of all may be near
 STENCIL_REACH = 4  # points on either side that a cubic, or the next one, may go through
 
@@ -51,7 +52,7 @@ def solve_all_extremes(
     curves: Sequence[tuple[FloatArray, FloatArray, float]],
     solve: Callable[[list[FloatArray]], list[tuple[FloatArray, Any]]],
 ) -> list[tuple[Knots, ...]]:
-    """Return the same of several curves; `solve` takes places of each of them, by chance none, in one call."""
+    """Return the results of `solve_extremes` for several curves; `solve` takes places, or none, of each in one call."""
     knots_by_curve = [[(t, row) for row in rows] for t, rows, _ in curves]
     largest = [rows.max(axis=0) for _, rows, _ in curves]
     for _ in range(N_EXTREME_ROUNDS):
@@ -93,9 +94,9 @@ def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: 
     window : (2,) array
         Minus infinity is returned if no point and no extreme between two is inside.
     """
-    few = few_points(x, *window)
+    few = choose_few_points(x, *window)
     known_stresses = stresses(few)
-    more = near_largest(x, few, known_stresses, *window)
+    more = find_near_largest(x, few, known_stresses, *window)
     if len(more):
         few = np.concatenate([few, more])
         known_stresses = np.concatenate([known_stresses, stresses(more)], axis=1)
@@ -104,14 +105,14 @@ def largest_inside(x: FloatArray, stresses: Callable[[Any], FloatArray], solve: 
     return largest_between(x, few, known_stresses, solve, window)
 
 
-def few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
-    """Return the numbers of points of a path that are looked at first, in a window and next to it."""
+def choose_few_points(x: FloatArray, low: float, high: float) -> NDArray[np.intp]:
+    """Return the numbers of points at which the stress is computed first, in a window and next to it."""
     first = max(int(np.searchsorted(x, low)) - STENCIL_REACH, 0)
     last = min(int(np.searchsorted(x, high, side="right")) + STENCIL_REACH, len(x)) - 1
-    return np.append(np.arange(first, last, max(1, (last - first) // N_FEW)), last)
+    return np.append(np.arange(first, last, max(1, (last - first) // N_FIRST_POINTS)), last)
 
 
-def near_largest(
+def find_near_largest(
     x: FloatArray, few: NDArray[np.intp], stresses: FloatArray, low: float, high: float
 ) -> NDArray[np.intp]:
     """Return which other points are near the largest stress, from the stresses (b, m) at few of them."""

@@ -1,6 +1,7 @@
-"""Force and stress of a beam mechanism at a few poses, in a hundredth of the time of its analysis: for searches.
+"""Force and stress of a beam mechanism at a few poses, for searches: in a hundredth of the time of an analysis.
 
-The network and the path are those of the analysis; what is left out is everything that a search does not look at.
+A specification and places of the drive go in; force and stress there come out, with exact derivatives by values of the
+specification. Network and path are those of the analysis; metrics, findings and the curve are not computed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""YAML specification of a beam mechanism may say."""
+"""YAML specification of a beam mechanism: its keys with types, bounds and descriptions, and cross-checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""YAML specification of a cam mechanism may say."""
+"""YAML specification of a cam mechanism: its keys with types, bounds and descriptions, and cross-checks."""
 
 from __future__ import annotations
 

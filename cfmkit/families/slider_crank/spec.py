@@ -1,4 +1,4 @@
-"""YAML specification of a slider-crank mechanism may say."""
+"""YAML specification of a slider-crank mechanism: its keys with types, bounds and descriptions, and cross-checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a mechanism of snap-through leaves and a preloaded spring: its curves, its preloads, and itself, bent."""
+"""Figures of a vcfm (snap-through leaves and a preloaded spring): curves, preloads, stress, mechanism to scale."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ if TYPE_CHECKING:
 
 TRAVEL_SCALE = Scale("displacement", "length")
 N_WINDOW_PLACES = 241
-"""Places from which on the start of a window is looked for."""
+"""Places that are tried as the start of a window."""
 
 ELEMENT_COLOURS = {"leaf": LINE_BLUE, "spring": SPRING_OCHRE}
-"""Of what bends."""
+"""Colours of the bodies that bend."""
 
 N_PRELOADS = 41
-"""Preloads of the map."""
+"""Preloads for which the figure of the adjustability is computed."""
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:

@@ -1,4 +1,4 @@
-"""YAML specification of a V-beam and diamond mechanism may say."""
+"""YAML specification of a vcfm (V-beams and a spring): its keys with types, bounds and descriptions, cross-checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""A strip that was found, rounded, and pressed again at many places."""
+"""Audit of a designed strip of a printed slider-crank: its sizes are rounded and its force is computed at many places.
+
+The search works with few places and unrounded numbers. Its outcome goes in; the rounded strip comes out with the travel
+over which it keeps its limits, its ripple, and the bounds and limits that hold the design.
+"""
 
 from __future__ import annotations
 
@@ -23,16 +27,16 @@ if TYPE_CHECKING:
 
 N_AUDIT_PLACES = 240
 
-AT_END = 1e-6, 1e-5  # nanometres and a share: a number so near to an end of its range is held by it
+BOUND_TOLERANCES = 1e-6, 1e-5  # a nanometre and a share: a number so near to an end of its range is held by it
 
 STRESS_RTOL = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
 
-ACTIVE_LIMIT_SHARE = 0.02  # a limit that is so near, as a share of itself, holds the design
+ACTIVE_LIMIT_SHARE = 0.02  # a value so near to its limit, as a share of the limit, holds the design
 
 
 @dataclass(frozen=True)
 class FinishedStrip:
-    """A finished strip."""
+    """A designed strip with rounded sizes, and what it reaches."""
 
     strip: Strip  # rounded
     shares: tuple[tuple[float, ...], ...] | None  # where its stations are, as `mechanism.beam.shares` says it
@@ -40,7 +44,7 @@ class FinishedStrip:
     # ripple, rms: largest deviation in it as a share, and root mean square of ten points [N]
     ripple: float
     rms: float
-    active: tuple[str, ...]  # what holds it
+    active: tuple[str, ...]  # bounds and limits that hold the design
     overstress: float  # largest stress over the allowed one where the stroke is given; 1 where the stress ends it
 
 
@@ -77,7 +81,7 @@ def judge(
     solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end))
     ratio = solution.force / task.force - task.share(solution.travel)
     ripple, stress = limits
-    stroke = min(end, _last(solution, ratio, ripple, stress))
+    stroke = min(end, _end_of_stroke(solution, ratio, ripple, stress))
     stroke = float(np.floor(stroke * 1e6) / 1e6) if task.goal == "stroke" else end
     inside = (travel >= task.start) & (travel <= stroke)
     if not inside.any() or stroke <= task.start:
@@ -87,7 +91,7 @@ def judge(
         _shares(form, values),
         (task.start, stroke),
         float(np.abs(ratio[inside]).max()),
-        _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even(task.start, stroke))),
+        _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even_places(task.start, stroke))),
         (*_find_at_bounds(found, values), *_find_active_limits(solution, ratio, inside, limits)),
         1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
     )
@@ -95,10 +99,10 @@ def judge(
 
 def chain_force(solution: Solution, start: float, stroke: float) -> FloatArray:
     """Return the force at ten even places of the travel, its start left out [N]."""
-    return np.asarray(solution.chain.press(_even(start, stroke)).force)
+    return np.asarray(solution.chain.press(_even_places(start, stroke)).force)
 
 
-def _even(start: float, stroke: float) -> FloatArray:
+def _even_places(start: float, stroke: float) -> FloatArray:
     return start + (stroke - start) * np.arange(1, 11) / 10
 
 
@@ -106,7 +110,7 @@ def _rms(force: FloatArray, target: FloatArray | float) -> float:
     return float(np.sqrt(np.mean((force - target) ** 2)))
 
 
-def _last(solution: Solution, ratio: FloatArray, ripple: float | None, stress: float | None) -> float:
+def _end_of_stroke(solution: Solution, ratio: FloatArray, ripple: float | None, stress: float | None) -> float:
     """Return the travel at which the first limit is met [m]."""
     ends = [float(solution.travel[-1])]
     if ripple is not None:
@@ -128,26 +132,26 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
 
 def _find_at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
-    form, reported = found.form, []
-    ends = find_active_bounds(values, found.ranges.form, *AT_END)
+    form, reasons = found.form, []
+    ends = find_active_bounds(values, found.ranges.form, *BOUND_TOLERANCES)
     for k in np.flatnonzero(ends).tolist():
         value, side = float(values[k]), "smallest" if ends[k] < 0 else "largest"
         if k < form.count:
-            reported.append(f"mechanism.beam.thickness.{k} at its {side}, {mm(value * 1e-3)}")
+            reasons.append(f"mechanism.beam.thickness.{k} at its {side}, {mm(value * 1e-3)}")
         elif k < form.count + form.placed:
-            reported.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
+            reasons.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
         else:
-            reported.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
+            reasons.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
     if found.task.goal == "stroke" and np.isclose(0.01 * found.descent.z[-1], found.ranges.longest, rtol=1e-6):
-        reported.append(f"stroke at its longest, {mm(found.ranges.longest)}")
-    return reported
+        reasons.append(f"stroke at its longest, {mm(found.ranges.longest)}")
+    return reasons
 
 
 def _find_active_limits(
     solution: Solution, ratio: FloatArray, inside: Any, limits: tuple[float | None, float | None]
 ) -> list[str]:
     """Return where the band and the stress hold the strip."""
-    reported = []
+    reasons = []
     ripple, stress = limits
     if ripple is not None:
         for sign, name in ((1.0, "upper"), (-1.0, "lower")):
@@ -155,12 +159,12 @@ def _find_active_limits(
             peaks = [k for k in np.flatnonzero(off > (1.0 - ACTIVE_LIMIT_SHARE) * ripple).tolist() if _peak(off, k)]
             if peaks:
                 places = ", ".join(mm(float(solution.travel[k])) for k in peaks)
-                reported.append(f"{name} edge of the band at {places}")
+                reasons.append(f"{name} edge of the band at {places}")
     last = np.flatnonzero(inside)[-1]
     if stress is not None and solution.stress[last] > (1.0 - 0.5 * ACTIVE_LIMIT_SHARE) * stress:
         where = mm(float(solution.place[last]))
-        reported.append(f"stress {mpa(stress)} at the end, {where} along the strip")
-    return reported
+        reasons.append(f"stress {mpa(stress)} at the end, {where} along the strip")
+    return reasons
 
 
 def _peak(values: FloatArray, k: int) -> bool:

@@ -22,7 +22,7 @@ from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.results.between_points import interpolate_path
-from cfmkit.elastica.results.neighbour import neighbouring
+from cfmkit.elastica.results.equilibria_near_known_path import solve_near_known_path
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER_NODE, kink, mirror_points
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ class Chain(ShortRepr):
         known = _trace(self.build(helper), drive, tolerance)
         if known.status is not PathStatus.COMPLETE:
             return self._classify_ending(known, wanted, helped=True)
-        path = neighbouring(known, self.build(self.points), drive)
+        path = solve_near_known_path(known, self.build(self.points), drive)
         first = _beginning(path, drive) if other else 0
         if other and 0 < first < len(drive.points):
             path = _from_its_limit(part_of(path, path.requested >= first), drive.points[:first])

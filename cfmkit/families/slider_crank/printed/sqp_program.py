@@ -27,7 +27,7 @@ import numpy as np
 
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
-from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
+from cfmkit.elastica.results.equilibria_near_known_path import drive_slope, solve_near_known_path
 from cfmkit.elastica.results.path import N_PLACES
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
@@ -214,7 +214,7 @@ class StripProgram(DesignProgram):
         drive = Displacement(SLIDER_NODE, self.task.direction, travel)
         if self.known is not None:
             with suppress(InputError):  # stations that move can change how finely the strip is cut
-                near = neighbouring(self.known, network, drive)
+                near = solve_near_known_path(self.known, network, drive)
                 if near.status is PathStatus.COMPLETE:
                     return near
         return _trace(network, drive)
@@ -315,12 +315,15 @@ class StripProgram(DesignProgram):
 
         paths = [(0.0, state.path)]
         try:
-            paths += [(step, neighbouring(state.path, build_shifted(step), drive)) for step in (-nudge, nudge)]
+            paths += [(step, solve_near_known_path(state.path, build_shifted(step), drive)) for step in (-nudge, nudge)]
         except InputError:
             beside = _trace(build_shifted(nudge), drive)
             paths = []
             if beside is not None:
-                paths = [(nudge, beside), (2.0 * nudge, neighbouring(beside, build_shifted(2.0 * nudge), drive))]
+                paths = [
+                    (nudge, beside),
+                    (2.0 * nudge, solve_near_known_path(beside, build_shifted(2.0 * nudge), drive)),
+                ]
         found = [pair for pair in paths if pair[1].status is PathStatus.COMPLETE]
         if len(found) < 2:
             return None

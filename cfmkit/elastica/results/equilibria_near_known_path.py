@@ -1,7 +1,7 @@
-"""Equilibria of a network that differs little from one whose path is known: solved from there, not from rest.
+"""Equilibria of a network that differs little from one with a known path: each is solved from the known equilibrium.
 
-An optimiser's next design, or a branch that cannot be reached from rest, is found this way. Every point is judged by
-itself: what moved too far, or is less stable, counts as not found.
+For the next design of an optimiser, and for branches that cannot be reached from rest. A point that moved too far, or
+is less stable than the known one, counts as not found.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.path import EquilibriumPath
 
 
-def neighbouring(path: EquilibriumPath, network: Network, drive: Drive, largest_turn: float = 0.5) -> EquilibriumPath:
+def solve_near_known_path(
+    path: EquilibriumPath, network: Network, drive: Drive, largest_turn: float = 0.5
+) -> EquilibriumPath:
     """Return the equilibria of `network` nearest to those of a path, one for each point of the drive.
 
     Parameters
