@@ -190,7 +190,8 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
 def _engine(solver: Mapping[str, Any]) -> str:
     if solver["engine"] == "C":
         return "runs on compiled C"
-    why = "CFMKIT_WITHOUT_C is set" if solver["switched_off"] else "no C compiler was there when it was installed"
+    installed = "it was installed without a C compiler, or for another version"
+    why = "CFMKIT_WITHOUT_C is set" if solver["switched_off"] else installed
     return f"runs on numpy, about 30 times slower: {why}"
 
 

@@ -74,11 +74,11 @@ def _module() -> Any:
         from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
     except ImportError:
         return None
-    return _march
+    return _march if getattr(_march, "FIELDS", 0) == len(COUNT_FIELDS) + len(ADDRESS_FIELDS) else None
 
 
 def load_compiled() -> Any:
-    """Return the compiled module, None if it was not built, or is switched off by `WITHOUT_C_VARIABLE`."""
+    """Return the compiled module, None if it was not built, or for another version, or `WITHOUT_C_VARIABLE` is set."""
     return None if WITHOUT_C_VARIABLE in os.environ else _module()
 
 

@@ -237,4 +237,9 @@ static PyMethodDef methods[] = {
 
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_march", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
-PyMODINIT_FUNC PyInit__march(void) { return PyModule_Create(&definition); }
+/* Code that was compiled before Python's side changed is told by the number of fields, and not used. */
+PyMODINIT_FUNC PyInit__march(void) {
+    PyObject *module = PyModule_Create(&definition);
+    if (module && PyModule_AddIntConstant(module, "FIELDS", sizeof(Model) / sizeof(Int))) Py_CLEAR(module);
+    return module;
+}

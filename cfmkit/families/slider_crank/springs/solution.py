@@ -6,9 +6,8 @@ common (the motion, or efforts of unit springs along it) is one row, (1, n), and
 Equilibria, turning points and bands are searched on a fine grid, cut into monotonic pieces, and refined on the closed
 form, so that they do not depend on the points of the curve.
 
-Four places of the motion have names: `start` is the unloaded position; `rest`, where all springs are relaxed, is the
-same place or none; `stretched` is the nearest position with crank and coupler in line; around `reference` the constant
-band is measured, and the effort there is `level`.
+Places of the motion: `start` is the unloaded position; `rest`, where all springs are relaxed, is the same or none;
+`stretched` is the nearest with crank and coupler in line; around `reference` the band is measured, of effort `level`.
 
 Reference
 ---------
@@ -488,10 +487,8 @@ class ClosedFormEffort(ShortRepr):
 
     def effort(self, name: str, places: FloatArray, /) -> FloatArray:
         """Return torque [N m] or force [N] of a branch at places of any shape."""
-        if places.size == self.places.size and np.may_share_memory(places, self.places):  # as each metric begins
-            own = self.solution.curve.place
-        else:
-            own = np.reshape(places, (1, -1))
+        whole = places.size == self.places.size and np.may_share_memory(places, self.places)  # as each metric begins
+        own = self.solution.curve.place if whole else np.reshape(places, (1, -1))
         return self.solution.effort_at(own, None, name).reshape(np.shape(places))
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
