@@ -406,7 +406,7 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     """Return the counts of a `Model`."""
     elements, points = mesh.elements.weight.shape
     follows = any(load.item.follows for load in mesh.loads)
-    presses = int(np.isin([contact.unknown for contact in mesh.contacts], mesh.free).sum())
+    presses = int(np.isin([at.unknown for at in mesh.contacts], mesh.free).sum()) if mesh.contacts else 0
     values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
     more = (len(mesh.loads), int(ramp), int(follows), len(mesh.contacts), presses)
     return dict(zip(COUNT_FIELDS, (*values, *more), strict=True))
