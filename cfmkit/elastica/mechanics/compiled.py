@@ -283,7 +283,7 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     elements, points = mesh.elements.weight.shape
     follows = any(load.item.follows for load in mesh.loads)
     nodes, sides = node_contacts(mesh), side_contacts(mesh)
-    presses = int(np.isin([contact.unknown for contact in nodes], mesh.free).sum())
+    presses = int(np.isin([at.unknown for at in nodes], mesh.free).sum()) if nodes else 0
     values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
     more = (len(mesh.loads), int(ramp), int(follows), len(nodes), presses, len(sides))
     moved = (len(mesh.moving.elements), mesh.fits.bundle.coefficients.shape[-1]) if mesh.moving is not None else (0, 0)
