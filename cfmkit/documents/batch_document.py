@@ -60,7 +60,7 @@ def document_of(
 
 
 def _count_changes(compared: BatchComparison) -> str:
-    count = len(compared.beyond)
+    count = len(compared.changes_beyond_tolerance)
     return f"{count} value{'s' * (count != 1)} changed" if count else ""
 
 
