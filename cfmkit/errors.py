@@ -111,7 +111,8 @@ class Problem:
     def __str__(self) -> str:
         """Return the one line that the user reads: ``file:line:col: path: message``."""
         place = f"{self.source}:{self.line}:{self.column}" if self.line else self.source
-        return ": ".join(part for part in (_words_shortened(place), _words_shortened(self.path), self.message) if part)
+        path = "" if self.source == f"--set {self.path}" else self.path  # said once
+        return ": ".join(part for part in (_words_shortened(place), _words_shortened(path), self.message) if part)
 
     @property
     def excerpt(self) -> tuple[str, ...]:

@@ -259,8 +259,13 @@ def _is_below(path: str, reported: set[str]) -> bool:
 
 
 def rename_source(error: SpecError, old: str, new: str) -> SpecError:
-    """Return the error with another name for the source of some problems."""
-    return SpecError([replace(one, source=new) if one.source == old else one for one in error.problems])
+    """Return the error with another name for the source of some problems, which stands for its path as well."""
+    return SpecError(
+        [
+            replace(one, source=new, path="" if old == f"--set {one.path}" else one.path) if one.source == old else one
+            for one in error.problems
+        ]
+    )
 
 
 def _similar(name: str) -> str:

@@ -137,7 +137,7 @@ class YamlDocument:
         path = self._path(path)
         reported = to_dotted(path)
         if option := self._option_at(path):
-            return Problem(option, 0, 0, "" if option == f"--set {reported}" else reported, message)
+            return Problem(option, 0, 0, reported, message)
         owner = self._owner(path)
         line, column = owner._own_place(path, at_key)
         return Problem(owner.source, line, column, reported, message, owner._line(line))
