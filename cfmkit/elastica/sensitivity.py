@@ -103,7 +103,7 @@ class Gradient:
     @cached_property
     def _rates(self) -> FloatArray:
         """Slopes of the free unknowns along the path at the points, (p, free)."""
-        solutions = equations(self.path.mesh).solve_each(self.path.free[self.points], self.at.drive)
+        solutions = equations(self.path.mesh).solve_each(self.path.free[self.points], self.at.drive, quick=True)
         if not (solutions.converged.all() and np.isfinite(solutions.rate).all()):
             raise InputError(SINGULAR_MESSAGE)
         return solutions.rate

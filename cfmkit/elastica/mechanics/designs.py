@@ -140,7 +140,9 @@ def _plain(
 
     def tables_at(mesh: Discretisation) -> dict[str, Any]:
         tables = plain_tables(turned, length * scales.length, rigidities, scales, mesh.degree, row, e.cuts)
-        return tables | {"axial": tables["axial"] + template.floor[:, None]}
+        if np.any(template.floored):
+            tables["axial"] = tables["axial"] + template.floor[:, None]
+        return tables
 
     tables = tables_at(template)
     if inside.size:  # bodies between the elements of a beam

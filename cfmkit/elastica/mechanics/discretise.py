@@ -140,8 +140,7 @@ class Discretisation:
     @property
     def floor(self) -> FloatArray:
         """1/EA of the elements of beams that do not stretch, (e,): what is left of their floors."""
-        stretches = {name: beam.section.axial for name, beam in self.fits.network.beams.items()}
-        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, self.axial[:, 0]))
+        return np.asarray(np.where(self.floored, self.axial[:, 0], 0.0))
 
     @property
     def cuts(self) -> dict[str, list[float]]:

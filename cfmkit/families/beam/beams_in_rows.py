@@ -58,7 +58,7 @@ class BeamRows:
 
     @cached_property
     def _laws(self) -> list[BetweenPoints]:
-        return [law for one in self.each if (law := one.everywhere) is not None]
+        return [law for one in self.each if (law := one.model_between_points) is not None]
 
     @cached_property
     def branches(self) -> Mapping[str, CurveRows]:
@@ -117,7 +117,7 @@ def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]
             solution = solve(specs[index])
         except CfmError:  # its own analysis says what is wrong with it
             continue
-        path, law = solution.path, solution.everywhere
+        path, law = solution.path, solution.model_between_points
         quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
         if quiet and law is not None and solution.accurate.all():
             found[index] = solution

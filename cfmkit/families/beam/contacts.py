@@ -17,8 +17,8 @@ from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.errors import InputError
+from cfmkit.families.beam.constant_force_range_and_extremes import window_of
 from cfmkit.families.beam.contact_spec import MAX_OVERLAP_SHARE, column_names, friction_columns, pads_of, sides_of
-from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import DEFINITIONS, LARGEST_FORCE
@@ -259,7 +259,7 @@ def force_extremes(
 
 def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float | None:
     """Return the mean force of a contact over the motion in a window, piece by piece between corners [N]."""
-    law = solution.everywhere
+    law = solution.model_between_points
     if law is None:
         return None
     low, high = max(window[0], float(law.places[0])), min(window[1], float(law.places[-1]))

@@ -16,12 +16,12 @@ from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import BOX_TOLERANCE, bodies, made_strips, regions
 from cfmkit.families.beam.scalar_results import natural
 from cfmkit.families.beam.strips_and_gaps import mirror_points, strips
-from cfmkit.families.beam.tip_on_uneven_surface import ride
+from cfmkit.families.beam.tip_on_uneven_surface import follow_surface
 from cfmkit.families.fem_results import number_fillets
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, color_key, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
@@ -105,7 +105,7 @@ def curve(result: Result) -> Figure:
         levels.append(Limit(nominal, f"F_d = {value_text(nominal, 'force')} at {value_text(end, 'length')}"))
     look = CurveLook(levels=tuple(levels), regions=tuple(regions))
     only = replace(result, curves=result.curves[:1])
-    return loop_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
+    return curve_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
 
 
 def stress_map(result: Result) -> Figure:
@@ -375,7 +375,7 @@ def frequencies(result: Result) -> Figure:
 
 def surface(result: Result) -> Figure:
     """Return the contact along the surface: its height, and the forces at the tip [Lan, Fig. 14]."""
-    found = ride(result.state)
+    found = follow_surface(result.state)
     if found is None:
         raise ValueError("there is no surface")
     way = Scale("along the surface", "length")

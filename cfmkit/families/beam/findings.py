@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
+from cfmkit.families.beam.constant_force_range_and_extremes import window_of
 from cfmkit.families.beam.contacts import CONTACT_FINDINGS as ON_CONTACTS
 from cfmkit.families.beam.contacts import change_sentences, contact_sentences
-from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of
 from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units

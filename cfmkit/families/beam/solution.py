@@ -18,7 +18,7 @@ from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.elastica.results.folding_path_between_points import interpolate_folding_path
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
-from cfmkit.families.beam.curve_along_its_motion import AlongMotion
+from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirror_points, smallest_gap
 
@@ -76,7 +76,7 @@ class Solution(ShortRepr):
         return "angle" if self.spec.mechanism.drive.turns else "length"
 
     @cached_property
-    def everywhere(self) -> BetweenPoints | None:
+    def model_between_points(self) -> BetweenPoints | None:
         """The equilibria between the points of the path; None of paths whose motion turns back."""
         drive, axial = self.spec.mechanism.drive, self.spec.stress == "total"
         unit, allowed = self.assembly.effort_unit, self.assembly.allowable_stress
@@ -93,7 +93,7 @@ class Solution(ShortRepr):
     @cached_property
     def winding(self) -> AlongTheWay | None:
         """The equilibria at every place of the way of a path whose motion turns back."""
-        if self.everywhere is not None:
+        if self.model_between_points is not None:
             return None
         return interpolate_folding_path(self.path, lambda path: replace(self, path=path, keep=np.arange(len(path))))
 
@@ -121,7 +121,7 @@ class Solution(ShortRepr):
 
         Where the path turns back, between its points, and of several states at one place the largest.
         """
-        if self.everywhere is not None:
+        if self.model_between_points is not None:
             return self._part_efforts_at(np.ravel(places)).reshape(np.shape(places))
         motion, efforts = self.with_ends.motion, self.with_ends.largest_member_efforts
         low, high = np.minimum(motion[1:], motion[:-1]), np.maximum(motion[1:], motion[:-1])
@@ -131,9 +131,9 @@ class Solution(ShortRepr):
         return np.asarray(np.where((at >= low) & (at <= high), between, 0.0).max(axis=1))
 
     def _part_efforts_at(self, places: FloatArray) -> FloatArray:
-        assert self.everywhere is not None
+        assert self.model_between_points is not None
         found, near = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
-        for corner, *sides in self.everywhere.beside_corners[:, [1, 0, 2]].tolist():
+        for corner, *sides in self.model_between_points.beside_corners[:, [1, 0, 2]].tolist():
             here = np.abs(places - corner) <= near
             if here.any():  # the path has two directions: along one it may be unbounded, along the other it goes on
                 steps = np.array([side - corner for side in sides if side != corner])
@@ -142,8 +142,8 @@ class Solution(ShortRepr):
         return found
 
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
-        assert self.everywhere is not None
-        there = self.everywhere.solve_at(places)
+        assert self.model_between_points is not None
+        there = self.model_between_points.solve_at(places)
         alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
         return np.where(there.accurate, alone.largest_member_efforts, np.nan)
 

@@ -122,9 +122,6 @@ class Rescale(Model):
         return {}
 
 
-LEAST_DRAWN = 20
-"""Parts that a design is judged by at least, as of `design.samples`."""
-
 LEAST_SHARE = 0.05
 """Of its largest force a target curve must have everywhere: the search compares by the force that is wanted."""
 
