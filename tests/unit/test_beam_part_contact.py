@@ -104,12 +104,80 @@ def test_a_pad_that_leaves_its_beam_gives_a_partial_result_with_the_reason():
     assert "'tip' on beam 'lower'" in result.message
 
 
+PAIR_OF_BEAMS = stated("{between: [upper, lower]}").replace("[130 mm, 0 mm]", "[80 mm, 0 mm]")
+
+
+def test_two_beams_have_one_force_and_a_place_on_each():
+    """The end of the shorter one presses on the side of the other: the same as a pad of its node."""
+    pair = cfmkit.analyze(cfmkit.loads(PAIR_OF_BEAMS))
+    force, upper, lower = (pair.curve.extra[f"upper_lower_{end}"].values for end in ("force", "at_upper", "at_lower"))
+    touches = force > 0
+    assert touches.sum() > 4
+    assert (lower[touches] == 1).all()
+    assert np.isnan(upper[~touches]).all()
+    pad = cfmkit.analyze(cfmkit.loads(PAIR_OF_BEAMS.replace("[upper, lower]", "[end, upper]")))
+    assert force == pytest.approx(pad.curve.extra["end_upper_force"].values, rel=1e-9, abs=1e-12)
+    assert upper == pytest.approx(pad.curve.extra["end_upper_at"].values, rel=1e-9, nan_ok=True)
+    means = pair.values["contact_force[upper_lower]"].value, pad.values["contact_force[end_upper]"].value
+    assert means[0] == pytest.approx(means[1], rel=1e-9)
+    (said,) = (warning.message for warning in pair.warnings if warning.name == "contact_begins")
+    assert said.endswith("between 'end' and 'upper'")
+    assert "beams_touch" not in {warning.name for warning in pair.warnings}
+    assert "pad-3-16-0" in {artist.get_gid() for artist in figures(pair)["shapes"]().axes[0].get_children()}
+
+
+BULGE = (
+    stated("{between: [upper, lower]}")
+    .replace("{start: root, end: tip}", "{start: root, end: tip, shape: {kind: arc, sweep: 57.3 deg}}")
+    .replace("tip: {at: [100 mm, 10 mm]}", "tip: {at: [95.41 mm, 19.57 mm]}")
+    .replace("root: {at: [0 mm, 10 mm]", "root: {at: [0 mm, 10 mm]")
+    .replace("travel: 30 mm", "travel: 60 mm")
+)
+
+
+def test_two_beams_that_begin_to_nest_give_a_partial_result_with_the_reason():
+    result = cfmkit.analyze(cfmkit.loads(BULGE))
+    force, upper, lower = (result.curve.extra[f"upper_lower_{end}"].values for end in ("force", "at_upper", "at_lower"))
+    assert result.status is Status.PARTIAL
+    said = {warning.name: warning.message for warning in result.warnings}
+    assert "contact of 'upper' on 'lower' spreads along a length" in said["contact_spreads_between_beams"]
+    assert "contact begins at" in said["contact_begins"]
+    assert force[-1] > 0
+    assert 0.3 < lower[-1] < upper[-1] < 1
+    drawn = {artist.get_gid() for artist in figures(result)["shapes"]().axes[0].get_children()}
+    assert any(name and name.startswith("side-0-") for name in drawn)
+    assert any(name and name.startswith("side-1-") for name in drawn)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("{start: wall, end: end}", "{start: wall, end: tip}", "both beams are at node 'tip'"),
+        ("{start: wall, end: end}", "{start: wall, end: end, end_offset: [0 mm, 1 mm]}", "beam 'lower' ends beside a"),
+        (
+            "{start: wall, end: end}", "{start: wall, end: end, thickness: [[0, 1 mm], [1, 2 mm]]}",
+            "the thickness of beam 'lower' varies: give a node that touches, and a beam",
+        ),
+    ],
+)  # fmt: skip
+def test_two_beams_that_cannot_be_in_contact_are_refused(old, new, says):
+    with pytest.raises(SpecError, match=says):
+        cfmkit.loads(PAIR_OF_BEAMS.replace(old, new))
+
+
+def test_two_beams_that_cross_at_rest_are_refused_with_depth_and_place():
+    text = PAIR_OF_BEAMS.replace("[80 mm, 0 mm]", "[80 mm, 20 mm]")
+    with pytest.raises(InputError, match=r"beams 'upper' and 'lower' overlap by 0\.5 mm at 40% of 'upper' at rest"):
+        cfmkit.analyze(cfmkit.loads(text))
+
+
 @pytest.mark.parametrize(
     ("pair", "says"),
     [
         ("{between: [top, lower]}", "there is no node or beam 'top'; nodes are root, tip, wall, end; beams are upper"),
-        ("{between: [upper, lower]}", "these are two beams: give a node and a beam, such as [tip, lower]"),
-        ("{between: [tip, end]}", "these are two nodes"),
+        ("{between: [upper, upper]}", "contact of beam 'upper' with itself is not modelled"),
+        ("{between: [upper, lower], radius: 1 mm}", "two beams touch with half their thickness: leave it out"),
+        ("{between: [tip, end]}", "these are two nodes: one must be a beam"),
         ("{between: [end, lower]}", "node 'end' is an end of beam 'lower'"),
         ("{between: [root, lower]}", "no beam ends freely at node 'root': state the radius of its round pad"),
         ("{between: [tip]}", "item 2 of the list is missing"),

@@ -245,7 +245,7 @@ def test_a_leaf_that_would_wrap_around_a_pad_ends_the_path_with_the_reason():
     path = trace(net, Loading(TIP_LOAD, np.array([0.5, 9.0])), EXACT)
     assert path.status is PathStatus.LOST
     assert path.contact_events[-1].kind == "spreads"
-    assert "'post' on beam 'leaf' begins to lie on it along a length" in path.message
+    assert "contact of 'post' on beam 'leaf' spreads along a length" in path.message
 
 
 def test_stability_changes_with_a_pad_where_the_load_has_its_limit():

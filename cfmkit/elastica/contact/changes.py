@@ -18,7 +18,7 @@ from cfmkit.elastica.contact.side_gaps import LoadStage, carry
 from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.model.contact import NodeOnBeam, NodeOnObstacle, describe
+from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
@@ -316,6 +316,7 @@ class PieceOfPath:
         radii += [
             item.radius + 0.5 * beams[item.beam].section.thinnest for item in items if isinstance(item, NodeOnBeam)
         ]
+        radii += [beams[item.beam].section.thinnest for item in items if isinstance(item, BeamOnBeam)]
         return min(radii, default=np.inf)
 
     def grows_along(self, at: PathEquilibrium, number: int) -> float:

@@ -1,4 +1,4 @@
-"""Edges that the side of a beam may touch, in states of a network: outlines that stand still, round pads of nodes."""
+"""Edges that the side of a beam may touch, in states of a network: of obstacles, of pads, of other beams."""
 
 from __future__ import annotations
 
@@ -7,40 +7,64 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnObstacle, Distance
+from cfmkit.elastica.model.contact import BeamOnObstacle, Distance, NodeOnBeam
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import BeamSide
+    from cfmkit.elastica.model.contact import BeamOnBeam, BeamSide
 
 
 def measure_distance(mesh: Discretisation, item: BeamSide, places: Any, z: Any) -> Distance:
     """Return the signed distances of places (..., k, 2) from an edge in states (..., size); dimensionless.
 
-    Places have as many leading axes as the states, and any number of axes behind them.
+    Places have as many leading axes as the states, and any number of axes behind them. Of another beam the edge is
+    the circle about its place that touches.
     """
     length = mesh.scales.length
     if isinstance(item, BeamOnObstacle):
         edge = item.outline.distance(places * length)
         return Distance(edge.value / length, edge.normal, edge.curvature * length)
-    centre = poses(mesh.attachments, z, [mesh.nodes[item.node]]).place[..., 0, :]
+    number, radius = _circle(mesh, item)
+    centre = poses(mesh.attachments, z, [number]).place[..., 0, :]
     away = places - centre.reshape(*centre.shape[:-1], *(1,) * (places.ndim - centre.ndim), 2)
     reach = np.hypot(away[..., 0], away[..., 1])
-    return Distance(reach - item.radius / length, away / reach[..., None], 1 / reach)
+    return Distance(reach - radius, away / reach[..., None], 1 / reach)
 
 
 class EdgeMotion(NamedTuple):
-    """What moves an edge: m unknowns, none of an obstacle, three of the pad of a node: x, y and rotation."""
+    """Unknowns that move an edge: none of an obstacle, those of its body of a circle: x, y and rotation."""
 
     unknowns: Any  # (m,)
     jacobian: FloatArray  # (2, m)
-    arm: FloatArray  # (2,) from its body to the centre of the pad
+    arm: FloatArray  # (2,) from its body to the centre of the circle
 
 
 def find_motion(mesh: Discretisation, item: BeamSide, z: FloatArray) -> EdgeMotion:
     """Return what moves an edge in a state (size,)."""
     if isinstance(item, BeamOnObstacle):
         return EdgeMotion(np.zeros(0, np.int64), np.zeros((2, 0)), np.zeros(2))
-    at = poses(mesh.attachments, z, [mesh.nodes[item.node]])
+    at = poses(mesh.attachments, z, [_circle(mesh, item)[0]])
     return EdgeMotion(at.unknowns[0, :3], at.jacobian[0], at.arm[0])
+
+
+def _circle(mesh: Discretisation, item: NodeOnBeam | BeamOnBeam) -> tuple[int, float]:
+    """Return the attachment and the radius of the pad, or of the other beam at its place, that a side touches."""
+    if isinstance(item, NodeOnBeam):
+        return mesh.nodes[item.node], item.radius / mesh.scales.length
+    return find_mate(mesh, item).place, half_thickness_of(mesh, item.partner)
+
+
+def find_mate(mesh: Discretisation, item: BeamOnBeam) -> ContactAt:
+    """Return the contact of the other beam of a pair that touches."""
+    return next(
+        contact
+        for contact in mesh.contacts
+        if type(contact.item) is type(item) and contact.item.name == item.name and contact.item.beam == item.partner
+    )
+
+
+def half_thickness_of(mesh: Discretisation, beam: str) -> float:
+    """Return half the thickness of a beam of one thickness, in mean beam lengths."""
+    return 0.5 * mesh.fits.network.beams[beam].section.thinnest / mesh.scales.length

@@ -8,12 +8,14 @@ import numpy as np
 
 from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
 from cfmkit.elastica.contact.side_changes import locate_side_change
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 NOT_LOCATED = "where {names} {what} was not found near {{place}}"
@@ -75,7 +77,12 @@ def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:
         return False
     item = piece.sides.all[row - count].item
     sides = [k for k in rows if count <= k < count + len(piece.sides.all)]
-    return any(k != row and piece.sides.all[k - count].item is item for k in sides)
+    return any(k != row and _touch_alike(piece.sides.all[k - count].item, item) for k in sides)
+
+
+def _touch_alike(item: BeamSide, neighbour: BeamSide) -> bool:
+    """Return True if two contacts are one, or of the same parts of the mechanism."""
+    return item is neighbour or (not isinstance(item, BeamOnObstacle) and item.name == neighbour.name)
 
 
 def _find_change_at_end(

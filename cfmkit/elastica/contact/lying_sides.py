@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.side_conditions import ROUNDING_OF_KIND
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
-from cfmkit.elastica.model.contact import NodeOnBeam
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.changes import PieceOfPath
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide
+    from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 NO_TENSION = 1e-9  # share of a force along an obstacle that is none
@@ -25,7 +25,7 @@ STRAIGHT_TURN = 1e-9  # turn of an unloaded beam that is none [rad]
 
 def may_lie(piece: PieceOfPath, item: BeamSide, parameter: float) -> bool:
     """Return True if a side takes on another curvature where it lies on an obstacle."""
-    is_round = isinstance(item, NodeOnBeam) or len(item.outline.radius) > 0
+    is_round = not isinstance(item, BeamOnObstacle) or len(item.outline.radius) > 0
     return is_round or abs(_measure_unloaded_bend(piece, item, parameter)) > STRAIGHT_TURN
 
 
@@ -51,7 +51,7 @@ def presses_where_it_spreads(piece: PieceOfPath, item: BeamOnObstacle, place: An
 
 def why_not_laid(piece: PieceOfPath, item: BeamSide) -> str:
     """Return why a beam cannot lie on an obstacle along a length; empty if it can."""
-    if isinstance(item, NodeOnBeam):
+    if not isinstance(item, BeamOnObstacle):
         return "between parts of the mechanism that is not modelled"
     beam = piece.whole.mesh.fits.network.beams[item.beam]
     shape, section = beam.shape, beam.section

@@ -11,12 +11,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
+from cfmkit.elastica.contact.places_of_sides import (
+    find_nearest_places,
+    find_pads_at,
+    find_partner,
+    lay_anew,
+    list_remaining_places,
+)
 from cfmkit.elastica.contact.side_conditions import NEW_PLACE
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import NodeOnBeam, NodeOnObstacle, describe
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, describe
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
@@ -28,6 +36,8 @@ N_SECANTS, ZERO_LEVEL = 12, 1e-13
 RATE_STEP = 1e-6  # motion by which rates of conditions are differentiated
 FROM_ROOT, BESIDE_ROOT = 1e-3, 1e-2  # of a beam from a clamped end on the obstacle: what lies there first; a point
 BEGINS_TO_LIE = "{names} begins to lie on it along a length at {{place}}: {why}"
+SPREADS_MESSAGE = "contact of {names} spreads along a length at {{place}}: {why}"
+TOUCHES_TWICE = "{names} touch at a second place at {{place}}: that is not modelled"
 MEETS_WHOLE = "{names} is met along the whole length at {{place}}: no place touches first"
 REACHES_MARK = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
 CONTACTS_MEET = "two contacts of beam {beam!r} meet at {{place}}"
@@ -57,10 +67,10 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
         kind: Literal["moves", "spreads"] = "moves" if condition.kind == "tangent" else "spreads"
         return ContactChange(kind, condition.number, at, unstable, unstable, number, condition)
     if condition.kind == "end" and condition.mark in (0.0, 1.0) and condition.last in piece.sides.roots(condition.item):
-        beyond = piece.with_flanks(_remaining_places(piece, condition.number), piece.closed - {condition.number})
+        beyond = piece.with_flanks(list_remaining_places(piece, condition.number), piece.closed - {condition.number})
         begin, wanted = piece.carry(at, beyond), ("wraps", condition.last)
     elif condition.kind == "end":
-        onto = _move_onto_node(piece, condition)
+        onto = _move_onto_node(piece, condition, at)
         if onto is None:
             return PathStop(WhyStopped.LOST, at.drive, REACHES_MARK.format(
                 names=piece.say(condition.number), mark=_mark(piece, condition)))  # fmt: skip
@@ -108,9 +118,13 @@ def _locate_touch(
             return None if at is None else ContactChange(
                 "spreads", between, at, step.first.unstable, step.first.unstable, condition.number,
                 condition._replace(kind="lies", number=between))  # fmt: skip
-        if 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
-            flanks = [*piece.flanks, FlankPlace(condition.number, least.parameter)]
-            beyond = piece.with_flanks(flanks, piece.closed)
+        if isinstance(condition.item, BeamOnBeam) and any(
+            contact.number == condition.number for contact in piece.whole.mesh.contacts
+        ):
+            return PathStop(WhyStopped.LOST, guess.drive, TOUCHES_TWICE.format(names=describe(condition.item)))
+        places = find_nearest_places(piece, condition, guess, least.parameter)
+        if places:
+            beyond = piece.with_flanks([*piece.flanks, *places], piece.closed)
             begin_guess = beyond.shrink(piece.carry(guess, beyond))
             number = _new_side(piece, beyond, condition.number, least.parameter)
             border = np.zeros(len(begin_guess.x) + 1)
@@ -122,8 +136,8 @@ def _locate_touch(
                 if -BESIDE_SHARE <= step.share_of(back) <= 1 + BESIDE_SHARE:
                     return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
                                          condition.number, condition, beyond)  # fmt: skip
-        elif _pads_at(piece, condition, least.parameter):  # it is the node that begins to touch
-            return None
+        elif isinstance(condition.item, BeamOnBeam) or find_pads_at(piece, condition, least.parameter):
+            return None  # it is the node that begins to touch
         closer = step.bisect(row)
         if closer is None:
             return None
@@ -145,52 +159,17 @@ def _new_side(piece: PieceOfPath, beyond: PieceOfPath, number: int, parameter: f
     return min(sides, key=lambda k: abs(mesh.elements.cuts[mesh.contacts[k].element, 1] - parameter))
 
 
-def _move_onto_node(piece: PieceOfPath, condition: SideCondition) -> PieceOfPath | None:
+def _move_onto_node(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> PieceOfPath | None:
     """Return the piece in which the node at the end of a beam touches instead of its side; None if none may."""
-    pads = _pads_at(piece, condition, 1.0 if condition.last else 0.0)
+    pads = find_pads_at(piece, condition, 1.0 if condition.last else 0.0)
     if not pads or condition.mark not in (0.0, 1.0):
         return None
-    return piece.with_flanks(
-        _remaining_places(piece, condition.number), (piece.closed - {condition.number}) | {pads[0]}
-    )
-
-
-def _pads_at(piece: PieceOfPath, condition: SideCondition, end: float) -> list[int]:
-    """Return the numbers of the pads on the same obstacle of the node at the end of a beam that is near."""
-    mesh = piece.whole.mesh
-    beam = mesh.fits.network.beams[condition.item.beam]
-    node = beam.end if end > 0.5 else beam.start
-    return [
-        k
-        for k, contact in enumerate(mesh.contacts)
-        if isinstance(contact.item, NodeOnObstacle)
-        and contact.item.name == condition.item.name
-        and contact.item.node == node
-    ]
-
-
-def _remaining_places(piece: PieceOfPath, *numbers: int) -> list[FlankPlace]:
-    """Return the places at which sides touch but for some contacts, and what lay on an obstacle beside these."""
-    mesh = piece.whole.mesh
-    return [
-        FlankPlace(
-            contact.number,
-            float(mesh.elements.cuts[contact.element, 1]),
-            0 if k + contact.laid in numbers else contact.laid,
-        )
-        for k, contact in enumerate(mesh.contacts)
-        if contact.slide >= 0 and k not in numbers
-    ]
-
-
-def _lay_anew(piece: PieceOfPath, number: int, laid: int) -> PieceOfPath:
-    """Return the piece in which the side beside a contact lies on its obstacle, or does not."""
-    mesh = piece.whole.mesh
-    return piece.with_flanks([
-        FlankPlace(contact.number, float(mesh.elements.cuts[contact.element, 1]), laid if k == number else contact.laid)
-        for k, contact in enumerate(mesh.contacts)
-        if contact.slide >= 0
-    ], piece.closed)  # fmt: skip
+    left = list_remaining_places(piece, condition.number)
+    if isinstance(condition.item, BeamOnBeam):  # the node touches the other beam where its side did
+        mate = find_mate(piece.whole.mesh, condition.item)
+        left.append(FlankPlace(pads[0], float(piece.whole.values(at.x, at.drive)[mate.slide])))
+        return piece.with_flanks(left, piece.closed)
+    return piece.with_flanks(left, (piece.closed - {condition.number}) | {pads[0]})
 
 
 def _contact_around(piece: PieceOfPath, condition: SideCondition, parameter: float) -> int | None:
@@ -222,7 +201,7 @@ def _join_contacts(piece: PieceOfPath, condition: SideCondition, at: PathEquilib
     z, mesh = piece.whole.values(at.x, at.drive), piece.whole.mesh
     pair = mesh.contacts[condition.number], mesh.contacts[condition.number + 1]
     middle = 0.5 * float(sum(z[contact.slide] for contact in pair))
-    flanks = [*_remaining_places(piece, condition.number, condition.number + 1), FlankPlace(pair[0].number, middle)]
+    flanks = [*list_remaining_places(piece, condition.number, condition.number + 1), FlankPlace(pair[0].number, middle)]
     return piece.with_flanks(flanks, piece.closed)
 
 
@@ -232,12 +211,9 @@ def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath,
     begin_guess = piece.carry(at, beyond)
     force = sum(float(z[piece.whole.mesh.contacts[k].unknown]) for k in numbers)
     full = beyond.whole.values(begin_guess.x, begin_guess.drive)
-    idle = [
-        contact.unknown
-        for k, contact in enumerate(mesh.contacts)
-        if k in beyond.closed and full[contact.unknown] == 0.0
-    ]
-    full[idle] = force / max(len(idle), 1)
+    idle = [contact for k, contact in enumerate(mesh.contacts) if k in beyond.closed and full[contact.unknown] == 0.0]
+    n_forces = sum(not isinstance(contact.item, BeamOnBeam) or contact.item.leads for contact in idle)
+    full[[contact.unknown for contact in idle]] = force / max(n_forces, 1)
     return begin_guess._replace(x=full[mesh.free])
 
 
@@ -298,19 +274,23 @@ def enter_side_change(
         why = why_not_laid(piece, condition.item)
         curved = condition.kind == "wraps" or may_lie(piece, condition.item, 0.5)
         if why and curved:
-            text = BEGINS_TO_LIE.format(names=describe(condition.item), why=why)
+            text = BEGINS_TO_LIE if isinstance(condition.item, BeamOnObstacle) else SPREADS_MESSAGE
+            text = text.format(names=describe(condition.item), why=why)
             return PathStop(WhyStopped.LOST, change.at.drive, text)
     lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
                     if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
     if condition is None:  # a contact of a side ends
         item = piece.whole.mesh.contacts[change.number]
-        beyond = piece.with_flanks(_remaining_places(piece, change.number), piece.closed - {change.number})
+        beyond = piece.with_flanks(list_remaining_places(piece, change.number), piece.closed - {change.number})
         begin_guess = beyond.shrink(piece.carry(change.at, beyond))
         at = beyond.own.solve(begin_guess.x, begin_guess.drive)
         if at is None:
             return lost
+        number = item.number
+        if isinstance(item.item, BeamOnBeam) and not item.item.leads:
+            number = find_partner(piece, number)
         row = len(beyond.whole.mesh.contacts) + next(
-            k for k, contact in enumerate(beyond.sides.all) if contact.kind == "touch" and contact.number == item.number
+            k for k, contact in enumerate(beyond.sides.all) if contact.kind == "touch" and contact.number == number
         )
         whole = beyond.grow(at)
         grows = row_rate(beyond, whole, row)
@@ -346,7 +326,12 @@ def _move_into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None
     """Return the piece in which a side touches instead of the node at its end, and how the way from there grows."""
     condition: Any = change.condition
     place = 1 - NEW_PLACE if condition.last else NEW_PLACE
-    beyond = piece.with_flanks([*piece.flanks, FlankPlace(change.contact, place)], piece.closed - {change.number})
+    left, new = piece.flanks, [FlankPlace(change.contact, place)]
+    if isinstance(condition.item, BeamOnBeam):
+        pad, z = piece.whole.mesh.contacts[change.number], piece.whole.values(change.at.x, change.at.drive)
+        left = tuple(list_remaining_places(piece, change.number))
+        new.append(FlankPlace(find_partner(piece, change.contact), float(z[pad.slide])))
+    beyond = piece.with_flanks([*left, *new], piece.closed - {change.number})
     number = _new_side(piece, beyond, change.contact, place)
     begin = _pass_force_on(piece, change.at, beyond, change.number)
     slide = beyond.slot_in_own(number, slide=True)
@@ -369,7 +354,7 @@ def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False)
     lies = may_lie(piece, item, middle) and presses_where_it_spreads(piece, item, place, force, angle)
     lies = lies and not free
     both = [FlankPlace(change.contact, middle + side * NEW_PLACE, int(lies and side < 0)) for side in (-1.0, 1.0)]
-    beyond = piece.with_flanks([*_remaining_places(piece, change.number), *both], piece.closed)
+    beyond = piece.with_flanks([*list_remaining_places(piece, change.number), *both], piece.closed)
     first, last = (_new_side(piece, beyond, change.contact, contact.parameter) for contact in both)
     begin = _pass_force_on(piece, change.at, beyond, change.number)
     new = beyond.whole.mesh
@@ -432,7 +417,7 @@ def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | N
     else:
         laid = contact.laid
     element = contact.element + (laid > 0)
-    beyond = _lay_anew(piece, change.number, laid if condition.kind == "lies" else 0)
+    beyond = lay_anew(piece, change.number, laid if condition.kind == "lies" else 0)
     begin, new = piece.carry(change.at, beyond), beyond.whole.mesh
     full = beyond.whole.values(begin.x, begin.drive)
     side_contact = mesh.elements.unknowns[element]

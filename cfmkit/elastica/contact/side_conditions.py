@@ -17,19 +17,20 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.edges import measure_distance
-from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
+from cfmkit.elastica.contact.edges import find_mate, measure_distance
+from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.beam_fits import beam_end_at
-from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide, NodeOnObstacle
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, NodeOnObstacle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
@@ -38,6 +39,10 @@ NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a co
 ROUNDING_OF_KIND = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
              "wraps": 1e-9, "pulls": 1e-9}  # fmt: skip
 """By how much each kind of condition may be negative."""
+
+
+PAD_OF_SIDE: dict[type, Any] = {BeamOnObstacle: NodeOnObstacle, BeamOnBeam: NodeOnBeam}
+"""Contacts of the node at the end of a beam with what its side may touch, too."""
 
 
 class SideCondition(NamedTuple):
@@ -68,15 +73,16 @@ class SideConditions:
         for number, item in enumerate(mesh.fits.network.contacts):
             if not isinstance(item, BeamSide):
                 continue
-            yield SideCondition("touch", number, item)
+            if not isinstance(item, BeamOnBeam) or item.leads:
+                yield SideCondition("touch", number, item)
             beam = mesh.fits.network.beams[item.beam]
             elements = [contact for _, contact in sides if contact.item.beam == item.beam]  # type: ignore[union-attr]
             for last in self.roots(item):
                 if not elements or elements[-1 if last else 0].item is not item:
                     yield SideCondition("wraps", number, item, last)
             for k in sorted(self.closed):
-                pad = mesh.contacts[k].item
-                if isinstance(pad, NodeOnObstacle) and pad.name == item.name and not np.isfinite(item.stiffness):
+                pad: Any = mesh.contacts[k].item
+                if isinstance(pad, PAD_OF_SIDE.get(type(item), ())) and pad.name == item.name:
                     for last, node in ((False, beam.start), (True, beam.end)):
                         if pad.node == node and not np.isfinite(pad.stiffness):
                             yield SideCondition("tangent", k, item, last)
@@ -94,6 +100,8 @@ class SideConditions:
                 yield SideCondition("end", k, side, True, high)
             if contact.laid and len(side.outline.radius):
                 yield SideCondition("pulls", k, side)
+            if isinstance(side, BeamOnBeam) and not side.leads:
+                continue
             if not contact.laid and not any(neighbour.item is side for neighbour in before[-1:] + after[:1]):
                 yield SideCondition("spreads", k, side)
         for (k, contact), (_, neighbour) in itertools.pairwise(sides):
@@ -140,9 +148,9 @@ class SideConditions:
             for number, contact in enumerate(mesh.contacts):
                 if contact.item.name != item.name:
                     continue
-                if contact.slide >= 0 and contact.item is item:
+                if contact.slide >= 0 and contact.item.beam == item.beam:  # type: ignore[union-attr]
                     touched += [contact.element, contact.element + 1]
-                elif isinstance(contact.item, NodeOnObstacle) and number in self.closed:
+                elif isinstance(contact.item, NodeOnObstacle | NodeOnBeam) and number in self.closed:
                     touched += [elements[0]] * (contact.item.node == beam.start) + [elements[-1]] * (
                         contact.item.node == beam.end
                     )
@@ -152,7 +160,7 @@ class SideConditions:
                 for contact in mesh.contacts
                 if contact.laid and contact.item is item
             ]
-            self._gaps[item] = SideGaps(mesh, item, tuple(touched), tuple(laid))
+            self._gaps[item] = make_gaps(mesh, item, tuple(touched), tuple(laid))
         return self._gaps[item]
 
     @cached_property
@@ -180,7 +188,7 @@ class SideConditions:
         if condition.kind == "tangent":
             return self._run_away(contact, condition, z)
         if condition.kind == "spreads":
-            return self._relative_curvature(contact, z)
+            return self._least_curvature(contact, z)
         if condition.kind in ("closes", "pinch"):
             following = self.mesh.contacts[condition.number + 1]
             return np.asarray(z[:, following.slide] - z[:, contact.slide] - NEW_PLACE)
@@ -223,9 +231,26 @@ class SideConditions:
         inside = float(mesh.elements.cuts[element].mean())
         angle = float(np.real(fitted.angle(float(side), inside))) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
         place = poses(mesh.attachments, z, [pad.place]).place[:, 0]
-        normal = measure_distance(mesh, condition.item, place, z).normal
+        if isinstance(condition.item, BeamOnBeam):  # there the pad touches the other beam
+            away = poses(mesh.attachments, z, [int(mesh.elements.ends[element, side])]).place[:, 0] - place
+            normal = away / np.hypot(*away.T)[:, None]
+        else:
+            normal = measure_distance(mesh, condition.item, place, z).normal
         along = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
         return np.asarray(-along if condition.last else along)
+
+    def _least_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
+        """Return the curvature of the gap at a contact; of two beams the smaller one of the gap by both places."""
+        side = self._relative_curvature(contact, z)
+        if not isinstance(contact.item, BeamOnBeam):
+            return side
+        mesh, mate = self.mesh, find_mate(self.mesh, contact.item)
+        partner = self._relative_curvature(mate, z)
+        places = [
+            mesh.attachments.origin[at.place] + z[:, mesh.attachments.unknowns[at.place, :2]] for at in (contact, mate)
+        ]
+        mixed = 1 / np.hypot(*(places[0] - places[1]).T)  # but for its sign: both are tangent
+        return np.asarray(0.5 * (side + partner) - np.hypot(0.5 * (side - partner), mixed))
 
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""

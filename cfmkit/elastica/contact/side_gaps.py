@@ -18,7 +18,7 @@ from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import NodeOnBeam
+from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
@@ -138,6 +138,14 @@ def _even_angles() -> FloatArray:
     return np.asarray(0.5 * (1 - np.cos(np.pi * np.arange(N_ALONG) / (N_ALONG - 1))))
 
 
+def interpolate_line(degree: int, fractions: FloatArray, start: Any, slopes: Any) -> tuple[Any, Any]:
+    """Return places of elements and their slopes at fractions (...), from starts (..., 2), slopes (..., q, 2)."""
+    rows = _rows_at(degree, fractions.ravel())
+    shape = (*fractions.shape, -1)
+    place = start + np.einsum("...q,...qd->...d", rows.integrals.reshape(shape), slopes)
+    return place, np.einsum("...q,...qd->...d", rows.interpolation.reshape(shape), slopes)
+
+
 class LeastGap(NamedTuple):
     """The least gap of the side of a beam."""
 
@@ -192,14 +200,18 @@ class SideGaps:
     ) -> tuple[Any, Any, SideStates]:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
-        values = measure_distance(self.mesh, self.item, seen.place, z)
+        value, normal = self.distance(seen.place, z, stage)
         half = np.stack(
             [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
         )
-        slope = values.normal[..., 0] * np.cos(seen.angle) + values.normal[..., 1] * np.sin(seen.angle)
+        slope = normal[..., 0] * np.cos(seen.angle) + normal[..., 1] * np.sin(seen.angle)
         taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
         slope = slope - np.stack(taper, axis=1)
-        return values.value - half, slope, seen
+        return value - half, slope, seen
+
+    def distance(self, places: Any, z: FloatArray, stage: LoadStage) -> tuple[Any, Any]:
+        """Return the distances of places (n, ..., 2) from what may be touched in n states, and their gradients."""
+        return measure_distance(self.mesh, self.item, places, z)[:2]
 
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
@@ -253,9 +265,9 @@ class SideGaps:
     def _side(self) -> SideData | None:
         """The side as compiled code takes it."""
         mesh = self.mesh
-        if isinstance(self.item, NodeOnBeam) or isinstance(
-            mesh.fits.network.beams[self.item.beam].section.thickness, Taper
-        ):
+        if not isinstance(self.item, BeamOnObstacle):
+            return None
+        if isinstance(mesh.fits.network.beams[self.item.beam].section.thickness, Taper):
             return None
         edge = self.item.outline
         half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
@@ -310,6 +322,7 @@ class SideGaps:
         return _ElementStates(
             element,
             z,
+            stage,
             poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
             fields.slope_x[:, element] * speed,
             fields.slope_y[:, element] * speed,
@@ -325,10 +338,10 @@ class SideGaps:
         y = states.start[:, 1] + (states.y * upto).sum(axis=1)
         angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
         parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
-        edge = measure_distance(self.mesh, self.item, np.stack([x, y], axis=-1), states.z)
-        slope = edge.normal[:, 0] * np.cos(angle) + edge.normal[:, 1] * np.sin(angle)
+        value, normal = self.distance(np.stack([x, y], axis=-1), states.z, states.stage)
+        slope = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
         slope = slope - self._taper(parameter, states.element)
-        return _Beside(edge.value - self.half_thickness(parameter, states.element), slope, parameter)
+        return _Beside(value - self.half_thickness(parameter, states.element), slope, parameter)
 
 
 class _ElementStates(NamedTuple):
@@ -336,6 +349,7 @@ class _ElementStates(NamedTuple):
 
     element: int
     z: FloatArray  # (n, size)
+    stage: LoadStage
     start: FloatArray  # (n, 2)
     x: FloatArray  # (n, q)
     y: FloatArray
@@ -360,11 +374,6 @@ class _Beside(NamedTuple):
     gap: FloatArray
     slope: FloatArray
     parameter: FloatArray
-
-
-def least_side_gaps(mesh: Discretisation, item: BeamSide, z: FloatArray, drive: FloatArray) -> FloatArray:
-    """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
-    return SideGaps(mesh, item, ()).least(z, LoadStage(drive))
 
 
 def carry(

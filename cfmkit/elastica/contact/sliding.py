@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.edges import find_motion, measure_distance
+from cfmkit.elastica.contact.edges import find_mate, find_motion, measure_distance
 from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics import energy
@@ -32,6 +32,7 @@ from cfmkit.elastica.mechanics.moving_elements import (
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.contact import BeamOnBeam
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
@@ -77,6 +78,7 @@ class SideAt(NamedTuple):
     curvature: float  # of the gap along the beam
     rises: float  # normal . across, 1 or -1 where it is tangent
     bulge: float  # curvature of the obstacle there
+    along: FloatArray  # (2,) along the beam
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +232,7 @@ class SlidingEquations(NumpyEquations):
         return SideAt(
             float(edge.value) - radius, float(normal @ along) - taper, normal @ apart, turning, hessian,
             (-taper * slope[2], rises * slope[1]), np.append([x, y, turn], motion.unknowns), curvature, rises,
-            float(edge.curvature),
+            float(edge.curvature), along,
         )  # fmt: skip
 
     def _beam_at(self, contact: ContactAt, parameter: float) -> tuple[tuple[float, float, float], float, float, float]:
@@ -282,6 +284,7 @@ class SlidingEquations(NumpyEquations):
             self._lay_rows(part, z, residual, tangent)
         rows: list[tuple[Any, FloatArray, float]] = []  # of the symmetric matrix: unknowns, row, pivot
         self._add_nodes(z, moved, residual, change, tangent, rows)
+        pressing: dict[int, tuple[SideAt, int]] = {}  # sides that touch by their forces, with their last rows
         for number, contact in enumerate(sides):
             force, place, flag = slots[contact.unknown], slots[contact.slide], slots[contact.flag]
             tangent[flag, flag] = 1.0
@@ -293,24 +296,46 @@ class SlidingEquations(NumpyEquations):
             side, value = self.side_at(contact, z), float(z[contact.unknown])
             inside, rate = slots[side.unknowns] >= 0, moved[side.unknowns]
             indices, press_row, turn_row = slots[side.unknowns][inside], side.gap_row[inside], side.tangency_row[inside]
-            residual[indices] -= value * press_row
-            change[indices] -= value * (side.hessian @ rate)[inside]
-            tangent[np.ix_(indices, indices)] -= value * side.hessian[np.ix_(inside, inside)]
-            tangent[indices, force] -= press_row
-            residual[force], residual[place] = -side.gap, side.tangency
-            change[force], change[place] = -side.gap_row @ rate, side.tangency_row @ rate
-            tangent[force, indices] -= press_row
+            leading = self._find_leading(contact)
+            if leading is contact:
+                residual[indices] -= value * press_row
+                change[indices] -= value * (side.hessian @ rate)[inside]
+                tangent[np.ix_(indices, indices)] -= value * side.hessian[np.ix_(inside, inside)]
+                tangent[indices, force] -= press_row
+                residual[force], change[force] = -side.gap, -side.gap_row @ rate
+                tangent[force, indices] -= press_row
+                tangent[force, place] = -side.by_place[0]
+                rows.append((indices, -press_row, 0.0))
+            else:
+                residual[force] = z[leading.unknown] - value
+                tangent[force, force], tangent[force, slots[leading.unknown]] = -1.0, 1.0
+            residual[place], change[place] = side.tangency, side.tangency_row @ rate
             tangent[place, indices] += turn_row
-            tangent[force, place], tangent[place, place] = -side.by_place[0], side.by_place[1]
+            tangent[place, place] = side.by_place[1]
             tangent[:count, place] += self._differentiate_by_place(bare, way, z, number, laid)
-            rows.append((indices, -press_row, 0.0))
+            pressing[contact.unknown] = side, len(rows)
             bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
             rows.append((indices, turn_row, stiffness))
         self.move_to(places)
         at = LinearisedSides(residual, tangent, change)
         at.frozen, at.n_laid = self._frozen(tangent, rows, laid, z), len(laid)
+        self._couple_places(at.frozen[count:, count:], pressing, z)
         return at
+
+    def _couple_places(self, pivots: FloatArray, pressing: dict[int, tuple[SideAt, int]], z: FloatArray) -> None:
+        """Put the mixed curvature of the gap of two beams, by both places, among the pivots of conditions."""
+        for contact in self._sides:
+            leading = self._find_leading(contact)
+            if leading is not contact and contact.unknown in pressing:
+                (side, row), (partner, row_of_leading) = pressing[contact.unknown], pressing[leading.unknown]
+                mixed = float(partner.tangency_row[3:5] @ side.along) / max(float(z[leading.unknown]), SMALLEST_FORCE)
+                pivots[[row, row_of_leading], [row_of_leading, row]] = -mixed
+
+    def _find_leading(self, contact: ContactAt) -> ContactAt:
+        """Return the contact that has gap and force: of a pair of beams one of both, else the contact itself."""
+        item = contact.item
+        return find_mate(self.mesh, item) if isinstance(item, BeamOnBeam) and not item.leads else contact
 
     def _lay_rows(self, part: LaidPart, z: FloatArray, residual: FloatArray, tangent: FloatArray) -> None:
         """Put the equations of an element that lies on an obstacle in the place of those of a free one."""
@@ -329,7 +354,7 @@ class SlidingEquations(NumpyEquations):
 
     def is_pressing(self, contact: ContactAt, z: FloatArray) -> bool:
         """Return True if the side of a beam counts as touching: as it was set, or where it has a force."""
-        return contact.closed if contact.closed is not None else bool(z[contact.unknown] > 0)
+        return contact.closed if contact.closed is not None else bool(z[self._find_leading(contact).unknown] > 0)
 
     def _add_nodes(
         self, z: FloatArray, moved: FloatArray, residual: FloatArray, change: FloatArray, tangent: FloatArray,
@@ -470,6 +495,9 @@ class SlidingEquations(NumpyEquations):
             if contact.slide < 0:
                 term = press(self.mesh, contact, z)
                 total[term.unknowns] += term.gradient
+                continue
+            if (leading := self._find_leading(contact)) is not contact:
+                total[contact.unknown] += z[leading.unknown] - z[contact.unknown]
                 continue
             side = self.side_at(contact, z)
             total[side.unknowns] -= z[contact.unknown] * side.gap_row

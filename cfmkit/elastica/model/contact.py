@@ -334,7 +334,27 @@ class NodeOnBeam:
         return False
 
 
-BeamSide = BeamOnObstacle | NodeOnBeam
+@dataclass(frozen=True)
+class BeamOnBeam:
+    """One of two beams whose sides touch at a place of each that is an unknown.
+
+    A pair has one for each of its beams: of one name, one after the other; the first `leads` and has gap and force.
+    """
+
+    name: str
+    beam: str
+    partner: str
+    leads: bool = True
+    stiffness: float = field(default=math.inf, init=False)
+    friction: float = field(default=0.0, init=False)
+
+    @property
+    def turns(self) -> bool:
+        """False: the force is no moment."""
+        return False
+
+
+BeamSide = BeamOnObstacle | NodeOnBeam | BeamOnBeam
 """A contact of the side of a beam, whose place along the beam is an unknown."""
 Contact = Stop | NodeOnObstacle | BeamSide
 
@@ -345,5 +365,7 @@ def describe(item: Contact) -> str:
         return f"stop {item.name!r}"
     if isinstance(item, NodeOnBeam):
         return f"{item.node!r} on beam {item.beam!r}"
+    if isinstance(item, BeamOnBeam):
+        return " and ".join(f"{beam!r}" for beam in (item.beam, item.partner)[:: 1 if item.leads else -1])
     side = f"{item.node!r}" if isinstance(item, NodeOnObstacle) else f"beam {item.beam!r}"
     return f"{side} on {item.name!r}"

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ class Network(ShortRepr):
         for contact in self.contacts:
             if isinstance(contact, BeamSide) and contact.beam not in beams:
                 raise InputError(f"contact {contact.name!r} is of the beam {contact.beam!r}, which is not there")
-            if not isinstance(contact, BeamOnObstacle):
+            if not isinstance(contact, BeamOnObstacle | BeamOnBeam):
                 self._require_node(contact.node, f"contact {contact.name!r}")
         if self.links:
             self._check_links()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
-from cfmkit.elastica.contact.side_gaps import least_side_gaps
+from cfmkit.elastica.contact.pair_gaps import least_side_gaps
 from cfmkit.elastica.contact.terms import gaps, press
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials

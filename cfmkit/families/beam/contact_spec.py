@@ -1,4 +1,4 @@
-"""Specification of contact: stops of nodes, rigid obstacles that pads and beams may touch, pads that touch beams."""
+"""Specification of contact: stops of nodes, obstacles that pads and beams may touch, contacts between parts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from cfmkit.elastica.model.contact import (
+    BeamOnBeam,
     BeamOnObstacle,
     Contact,
     NodeOnBeam,
@@ -220,14 +221,14 @@ ObstacleSpec = Annotated[
 
 
 class PartContact(Model):
-    """A contact between two parts of the mechanism: the round pad of a node, and the side of a beam."""
+    """A contact between two parts of the mechanism: two beams, or the round pad of a node and a beam."""
 
-    between: tuple[str, str] = Field(description="a node, whose round pad touches, and the beam that it may touch")
+    between: tuple[str, str] = Field(description="two beams, or a node, whose round pad touches, and a beam")
     radius: Annotated[Length, Field(ge=0)] | None = Field(
-        None, description="of the pad; default: half the thickness of the beam that ends freely at the node"
+        None, description="of the pad of a node; default: half the thickness of the beam that ends freely there"
     )
 
-    def find_parts(self, mechanism: Mechanism) -> tuple[str, str] | None:
+    def find_pad(self, mechanism: Mechanism) -> tuple[str, str] | None:
         """Return the node and the beam, in whichever order they are stated; None if it is not one of each."""
         pairs = (self.between, self.between[::-1])
         return next(((a, b) for a, b in pairs if a in mechanism.nodes and b in mechanism.beams), None)
@@ -238,24 +239,57 @@ class PartContact(Model):
             if name not in mechanism.nodes and name not in mechanism.beams:
                 names = f"nodes are {list_names(mechanism.nodes)}; beams are {list_names(mechanism.beams)}"
                 return "between", f"there is no node or beam {name!r}; {names}"
-        parts = self.find_parts(mechanism)
-        if parts is None:
-            kind = "beams" if self.between[0] in mechanism.beams else "nodes"
-            return "between", f"these are two {kind}: give a node and a beam, such as [tip, lower]"
-        node, beam = parts
-        if node in (mechanism.beams[beam].start, mechanism.beams[beam].end):
+        pad = self.find_pad(mechanism)
+        if pad is None:
+            return self._find_fault_of_beams(mechanism)
+        node, beam = pad
+        if node in end_nodes(mechanism, beam):
             return "between", f"node {node!r} is an end of beam {beam!r}: its pad always touches that beam"
         if self.radius is None and node not in free_ends(mechanism):
             return "radius", f"no beam ends freely at node {node!r}: state the radius of its round pad"
         return None
 
-    def contact(self, mechanism: Mechanism) -> NodeOnBeam:
-        """Return the contact, named by its node and its beam."""
-        parts = self.find_parts(mechanism)
-        assert parts is not None
-        node, beam = parts
-        radius = free_ends(mechanism)[node] if self.radius is None else self.radius
-        return NodeOnBeam(f"{node}_{beam}", node, beam, radius)
+    def _find_fault_of_beams(self, mechanism: Mechanism) -> tuple[str, str] | None:
+        """Return what is wrong with two parts that are not a node and a beam."""
+        first, second = self.between
+        if first not in mechanism.beams or second not in mechanism.beams:
+            return "between", "these are two nodes: one must be a beam, such as [tip, lower]"
+        if first == second:
+            return "between", f"contact of beam {first!r} with itself is not modelled"
+        common = set(end_nodes(mechanism, first)) & set(end_nodes(mechanism, second))
+        if common:
+            return "between", f"both beams are at node {common.pop()!r}: give a node that touches, and the other beam"
+        tapered = [name for name in self.between if isinstance(mechanism.of_beams("thickness")[name], tuple)]
+        if tapered:
+            return "between", f"the thickness of beam {tapered[0]!r} varies: give a node that touches, and a beam"
+        for name in self.between:
+            if mechanism.beams[name].start_offset or mechanism.beams[name].end_offset:
+                return "between", f"beam {name!r} ends beside a node: give a node that touches, and a beam"
+        if self.radius is not None:
+            return "radius", "two beams touch with half their thickness: leave it out"
+        return None
+
+    def contacts(self, mechanism: Mechanism) -> tuple[BeamOnBeam | NodeOnBeam, ...]:
+        """Return the contacts, all of one name: of two beams also those of their ends that are not held in place."""
+        pad = self.find_pad(mechanism)
+        if pad is not None:
+            node, beam = pad
+            radius = free_ends(mechanism)[node] if self.radius is None else self.radius
+            return (NodeOnBeam(f"{node}_{beam}", node, beam, radius),)
+        first, second = self.between
+        name, thickness = f"{first}_{second}", mechanism.of_beams("thickness")
+        ends = [
+            NodeOnBeam(name, node, partner, 0.5 * thickness[beam])
+            for beam, partner in ((first, second), (second, first))
+            for node in end_nodes(mechanism, beam)
+            if mechanism.nodes[node].support not in HELD_SUPPORTS
+        ]
+        return (BeamOnBeam(name, first, second), BeamOnBeam(name, second, first, leads=False), *ends)
+
+
+def end_nodes(mechanism: Mechanism, beam: str) -> tuple[str, str]:
+    """Return the nodes at both ends of a beam."""
+    return mechanism.beams[beam].start, mechanism.beams[beam].end
 
 
 def list_names(names: Iterable[str]) -> str:
@@ -273,7 +307,8 @@ def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
             stiffness = obstacle.stiffness or math.inf
             found.append(NodeOnObstacle(name, node, outline, radius, stiffness, obstacle.friction))
         found.extend(BeamOnObstacle(name, beam, outline) for beam in sides_of(mechanism, obstacle))
-    return tuple(found + [pair.contact(mechanism) for pair in mechanism.contacts])
+    found.extend(contact for pair in mechanism.contacts for contact in pair.contacts(mechanism))
+    return tuple(found)
 
 
 def rubs(mechanism: Mechanism) -> bool:
@@ -370,7 +405,7 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
         if name in mechanism.stops:
             yield ("obstacles", name), "a stop has the same name: rename one of them"
     for number, pair in enumerate(mechanism.contacts):
-        name = pair.contact(mechanism).name
+        name = pair.contacts(mechanism)[0].name
         if name in mechanism.stops or name in mechanism.obstacles:
             yield ("contacts", number), f"a stop or an obstacle has its name, {name!r}: rename that"
     key = next(key for key in ("stops", "obstacles", "contacts") if getattr(mechanism, key))
@@ -424,4 +459,4 @@ def column_names(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], 
         for toucher in (*pads_of(mechanism, obstacle), *sides_of(mechanism, obstacle)):
             yield ("obstacles", name, obstacle.kind), f"{name}_{toucher}_force"
     for number, pair in enumerate(mechanism.contacts):
-        yield ("contacts", number), f"{pair.contact(mechanism).name}_force"
+        yield ("contacts", number), f"{pair.contacts(mechanism)[0].name}_force"

@@ -5,15 +5,16 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import LazyMapping
 from cfmkit.curves import Column
-from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
+from cfmkit.elastica.contact.pair_gaps import make_gaps
+from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide, NodeOnBeam, NodeOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.errors import InputError
 from cfmkit.families.beam.constant_force_range_and_extremes import window_of
@@ -47,7 +48,7 @@ MOST_NAMED = 6
 
 
 def refuse_overlap_at_rest(assembly: Assembly) -> None:
-    """Refuse beams that lie in an obstacle, or in the pad of a node, before any load.
+    """Refuse beams that lie in an obstacle, in the pad of a node or in another beam before any load.
 
     Raises
     ------
@@ -61,11 +62,14 @@ def refuse_overlap_at_rest(assembly: Assembly) -> None:
     mesh = discretise(network, assembly.drive())
     rest = np.zeros((1, mesh.size))
     for contact in sides:
-        least = SideGaps(mesh, contact, ()).find_least(rest[0], LoadStage(np.zeros(1)))
+        least = make_gaps(mesh, contact).find_least(rest[0], LoadStage(np.zeros(1)))
         depth = -least.gap * mesh.scales.length
         if depth > MAX_OVERLAP_SHARE * mesh.scales.length:
             place = float(np.ravel(mesh.fits[contact.beam].arc(least.parameter))[0])
             by, where = format_short(depth, "length"), f"at {place:.0%} of its length before any load"
+            if isinstance(contact, BeamOnBeam):
+                names = f"beams {contact.beam!r} and {contact.partner!r} overlap"
+                raise InputError(f"mechanism.contacts: {names} by {by} at {place:.0%} of {contact.beam!r} at rest")
             if isinstance(contact, NodeOnBeam):
                 names = f"the pad of node {contact.node!r} overlaps beam {contact.beam!r}"
                 raise InputError(f"mechanism.contacts: {names} by {by} {where}")
@@ -74,20 +78,26 @@ def refuse_overlap_at_rest(assembly: Assembly) -> None:
 
 # -- forces ------------------------------------------------------------------------------------------------------------
 def groups(contacts: tuple[Contact, ...]) -> dict[tuple[str, str], list[int]]:
-    """Return the numbers of the contacts by name and node or beam: of a stop, or of what touches an obstacle."""
+    """Return the numbers of the contacts by name and node or beam: of a stop, or of what touches an obstacle.
+
+    Those between the same parts of the mechanism have one name.
+    """
     found: dict[tuple[str, str], list[int]] = {}
     for number, contact in enumerate(contacts):
-        found.setdefault((contact.name, toucher(contact)), []).append(number)
+        key = contact.name, "" if isinstance(contact, NodeOnBeam | BeamOnBeam) else toucher(contact)
+        found.setdefault(key, []).append(number)
     return found
 
 
 def toucher(contact: Contact) -> str:
     """Return the node or the beam that touches."""
-    return contact.beam if isinstance(contact, BeamOnObstacle) else contact.node
+    return contact.beam if isinstance(contact, BeamOnObstacle | BeamOnBeam) else contact.node
 
 
 def counterpart(contact: Contact) -> str:
     """Return the stop, the obstacle or the beam that is touched."""
+    if isinstance(contact, BeamOnBeam):
+        return contact.partner
     return contact.beam if isinstance(contact, NodeOnBeam) else contact.name
 
 
@@ -99,7 +109,9 @@ def signed_force(path: Path, numbers: list[int]) -> FloatArray:
 
 
 def sense_of(contact: Contact) -> float:
-    """Return the sign with which the force of a contact counts: of a stop that of its direction."""
+    """Return the sign with which the force of a contact counts: of a stop that of its direction, of two beams once."""
+    if isinstance(contact, BeamOnBeam):
+        return float(contact.leads)
     return contact.sense if isinstance(contact, Stop) else 1.0
 
 
@@ -136,7 +148,25 @@ def _column_names(solution: Solution) -> list[str]:
 def _place_columns(contact: Contact, column: str) -> list[str]:
     """Return the columns of where the side of a beam touches, by the column of the force."""
     ends = {BeamOnObstacle: ("from", "to"), NodeOnBeam: ("at",)}.get(type(contact), ())
+    if isinstance(contact, BeamOnBeam):
+        ends = f"at_{contact.beam}", f"at_{contact.partner}"
     return [f"{column.removesuffix('force')}{end}" for end in ends]
+
+
+def _place_values(path: Path, numbers: list[int]) -> FloatArray:
+    """Return the values of these columns at every point of a path, (n, columns)."""
+    contact = path.network.contacts[numbers[0]]
+    if not isinstance(contact, BeamOnBeam):
+        return path.contact_places(numbers[0])
+    beams = contact.beam, contact.partner
+    places = np.full((len(path), 2), np.nan)
+    for number in numbers:
+        item: Any = path.network.contacts[number]
+        touches, column = path.contact_force(number) > 0, beams.index(item.beam)
+        places[touches, column] = path.contact_places(number)[touches, 0]
+        if isinstance(item, NodeOnBeam):
+            places[touches, 1 - column] = float(path.network.beams[beams[1 - column]].end == item.node)
+    return places
 
 
 def _columns(solution: Solution) -> dict[str, Column]:
@@ -155,8 +185,9 @@ def _columns(solution: Solution) -> dict[str, Column]:
             said = [np.asarray(states)[keep] for _, states in rubbing]
             columns[state] = Column(np.array(["".join(each) for each in zip(*said, strict=True)], np.str_), "text")
         place_columns = _place_columns(contact, column)
-        for number, name in enumerate(place_columns):
-            columns[name] = Column(path.contact_places(numbers[0])[keep, number], "ratio")
+        if place_columns:
+            places = _place_values(path, numbers)[keep]
+            columns |= {name: Column(places[:, k], "ratio") for k, name in enumerate(place_columns)}
     marks = np.full(len(path), "", dtype=object)
     for event in path.contact_events:
         point = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
@@ -166,8 +197,8 @@ def _columns(solution: Solution) -> dict[str, Column]:
 
 def _mark(path: Path, event: ContactEvent) -> str:
     contact = path.network.contacts[event.number]
-    if isinstance(contact, NodeOnBeam):
-        return f"{contact.node} {contact.beam} {event.kind}"
+    if isinstance(contact, NodeOnBeam | BeamOnBeam):
+        return f"{toucher(contact)} {counterpart(contact)} {event.kind}"
     name = contact.name if isinstance(contact, Stop) else f"{contact.name} {toucher(contact)}"
     return f"{name} {event.kind}"
 
@@ -284,12 +315,12 @@ def change_sentences(
                 f"where {who} changes at {say(event.drive)}, friction leaves {event.states} states that can go on: "
                 f"{_state_taken(path, event)}",
             )
-        if event.kind == "spreads" and isinstance(path.network.contacts[event.number], NodeOnBeam):
+        if event.kind == "spreads" and isinstance(path.network.contacts[event.number], NodeOnBeam | BeamOnBeam):
             who = describe(path.network.contacts[event.number])
             yield (
                 "contact_spreads_between_beams",
-                f"contact of {who} spreads at {say(event.drive)}: the beam would wrap around the pad, which is not "
-                "modelled, and the curve ends there",
+                f"contact of {who} spreads along a length at {say(event.drive)}: that is not modelled between parts, "
+                "and the curve ends there",
             )
         if event.kind == "blocks":
             who = describe(path.network.contacts[event.number])
@@ -312,7 +343,7 @@ def describe(contact: Contact) -> str:
 
 def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
     contact, path = solution.path.network.contacts[event.number], solution.path
-    if event.kind == "blocks" or (event.kind == "spreads" and isinstance(contact, NodeOnBeam)):
+    if event.kind == "blocks" or (event.kind == "spreads" and isinstance(contact, NodeOnBeam | BeamOnBeam)):
         return ""
     if not isinstance(contact, Stop):
         what, partner = toucher(contact), counterpart(contact)
@@ -339,16 +370,22 @@ def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
 
 def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
     path = solution.path
-    touched = {event.number for event in path.contact_events}
+    changed = {event.number for event in path.contact_events}
+    parts = {contact.name for contact in path.network.contacts if isinstance(contact, BeamOnBeam)}
     thin = solution.spec.mechanism.thinnest
     for number, contact in enumerate(path.network.contacts):
-        if number in touched or contact.turns or path.contact_force(number).any():
+        numbers = numbers_of(path.network.contacts, contact.name) if contact.name in parts else [number]
+        if number != numbers[0] or contact.turns:  # of two beams the first has the least gap of all
+            continue
+        if any(k in changed or path.contact_force(k).any() for k in numbers):
             continue
         gap = path.contact_gap(number)
         moved = 0.0
         if isinstance(contact, BeamSide):
             moved = float(np.hypot(*np.moveaxis(path.line_motion(contact.beam), -1, 0)).max())
-        if not isinstance(contact, BeamOnObstacle):
+        if isinstance(contact, BeamOnBeam):
+            moved += float(np.hypot(*np.moveaxis(path.line_motion(contact.partner), -1, 0)).max())
+        elif not isinstance(contact, BeamOnObstacle):
             moved += float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
         least = float(gap.min())
         if ROUNDING_OF_GAP * path.mesh.scales.length < least < NEAR_GAP * thin:

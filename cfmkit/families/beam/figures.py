@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide, NodeOnBeam, Stop
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, BeamSide, NodeOnBeam, Stop
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
@@ -229,14 +229,14 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
     """Draw obstacles, bars of stops at the ends of their gaps, and node and rim of each pad that touches in a pose."""
     path, size = solution.path, max(box[2] - box[0], box[3] - box[1])
     outlines = {contact.name: contact.outline for contact in path.network.contacts
-                if not isinstance(contact, Stop | NodeOnBeam)}  # fmt: skip
+                if not isinstance(contact, Stop | NodeOnBeam | BeamOnBeam)}  # fmt: skip
     for name, outline in outlines.items():
         for number, line in enumerate(_both(solution, outline.lines(2 * size))):
             parts.edge(ax, line, f"obstacle-{name}-{number}", color=TEXT_INK, linewidth=1.8, zorder=1.6)
     for number, contact in enumerate(path.network.contacts):
         if isinstance(contact, BeamSide):
             _touching_side(solution, ax, number, poses)
-        if isinstance(contact, BeamOnObstacle):
+        if isinstance(contact, BeamOnObstacle | BeamOnBeam):
             continue
         node = path.network.nodes[contact.node]
         if isinstance(contact, Stop) and contact.direction is not None:

@@ -57,7 +57,8 @@ def ending_of(solution: Solution) -> PathEnding:
     """Return why a path ended; a path that is complete has nothing to say."""
     path = solution.path
     said = in_units(solution.assembly, path.message or path.status.value)
-    rigid = solution.spec.fidelity == "inextensible"
+    spreads = bool(path.contact_events) and path.contact_events[-1].kind == "spreads" and bool(path.changes_contact[-1])
+    rigid = solution.spec.fidelity == "inextensible" and not spreads  # then the contact is why
     taut: list[str] = []
     kept = len(solution.keep) > 1
     if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) and len(path):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
-from cfmkit.elastica.model.contact import NodeOnBeam
+from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam
 from cfmkit.elastica.results.between_loads import interpolate_loads
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.elastica.results.folding_path_between_points import interpolate_folding_path
@@ -249,11 +249,8 @@ class Solution(ShortRepr):
 
 
 def pairs_in_contact(network: Network) -> set[frozenset[str]]:
-    """Return the pairs of beams whose contact is solved for: one ends at the node of a pad that may touch the other."""
-    return {
-        frozenset((name, contact.beam))
-        for contact in network.contacts
-        if isinstance(contact, NodeOnBeam)
-        for name, beam in network.beams.items()
-        if contact.node in (beam.start, beam.end)
-    }
+    """Return the pairs of beams whose contact is solved for, with their sides or the pad of a node at an end."""
+    pads = [contact for contact in network.contacts if isinstance(contact, NodeOnBeam)]
+    ends = {(name, node) for name, beam in network.beams.items() for node in (beam.start, beam.end)}
+    at_pads = {frozenset((name, pad.beam)) for pad in pads for name, node in ends if node == pad.node}
+    return at_pads | {frozenset((item.beam, item.partner)) for item in network.contacts if isinstance(item, BeamOnBeam)}

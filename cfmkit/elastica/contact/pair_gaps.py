@@ -1,0 +1,97 @@
+"""Gaps between the sides of two beams: how near each place of one is to the other, whose nearest place is found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.contact.edges import half_thickness_of
+from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps, interpolate_line, side_states
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.moving_elements import with_places
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.model.contact import BeamOnBeam
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.contact import BeamSide
+
+N_FOOT_STEPS = 8  # of Newton's method without the curvature: its error falls by distance times curvature in each
+
+
+class Feet(NamedTuple):
+    """Nearest places of a beam, (n, p) each."""
+
+    place: Any  # (n, p, 2)
+    parameter: Any
+    is_inside: Any  # False at an end of the beam
+
+
+@dataclass(frozen=True, eq=False)
+class PairGaps(SideGaps):
+    """Gaps of the side of one beam to another beam, which has round ends."""
+
+    @cached_property
+    def partner_elements(self) -> Any:
+        """Elements of the other beam, (m,)."""
+        partner = self.item.partner  # type: ignore[union-attr]
+        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner])
+
+    def distance(self, places: Any, z: FloatArray, stage: LoadStage) -> tuple[Any, Any]:
+        """Return the distances of places (n, ..., 2) from the other beam in n states, and their gradients."""
+        feet = self.find_feet(places.reshape(len(z), -1, 2), z, stage)
+        away = places - feet.place.reshape(places.shape)
+        reach = np.hypot(away[..., 0], away[..., 1])
+        return reach - half_thickness_of(self.mesh, self.item.partner), away / reach[..., None]  # type: ignore[union-attr]
+
+    def find_feet(self, places: FloatArray, z: FloatArray, stage: LoadStage) -> Feet:
+        """Return the places of the other beam that are nearest to places (n, p, 2) in n states."""
+        mesh, elements, states = self.mesh, self.partner_elements, np.arange(len(z))[:, None]
+        moved = with_places(mesh, z)
+        e, fields = moved.elements, energy.fields(moved, z, *stage)
+        speed = np.broadcast_to(e.weight, (len(z), *e.weight.shape[-2:]))[:, elements] / basis(mesh.degree).weights
+        slopes = np.stack([fields.slope_x[:, elements] * speed, fields.slope_y[:, elements] * speed], axis=-1)
+        start = poses(mesh.attachments, z, e.ends[elements, 0]).place
+        sampled = side_states(mesh, z, stage, elements, self.fractions).place.reshape(len(z), -1, 2)
+        pairs = zip(places, sampled, strict=True)  # one state after the other: together they may be too many
+        nearest = np.array([((at[:, None] - line) ** 2).sum(axis=-1).argmin(axis=-1) for at, line in pairs])
+        row, fraction = nearest // len(self.fractions), self.fractions[nearest % len(self.fractions)]
+        last = len(elements) - 1
+        for _ in range(N_FOOT_STEPS):
+            place, tangent = interpolate_line(mesh.degree, fraction, start[states, row], slopes[states, row])
+            fraction = fraction + ((places - place) * tangent).sum(axis=-1) / (tangent * tangent).sum(axis=-1)
+            before, behind = (fraction < 0) & (row > 0), (fraction > 1) & (row < last)
+            row = row - before + behind
+            fraction = np.clip(np.where(before, 1.0, np.where(behind, 0.0, fraction)), 0.0, 1.0)
+        place, _ = interpolate_line(mesh.degree, fraction, start[states, row], slopes[states, row])
+        is_end = ((row == 0) & (fraction == 0)) | ((row == last) & (fraction == 1))
+        cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
+        cuts = np.broadcast_to(cuts, (len(z), *cuts.shape[-2:]))[:, elements][states, row]
+        return Feet(place, cuts[..., 0] + (cuts[..., 1] - cuts[..., 0]) * fraction, ~is_end)
+
+    def find_partner_place(self, z: FloatArray, stage: LoadStage, parameter: float) -> float | None:
+        """Return the parameter of the place of the other beam that is nearest in a state; None if it is an end."""
+        e = with_places(self.mesh, z[None]).elements
+        cuts = np.reshape(e.cuts if e.moved_cuts is None else e.moved_cuts[0], (-1, 2))[self.elements]
+        row = int(np.clip(np.searchsorted(cuts[:, 1], parameter), 0, len(cuts) - 1))
+        fraction = np.array([(parameter - cuts[row, 0]) / (cuts[row, 1] - cuts[row, 0])])
+        place = side_states(self.mesh, z[None], stage, self.elements[row : row + 1], fraction).place
+        feet = self.find_feet(place.reshape(1, 1, 2), z[None], stage)
+        return float(feet.parameter[0, 0]) if feet.is_inside[0, 0] else None
+
+
+def make_gaps(
+    mesh: Discretisation, item: BeamSide, touched: tuple[int, ...] = (), laid: tuple[int, ...] = ()
+) -> SideGaps:
+    """Return the gaps of a side: to an obstacle, to a pad, or to another beam."""
+    return (PairGaps if isinstance(item, BeamOnBeam) else SideGaps)(mesh, item, touched, laid)
+
+
+def least_side_gaps(mesh: Discretisation, item: BeamSide, z: FloatArray, drive: FloatArray) -> FloatArray:
+    """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
+    return make_gaps(mesh, item).least(z, LoadStage(drive))
