@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.contact import BeamSide
 
-N_FOOT_STEPS = 8  # of Newton's method without the curvature: its error falls by distance times curvature in each
+NEAR_DISTANCE = 0.1  # mean beam lengths within which the nearest place of a beam is found exactly
+N_FOOT_STEPS = 10  # of Newton's method without the curvature: its error falls by distance times curvature in each
+FOOT_RESOLUTION = 1e-12  # of an element: its square is the error of the distance
 
 
 class Feet(NamedTuple):
@@ -50,29 +52,47 @@ class PairGaps(SideGaps):
         return reach - half_thickness_of(self.mesh, self.item.partner), away / reach[..., None]  # type: ignore[union-attr]
 
     def find_feet(self, places: FloatArray, z: FloatArray, stage: LoadStage) -> Feet:
-        """Return the places of the other beam that are nearest to places (n, p, 2) in n states."""
-        mesh, elements, states = self.mesh, self.partner_elements, np.arange(len(z))[:, None]
+        """Return the places of the other beam that are nearest to places (n, p, 2) in n states.
+
+        Of places that are farther than `NEAR_DISTANCE` it is the nearest of those at which the beam is sampled.
+        """
+        mesh, elements = self.mesh, self.partner_elements
         moved = with_places(mesh, z)
-        e, fields = moved.elements, energy.fields(moved, z, *stage)
-        speed = np.broadcast_to(e.weight, (len(z), *e.weight.shape[-2:]))[:, elements] / basis(mesh.degree).weights
-        slopes = np.stack([fields.slope_x[:, elements] * speed, fields.slope_y[:, elements] * speed], axis=-1)
-        start = poses(mesh.attachments, z, e.ends[elements, 0]).place
-        sampled = side_states(mesh, z, stage, elements, self.fractions).place.reshape(len(z), -1, 2)
+        e, count = moved.elements, len(z)
+        sampled = side_states(mesh, z, stage, elements, self.fractions).place.reshape(count, -1, 2)
         pairs = zip(places, sampled, strict=True)  # one state after the other: together they may be too many
         nearest = np.array([((at[:, None] - line) ** 2).sum(axis=-1).argmin(axis=-1) for at, line in pairs])
         row, fraction = nearest // len(self.fractions), self.fractions[nearest % len(self.fractions)]
+        place = np.take_along_axis(sampled, nearest[..., None], axis=1)
+        near = np.nonzero(np.hypot(*np.moveaxis(places - place, -1, 0)) < NEAR_DISTANCE)
+        fields = energy.fields(moved, z, *stage)
+        speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, elements] / basis(mesh.degree).weights
+        slopes = np.stack([fields.slope_x[:, elements] * speed, fields.slope_y[:, elements] * speed], axis=-1)
+        lines = poses(mesh.attachments, z, e.ends[elements, 0]).place, slopes
+        row[near], fraction[near], place[near] = self._approach(places[near], near[0], row[near], fraction[near], lines)
         last = len(elements) - 1
-        for _ in range(N_FOOT_STEPS):
-            place, tangent = interpolate_line(mesh.degree, fraction, start[states, row], slopes[states, row])
-            fraction = fraction + ((places - place) * tangent).sum(axis=-1) / (tangent * tangent).sum(axis=-1)
-            before, behind = (fraction < 0) & (row > 0), (fraction > 1) & (row < last)
-            row = row - before + behind
-            fraction = np.clip(np.where(before, 1.0, np.where(behind, 0.0, fraction)), 0.0, 1.0)
-        place, _ = interpolate_line(mesh.degree, fraction, start[states, row], slopes[states, row])
         is_end = ((row == 0) & (fraction == 0)) | ((row == last) & (fraction == 1))
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
-        cuts = np.broadcast_to(cuts, (len(z), *cuts.shape[-2:]))[:, elements][states, row]
+        cuts = np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, elements][np.arange(count)[:, None], row]
         return Feet(place, cuts[..., 0] + (cuts[..., 1] - cuts[..., 0]) * fraction, ~is_end)
+
+    def _approach(
+        self, places: FloatArray, states: Any, row: Any, fraction: FloatArray, lines: tuple[Any, Any]
+    ) -> tuple[Any, FloatArray, FloatArray]:
+        """Return rows of elements, fractions and places of the feet of k places (k, 2), from nearby ones (k,)."""
+        last = len(self.partner_elements) - 1
+        for _ in range(N_FOOT_STEPS):
+            place, tangent = interpolate_line(self.mesh.degree, fraction, *(each[states, row] for each in lines))
+            step = ((places - place) * tangent).sum(axis=-1) / (tangent * tangent).sum(axis=-1)
+            before, behind = (fraction + step < 0) & (row > 0), (fraction + step > 1) & (row < last)
+            row = row - before + behind
+            advanced = np.clip(np.where(before, 1.0, np.where(behind, 0.0, fraction + step)), 0.0, 1.0)
+            stands = np.abs(advanced - fraction).max(initial=0.0) < FOOT_RESOLUTION
+            fraction = advanced
+            if stands:
+                break
+        place, _ = interpolate_line(self.mesh.degree, fraction, *(each[states, row] for each in lines))
+        return row, fraction, place
 
     def find_partner_place(self, z: FloatArray, stage: LoadStage, parameter: float) -> float | None:
         """Return the parameter of the place of the other beam that is nearest in a state; None if it is an end."""

@@ -141,7 +141,7 @@ def _even_angles() -> FloatArray:
 def interpolate_line(degree: int, fractions: FloatArray, start: Any, slopes: Any) -> tuple[Any, Any]:
     """Return places of elements and their slopes at fractions (...), from starts (..., 2), slopes (..., q, 2)."""
     rows = _rows_at(degree, fractions.ravel())
-    shape = (*fractions.shape, -1)
+    shape = (*fractions.shape, rows.integrals.shape[-1])
     place = start + np.einsum("...q,...qd->...d", rows.integrals.reshape(shape), slopes)
     return place, np.einsum("...q,...qd->...d", rows.interpolation.reshape(shape), slopes)
 
