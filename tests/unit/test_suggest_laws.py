@@ -122,3 +122,27 @@ def test_a_thin_screw_that_bears_its_share_is_no_fault():
         for hole in ("2.9 mm", "6.6 mm")
     ]
     assert faults[0] == faults[1]
+
+
+def test_catalogue_springs_are_proposed_at_the_pins_of_a_linkage():
+    keys = {"force": "5 N", "travel": "40 mm", "ripple": "3 %", "envelope": "[120 mm, 160 mm, 25 mm]"}
+    asked, candidates = offered("slider-crank", **keys, material="steel-s235", safety="1.5")
+    made = [
+        make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in candidates if one.springs == "catalogue"
+    ]
+    good = [one for one in made if one.good]
+    assert good, [one.missed or one.message for one in made]
+    for one in good:
+        springs, sheet = one.spec.mechanism.springs, one.spec.mechanism.part.sheet
+        assert all(spring.name.startswith("generic-torsion-") for spring in springs.bought)
+        assert one.numbers["parts"] == 3 + sum(spring.count for spring in springs.bought)
+        # each spring of a joint is at least as long as its turns of wire; those of the pivot are below the links
+        long = {at: 0.0 for at in ("pivot", "crank_pin", "slider_pin")}
+        for spring in springs.bought:
+            long[spring.at] += spring.count * spring.wound.wire * spring.wound.turns
+        assert one.numbers["depth"] > 3 * sheet + long["pivot"] + max(long["crank_pin"], long["slider_pin"])
+        rates = dict.fromkeys(long, 0.0)
+        for spring in springs.bought:
+            wound = spring.wound
+            rates[spring.at] += spring.count * 206e9 * wound.wire**4 / (64.0 * wound.coil * wound.turns)
+        assert rates == pytest.approx({at: getattr(springs, at) for at in rates}, rel=1e-3)

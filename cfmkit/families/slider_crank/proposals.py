@@ -16,6 +16,7 @@ import numpy as np
 
 from cfmkit.families.findings import mm
 from cfmkit.families.flattest_window import flattest
+from cfmkit.families.slider_crank.catalogue_spring_proposals import with_catalogue_springs
 from cfmkit.families.slider_crank.printed.outline import drawing
 from cfmkit.families.slider_crank.printed.part import PAD_SIZE
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -203,7 +204,8 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
             offers += _slow_parts(request, lengths, size * printed)
         first, last = _window(request, START_SHARES[0])
         if last <= lengths.reach * size * pinned and pins:
-            offers.append(pushed_linkage(request, lengths, size * pinned, first))
+            offers.append(linkage := pushed_linkage(request, lengths, size * pinned, first))
+            offers += [with_catalogue_springs(linkage)] if isinstance(linkage, Candidate) else []
     return offers
 
 

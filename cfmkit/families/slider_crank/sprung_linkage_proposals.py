@@ -193,11 +193,11 @@ def _sprung(
     request: Request, assembly: Assembly, ends: tuple[float, float], widest: float, sheet: float | None = None
 ) -> SprungMotion:
     """Return what springs have to do where the effort may be held between two ends of the motion."""
-    deep = _depth_of_springs(request, sheets_of_links(request)[0] if sheet is None else sheet)
+    deep = depth_of_springs(request, sheets_of_links(request)[0] if sheet is None else sheet)
     return SprungMotion(assembly, *ends, request.travel, widest, deep, shared=request.depth is not None)
 
 
-def _depth_of_springs(request: Request, sheet: float) -> float:
+def depth_of_springs(request: Request, sheet: float) -> float:
     """Return how far springs may stand out from links of a sheet [m], on both sides of them together [m]."""
     return max(request.envelope[:2]) if request.depth is None else request.depth - N_SHEETS * sheet
 
@@ -386,7 +386,7 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     turns = {JOINT_NAMES[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
     pulled = JOINT_NAMES[3] not in turns or low[3] > -TRAVEL_RTOL * turns[JOINT_NAMES[3]][1]
     part, pin = spec.mechanism.part, spec.mechanism.pins.diameter if spec.mechanism.pins else 0.0
-    deep = room = _depth_of_springs(request, (part.sheet if part else None) or 0.0)
+    deep = room = depth_of_springs(request, (part.sheet if part else None) or 0.0)
     if request.depth is not None and "pivot" in turns:
         # that of the pivot is on the other side of the links: first it takes as little as it can
         least = shortest_torsion_spring(*turns["pivot"], widest, pin)

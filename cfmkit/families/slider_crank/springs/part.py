@@ -37,11 +37,17 @@ def part_over_motion(result: Result) -> PosedPart:
         (*bodies(spec, solution, solution.unit_spring_curves), *joining.bodies),
         direction=0.0,
         depth=depth,
-        pieces=3 + int(np.count_nonzero(rates)),
+        pieces=3 + _count_springs(spec.mechanism.springs, rates),
         assumed=f"links {2e3 * eye_and_hole(spec)[0]:.3g} mm wide; {_sizes(spec.mechanism.springs)}{why}",
         pin=joining.pin,
         faults=joining.faults,
     )
+
+
+def _count_springs(springs: Springs, rates: FloatArray) -> int:
+    """Return how many springs there are: one for each rate that none is listed for."""
+    listed = {name: sum(spring.count for spring in springs.bought if spring.at == name) for name in JOINT_NAMES}
+    return sum(listed[name] or 1 for name, rate in zip(JOINT_NAMES, rates, strict=True) if rate)
 
 
 def bodies(spec: SliderCrankSpec, solution: Solution, units: UnitCurves) -> Iterator[PosedBody]:
@@ -65,17 +71,17 @@ def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray) -> tuple
     """Return the depth of links and springs [m], and what of it is taken; None, and why, where a part has no size.
 
     Crank and coupler lie above each other, the crank on the ground. The pivot's spring is below, all others are above:
-    they stand beside each other.
+    they stand beside each other. Several springs of a joint lie above each other.
     """
     springs, part = spec.mechanism.springs, spec.mechanism.part
     if part is None or part.sheet is None:
         return None, "; the depth of links is not known (mechanism.part.sheet)"
     high = {}
     for name, turn in ((name, turn) for name, rate, turn in zip(JOINT_NAMES, rates, turns, strict=True) if rate):
-        coils = springs.coils_at(name)
-        if not coils:
+        wound = [(spring.coil, spring.count) for spring in springs.bought if spring.at == name and spring.coil]
+        if not wound:
             return None, f"; the spring at the {name.replace('_', ' ')} has no size"
-        high[name] = max(height_of(name, coil, float(turn)) for coil in coils)
+        high[name] = sum(count * height_of(name, coil, float(turn)) for coil, count in wound)
     below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
     return N_SHEETS * part.sheet + below + above, f"; {N_SHEETS} sheets and the springs on both sides of them"
 
