@@ -422,7 +422,7 @@ def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:
     >>> import cfmkit
     >>> pictures = cfmkit.figures("configs/cam.yaml")
     >>> sorted(pictures)[:2], len(pictures["loop"]().axes)
-    (['contact', 'curvature'], 2)
+    (['assembly', 'contact'], 2)
     """
     from cfmkit.plots.figures import figures
 

@@ -42,21 +42,6 @@ ROUND_OFF = 1e-12
 lengths that they are computed from are differences themselves."""
 
 
-def round_off(parts: FloatArray) -> float:
-    """Return the error of the sum of efforts (parts, n), the largest of all n places: `ROUND_OFF` of their sizes.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> round_off(np.array([[4.0, 2.0], [-4.0, np.inf]]))
-    8e-12
-    """
-    import numpy as np
-
-    sizes = np.abs(parts).sum(axis=0)
-    return ROUND_OFF * float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
-
-
 class Status(Enum):
     """End of a solve."""
 

@@ -1,6 +1,7 @@
-"""The pages of the documentation that come with cfmkit: listed, found by name, and searched by meaning.
+"""Documentation pages shipped with cfmkit, for `cfmkit docs`: listed, found by name, and searched by word.
 
-The words of docs/glossary.md are read from its tables: a word and its meaning; a synonym and what to look for instead.
+A search also finds the names by which cfmkit calls what a user calls otherwise. They are in the second of two tables of
+docs/glossary.md: word and meaning; synonym and the words used here.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GuidePage:
-    """One page."""
+    """One page of the documentation."""
 
     name: str  # of its file, without the ending
     title: str  # its first heading
@@ -106,12 +107,12 @@ def list_terms() -> dict[str, list[dict[str, str]]]:
     return {name: [{"name": name, "meaning": meaning}] for name, meaning in read_terms().items()}
 
 
-def look_for(word: str) -> tuple[str, ...]:
+def words_for_synonym(word: str) -> tuple[str, ...]:
     """Return the words and names that the glossary gives for a synonym; empty if it is none.
 
     Examples
     --------
-    >>> look_for("bill of materials")
+    >>> words_for_synonym("bill of materials")
     ('parts.csv', 'bought spring', 'catalogue')
     """
     wanted = compile_phrases((word,))
@@ -161,14 +162,29 @@ NAVIGATION_PAGES = ("index", "glossary")
 
 
 def search(word: str) -> list[PageSection]:
-    """Return the sections that name a word or what the glossary says to look for instead, the best first."""
+    """Return the sections that name a word or what the glossary says to look for instead, the best first.
+
+    Several words that no section has as a phrase are looked for one by one: sections that name all of them.
+    """
+    sections = _score_sections(word)
+    if not sections and len(parts := word.split()) > 1:
+        of_parts = [{section[:2]: section for section in _score_sections(part)} for part in parts]
+        shared = set(of_parts[0]).intersection(*of_parts[1:])
+        sections = [
+            section._replace(score=min(scored[key].score for scored in of_parts))
+            for key, section in of_parts[0].items()
+            if key in shared
+        ]
+    return sorted(sections, key=lambda section: -section.score)
+
+
+def _score_sections(phrase: str) -> list[PageSection]:
     wanted = [
-        (compile_phrases([word]), 1.0),
-        *((compile_phrases([target]), SYNONYM_WEIGHT) for target in look_for(word)),
+        (compile_phrases([phrase]), 1.0),
+        *((compile_phrases([target]), SYNONYM_WEIGHT) for target in words_for_synonym(phrase)),
     ]
     rated = (_score(name, heading, text, wanted) for name, heading, text in _read_sections())
-    sections = [section for section in rated if section.score > 0]
-    return sorted(sections, key=lambda section: -section.score)
+    return [section for section in rated if section.score > 0]
 
 
 @cache

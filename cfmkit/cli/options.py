@@ -1,4 +1,4 @@
-"""Options: how one is declared, and those that several verbs take.
+"""Command-line options: functions that declare one for typer, and the sets of options that several commands share.
 
 An option or argument is a field of the dataclass that a verb's `run` takes: its type, `option`, `flag` or
 `argument` with what the help says, and its default.
@@ -53,7 +53,7 @@ def option(
 
 
 def _require_at_least(low: int) -> Callable[[int | None], int | None]:
-    """Return what lets a number pass that is neither too small nor too large for a signed integer of 64 bits."""
+    """Return a check that refuses numbers outside `low` ... `MAX_INTEGER`."""
 
     def check(value: int | None) -> int | None:
         if value is None or low <= value <= MAX_INTEGER:
@@ -114,7 +114,7 @@ class Common:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Changing(Common):
+class SpecOptions(Common):
     """Options of verbs that read specifications."""
 
     set: Annotated[
@@ -191,7 +191,7 @@ Overlay = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class OneSpec(Changing):
+class OneSpec(SpecOptions):
     """Options of verbs that read one specification and write a folder."""
 
     spec: Annotated[str, argument("SPEC", "YAML file of one mechanism; - reads standard input.")]
@@ -200,7 +200,7 @@ class OneSpec(Changing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Computing(OneSpec, FigureChoice):
+class ComputeOptions(OneSpec, FigureChoice):
     """Options of verbs that compute."""
 
     fidelity: Fidelity = None
@@ -209,7 +209,7 @@ class Computing(OneSpec, FigureChoice):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Studying(Computing):
+class StudyOptions(ComputeOptions):
     """Options of verbs that evaluate many points."""
 
     jobs: Jobs = None
@@ -229,7 +229,7 @@ class Studying(Computing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measuring(Common):
+class MeasurementOptions(Common):
     """Options of verbs that read a measurement."""
 
     units: Annotated[
@@ -300,14 +300,14 @@ def data_record(name: str) -> dict[str, Any]:
     return {"data": {"source": name, "sha256": file_hash(Path(name).resolve())}}
 
 
-def read_measured(name: str, options: Measuring) -> MeasuredCurves:
+def read_measured(name: str, options: MeasurementOptions) -> MeasuredCurves:
     """Return the measurement in a file, raw."""
     from cfmkit.experiment.curves_and_metrics_of_recording import read_measured as read
 
     return read(name, options.units, options.tare, options.zero, options.flips, options.cycles, options.group)
 
 
-def refuse_without_data(options: Measuring) -> None:
+def refuse_without_data(options: MeasurementOptions) -> None:
     """Refuse options about a measurement where none is named.
 
     Raises
@@ -315,12 +315,12 @@ def refuse_without_data(options: Measuring) -> None:
     cfmkit.errors.UsageError
         Naming the first of them.
     """
-    for name, _ in measuring_words(options):
+    for name, _ in given_measurement_options(options):
         raise UsageError(f"{name} applies to a measurement: name its file with --data")
 
 
-def measuring_words(options: Measuring) -> list[tuple[str, str]]:
-    """Return the stated options about a measurement, each with its value."""
+def given_measurement_options(options: MeasurementOptions) -> list[tuple[str, str]]:
+    """Return name and value of each option about a measurement that is given."""
     names = ("units", "tare", "zero", "flip", "cycles", "group")
     return [(f"--{name}", value) for name in names if (value := getattr(options, name)) is not None]
 

@@ -13,7 +13,7 @@ from cfmkit.runs.run import RunTask, carry_out
 from cfmkit.runs.specfile import STDIN_PATH
 
 if TYPE_CHECKING:
-    from cfmkit.cli.options import Computing, OneSpec
+    from cfmkit.cli.options import ComputeOptions, OneSpec
     from cfmkit.cli.output import Terminal
     from cfmkit.runs.run import FinishedRun, Verb
 
@@ -25,7 +25,7 @@ NO_MOTION = (
 """What is said where a film was requested and there is none."""
 
 
-def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = False) -> Document:
+def execute(verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool = False) -> Document:
     """Run a verb over the spec that the options name and write the folder."""
     out = folder_of(options, verb.name)
     wanted = RunTask(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)

@@ -13,7 +13,7 @@ from cfmkit.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.cli.options import Studying
+    from cfmkit.cli.options import StudyOptions
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.progress import StudyProgress
     from cfmkit.errors import ExitCode
@@ -46,7 +46,7 @@ class Made:
     points: int
 
 
-def command_of_a_point(options: Studying, redesigns: bool) -> str:
+def command_of_a_point(options: StudyOptions, redesigns: bool) -> str:
     """Return the command that computes a point of a study, but for what the study varies."""
     spec = options.spec if options.spec != "-" else "SPEC"
     said = ["design" if redesigns else "analyze", spec, *(part for one in options.changes for part in ("--set", one))]
@@ -143,7 +143,7 @@ def desk(out: str, terminal: Terminal, fresh: bool = False) -> Iterator[Desk]:
         yield Desk(folder, journal, progress)
 
 
-def executor_for(work: Work, options: Studying) -> Executor:
+def executor_for(work: Work, options: StudyOptions) -> Executor:
     """Return what gets the points done: processes, a cluster, or this process where that is enough.
 
     Raises
@@ -172,7 +172,7 @@ def executor_for(work: Work, options: Studying) -> Executor:
     return serial if min(jobs, count) == 1 else Pool(min(jobs, count))
 
 
-def compute(work: Work, options: Studying, place: Desk) -> Records:
+def compute(work: Work, options: StudyOptions, place: Desk) -> Records:
     """Return the rows of a study, as far as the user lets it run."""
     from cfmkit.studies.engine import run
 

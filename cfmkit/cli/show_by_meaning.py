@@ -6,7 +6,7 @@ from functools import cache
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cfmkit.cli.guide import compile_phrases, look_for, read_terms, search
+from cfmkit.cli.guide import compile_phrases, read_terms, search, words_for_synonym
 from cfmkit.cli.show_topics import TOPIC_KINDS
 from cfmkit.documents.document import Document, Paragraph, field, record_table
 
@@ -34,7 +34,7 @@ class NamedMeaning(NamedTuple):
 
 def explain_by_meaning(word: str) -> Document | None:
     """Return what there is on a word that is a term, a synonym, or part of a definition; None if there is nothing."""
-    targets = look_for(word)
+    targets = words_for_synonym(word)
     named = _names(word, targets) if word.strip() else []
     matching_terms = [name for name in read_terms() if name == word or name in targets]
     if not (matching_terms or targets or named):

@@ -74,13 +74,13 @@ def _missed_notes(entries: Sequence[Entry]) -> Iterator[Note]:
 
 def _changes(compared: BatchComparison) -> Iterator[Note]:
     """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
-    beyond = compared.beyond
+    beyond = compared.changes_beyond_tolerance
     text = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
     yield Note("compared", text, tone=BAD_TONE if beyond else GOOD_TONE, whole=True)
     for one in beyond[:MAX_CHANGES]:
         yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD_TONE, whole=True)
     if len(beyond) > MAX_CHANGES:
-        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more stand in changes.csv", tone=FAINT_TONE)
+        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more values in changes.csv", tone=FAINT_TONE)
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:

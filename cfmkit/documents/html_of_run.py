@@ -1,4 +1,4 @@
-"""``report.html`` of a run: its document with figures, the mechanism in motion, and every metric by branch."""
+"""``report.html`` of one run, a page to share: its document, figures, a slider that moves the mechanism, metrics."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def page(
     texts : sequence of (str, str)
         The specification, under its heading.
     run : RunCommand, optional
-        Which commands apply remedies.
+        The command that was run; the commands that apply a remedy of a finding are built from it.
     """
     record = family(report.result.spec.family)
     figures = {name: html.drawing(figure, name) for name, figure in drawn.items()}
-    film = _film(report.result, drawn, figures)
+    slider = _pose_slider(report.result, drawn, figures)
     return html.page(
         document_of(report, run),
         figures,
@@ -56,15 +56,15 @@ def page(
         command=command,
         texts=texts,
         metrics=metrics_table(report.metrics) if report.metrics else None,
-        film=film,
-        script=part("report.js") if film else "",
+        film=slider,
+        script=part("report.js") if slider else "",
         **references_of(record.name),
     )
 
 
 @dataclass(frozen=True)
-class Film:
-    """The mechanism in motion beside its curve."""
+class PoseSlider:
+    """Drawing of all poses with a slider that chooses one, beside the curve with a cursor."""
 
     drawing: str  # SVG of all poses
     curve: str  # name of the figure that has the cursors
@@ -73,8 +73,8 @@ class Film:
     first: str  # what stands below the slider before it is moved
 
 
-def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) -> Film | None:
-    """Return the film of a result; None if its family has none. The figure beside it gets its cursors."""
+def _pose_slider(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) -> PoseSlider | None:
+    """Return the poses of a result; None if its family draws none. The first figure gets a cursor for each pose."""
     moving = moving_of(family(result.spec.family), result)
     if moving is None or not drawn:
         return None
@@ -86,10 +86,10 @@ def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) 
         f'<line class="cursor" x1="{xs[0]}" x2="{xs[0]}" y1="{low}" y2="{high}"/>' for xs, low, high in spots
     )
     figures[name] = figures[name].replace("</svg>", f"{lines}</svg>")
-    texts = [_moment(result, float(place)) for place in moving.motion]
+    texts = [_pose_caption(result, float(place)) for place in moving.motion]
     data = escaped_json({"texts": texts, "cursors": [xs for xs, _, _ in spots]})
     drawing = film(moving, f"{result.spec.family} mechanism to scale over its travel")
-    return Film(drawing, name, data, len(texts), texts[0])
+    return PoseSlider(drawing, name, data, len(texts), texts[0])
 
 
 def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, float]]:
@@ -103,16 +103,16 @@ def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, 
         yield [round(float(one), 2) for one in x], round(height - box.y0 * scale, 2), round(height - box.y1 * scale, 2)
 
 
-def _moment(result: Result, place: float) -> str:
-    """Return the motion and the effort of every branch at one pose, in words."""
+def _pose_caption(result: Result, place: float) -> str:
+    """Return the text below the slider: the motion and the effort of every branch at one pose."""
     curve = result.curve
-    reported = [f"{curve.motion_name} {format_short(place, curve.motion_dimension)}"]
+    texts = [f"{curve.motion_name} {format_short(place, curve.motion_dimension)}"]
     for name in dict.fromkeys(curve.branches):
         on = curve.branch == name
         effort = _nearest(curve.motion[on], curve.effort[on], place)
         label = f"{curve.kind} on {name}" if len(set(curve.branches)) > 1 else curve.kind
-        reported.append(f"{label} {format_short(effort, curve.kind)}" if np.isfinite(effort) else f"{label}: none")
-    return ", ".join(reported)
+        texts.append(f"{label} {format_short(effort, curve.kind)}" if np.isfinite(effort) else f"{label}: none")
+    return ", ".join(texts)
 
 
 def _nearest(motion: Any, effort: Any, place: float) -> float:
@@ -123,4 +123,4 @@ def _nearest(motion: Any, effort: Any, place: float) -> float:
     return float(np.interp(place, motion[order], effort[order], left=np.nan, right=np.nan))
 
 
-__all__ = ["REPORT_NAME", "Film", "page"]
+__all__ = ["REPORT_NAME", "PoseSlider", "page"]

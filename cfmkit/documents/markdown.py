@@ -67,7 +67,7 @@ def _troubles(one: Entry) -> Iterator[str]:
 
 
 def _comparison_lines(compared: BatchComparison) -> Iterator[str]:
-    count = len(compared.beyond)
+    count = len(compared.changes_beyond_tolerance)
     yield from ("", f"### Compared with {plain(compared.folder)}", "")
     if not compared.changes:
         yield "No metric has changed."
@@ -75,12 +75,12 @@ def _comparison_lines(compared: BatchComparison) -> Iterator[str]:
         reported = f"{count} value{'s' * (count != 1)} changed by more than {100 * compared.tolerance:.4g} %"
         less = len(compared.changes) - count
         yield plain(f"{reported}, {less} by less." if less else f"{reported}.")
-        shown = (*compared.beyond, *(one for one in compared.changes if not one.beyond))[:MAX_CHANGES]
+        shown = (*compared.changes_beyond_tolerance, *(one for one in compared.changes if not one.beyond))[:MAX_CHANGES]
         yield from ("", "| specification | change |", "|---|---|")
         for one in shown:
             yield f"| {plain(one.spec)} | {'**' * one.beyond}{plain(one.sentence)}{'**' * one.beyond} |"
         if len(compared.changes) > len(shown):
-            yield from ("", f"{len(compared.changes) - len(shown)} more stand in changes.csv.")
+            yield from ("", f"{len(compared.changes) - len(shown)} more values in changes.csv.")
     if compared.gone:
         yield from ("", f"No longer there: {plain(', '.join(compared.gone))}")
 

@@ -1,4 +1,4 @@
-"""The document of `suggest`: proposals with their numbers, near misses, and families that cannot meet the request."""
+"""The document that `cfmkit suggest` prints, from metrics.json: proposals, near misses, families without proposals."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 NO_VALUE = "-"
 
 NOT_JUDGED = "open"
-"""Of a value that no model here has, or of which the material says nothing; a note says the reason."""
+"""Cell of a value that no model computes or for which the material lacks data; a note says the reason."""
 
 COLUMN_RANKS = {"parts": 4, "variant": 3, "hysteresis": 2, "life": 1}
 """Columns that narrow pages leave out, the largest first."""
@@ -82,36 +82,28 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
     )
     listed = (*record["proposals"], *record["unjudged"])
     order = f"proposals by {', '.join(record['order'])}" + ("; not judged in full last" if record["unjudged"] else "")
-    numbered = [
-        Span(f"{k} {record_of_proposal['family']}", link=_page_of(record_of_proposal))
-        for k, record_of_proposal in enumerate(listed, 1)
-    ]
+    numbered = [Span(f"{k} {proposal['family']}", link=_page_of(proposal)) for k, proposal in enumerate(listed, 1)]
     near_misses = record["near_misses"]
     for heading, names, rows in (
         (order, numbered, listed),
-        (
-            "alternatives: one unmet requirement",
-            [record_of_proposal["family"] for record_of_proposal in near_misses],
-            near_misses,
-        ),
+        ("alternatives: one unmet requirement", [miss["family"] for miss in near_misses], near_misses),
     ):
         if rows:
             cells = (
-                (name, *(cell(record_of_proposal) for cell in columns.values()))
-                for name, record_of_proposal in zip(names, rows, strict=True)
+                (name, *(cell(proposal) for cell in columns.values()))
+                for name, proposal in zip(names, rows, strict=True)
             )
             yield PageTable(heading, heads, tuple(cells))
     pair = (GridColumn("", False), GridColumn())
-    named = {record_of_proposal["family"] for record_of_proposal in listed}
-    known = {(record_of_proposal["family"], record_of_proposal["misses"][0]) for record_of_proposal in near_misses}
-    silent = tuple(
-        _silent(record_of_proposal)
-        for record_of_proposal in record["families"]
-        if record_of_proposal["family"] not in named
-        and (record_of_proposal["nearest"] or (record_of_proposal["family"], record_of_proposal["reason"]) not in known)
+    named = {proposal["family"] for proposal in listed}
+    shown_misses = {(miss["family"], miss["misses"][0]) for miss in near_misses}
+    without_proposal = tuple(
+        _family_without_proposal(entry)
+        for entry in record["families"]
+        if entry["family"] not in named and (entry["nearest"] or (entry["family"], entry["reason"]) not in shown_misses)
     )
-    if silent:
-        yield PageTable("no proposals from these families", pair, silent)
+    if without_proposal:
+        yield PageTable("no proposals from these families", pair, without_proposal)
 
 
 def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
@@ -157,7 +149,7 @@ def _incomplete(proposals: Sequence[Mapping[str, Any]], files: Written) -> Itera
         yield Note("note", text, whole=True)
 
 
-def _silent(record: Mapping[str, Any]) -> tuple[str, str]:
+def _family_without_proposal(record: Mapping[str, Any]) -> tuple[str, str]:
     """Return why a family has no proposal, and the nearest request that it could meet."""
     nearest = ", or with ".join(f"{key} {value}" for key, value in record["nearest"].items())
     return record["family"], (record["reason"] or "no mechanism fits") + (

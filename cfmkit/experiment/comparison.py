@@ -21,7 +21,7 @@ from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.compare import Compared, Points, counterpart, effort_at, largest, mean, overlap, rms
 from cfmkit.metrics.compare import compare as compare_sides
-from cfmkit.numerics.holes_in_samples import holes_between, weights
+from cfmkit.numerics.holes_in_samples import holes_between, sample_weights
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -268,7 +268,7 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
     grouped = []
     for number, (part, inside, passed) in enumerate(zip(parts, keep, times, strict=True)):
         way = 1 if part.motion[-1] >= part.motion[0] else -1
-        stands_for = weights(part.motion[inside][::way])[::way]
+        stands_for = sample_weights(part.motion[inside][::way])[::way]
         motion = np.clip(part.motion[inside], window.lo, window.hi)
         columns = _average_groups((motion, part.effort[inside], passed[inside], stands_for), size)
         grouped.append((*columns, np.full(len(columns[0]), number)))

@@ -16,7 +16,7 @@ from cfmkit.errors import QuantityError, UsageError
 from cfmkit.experiment.value_definitions import RECORDED_VALUES
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.metric_definitions import split_name
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.results import Finding, Quantity
 from cfmkit.specs.units import read_quantity
 
@@ -81,7 +81,7 @@ NOT_RECORDED_TEXT = "not recorded"
 
 
 def large_holes(
-    holes: Sequence[UnrecordedInterval], window: Window, largest: float = LARGEST_HOLE
+    holes: Sequence[UnrecordedInterval], window: Window, largest: float = MAX_HOLE_SHARE
 ) -> tuple[UnrecordedInterval, ...]:
     """Return the holes that are larger than a part of a window."""
     return tuple(hole for hole in holes if hole.width > largest * (window.hi - window.lo))
@@ -137,7 +137,7 @@ def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 def read_largest_hole(text: str | float | None) -> float:
-    """Return which part of a window a hole may take, from text such as ``5 %``; by default `LARGEST_HOLE`.
+    """Return which part of a window a hole may take, from text such as ``5 %``; by default `MAX_HOLE_SHARE`.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def read_largest_hole(text: str | float | None) -> float:
         If it is no share.
     """
     if text is None:
-        return LARGEST_HOLE
+        return MAX_HOLE_SHARE
     try:
         share = read_quantity(text, "ratio") if isinstance(text, str) else float(text)
     except QuantityError as error:

@@ -41,7 +41,7 @@ from cfmkit.experiment.reversal_transitions import remove_transitions
 from cfmkit.experiment.zeros_and_signs import correct_recording
 from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
 
@@ -307,7 +307,7 @@ def numbers_of(
     source: MeasuredCurves,
     frame: MeasuringFrame | None = None,
     window: Window | None = None,
-    largest_hole: float = LARGEST_HOLE,
+    largest_hole: float = MAX_HOLE_SHARE,
 ) -> Measurement:
     """Return the metrics of a measured mechanism, raw and filtered, its coverage and its repeatability.
 
@@ -392,7 +392,7 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
     }
     widest = min(low for low, _ in extents.values()), max(high for _, high in extents.values())
     # Passages at reversals are left out of one branch or the other of every recording.
-    allowed = LARGEST_HOLE * (widest[1] - widest[0]) + source.passage
+    allowed = MAX_HOLE_SHARE * (widest[1] - widest[0]) + source.passage
     late, early = max(extents, key=lambda key: extents[key][0]), min(extents, key=lambda key: extents[key][1])
     missing = {late: common.lo - widest[0], early: widest[1] - common.hi}
     cut = [key for key, length in missing.items() if length > allowed]
@@ -434,7 +434,7 @@ def require_loop(source: MeasuredCurves) -> None:
         only = source.strokes.measured[0][0].branch
         raise DataError(
             f"{source.recording.name}: holds only the branch {only!r}: without the return stroke there is no loop and "
-            "no hysteresis; if only one stroke was measured, add --one-branch"
+            "no hysteresis; if only one stroke was measured, add --one-branch (in Python one_branch=True)"
         )
 
 

@@ -19,7 +19,7 @@ from cfmkit.plots.style import LINE_COLOURS, TEXT_GREY, apply_style, axes_mm, ne
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
-    from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
@@ -77,16 +76,6 @@ def _from_border(value: float, dimension: str) -> float:
     from cfmkit.specs.units import from_border
 
     return float(from_border(value, dimension))
-
-
-def _named_holes(holes: Sequence[UnrecordedInterval]) -> dict[tuple[float, float], str]:
-    """Return the text at each hole: on which branch and in which cycle, where it is not on all of them."""
-    found: dict[tuple[float, float], list[UnrecordedInterval]] = {}
-    for hole in holes:
-        found.setdefault((hole.low, hole.high), []).append(hole)
-    alone = {ends: f"{here[0].branch}{f' of cycle {here[0].cycle}' if here[0].cycle else ''}"
-             for ends, here in found.items() if len(here) == 1}  # fmt: skip
-    return {ends: f"not recorded{f': {alone[ends]}' if ends in alone else ''}" for ends in found}
 
 
 def broken_at_holes(curve: Curve) -> Curve:

@@ -1,7 +1,7 @@
-"""A part in poses: named bodies of material, each held, driven, free or in contact.
+"""Geometry of a mechanism in several poses, as named bodies of material that are held, driven, free or in contact.
 
-Boxes, pictures, films and the frame around what moves are views of these bodies: a family says once where its material
-is in a pose, and a new view is written once for all families.
+A family returns these bodies once (`families/NAME/part.py`). Views are written once for all families: outlines, the
+bounding box, swept areas, pictures, animations, the frame around what moves, places for screws in a base plate.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ MIRROR_FACTORS = np.array([-1.0, 1.0])
 N_CIRCLE_POINTS = 73
 
 N_PLACES, N_COVERING = 26, 41
-"""Places of a screw along half an edge that are tried, and poses that they must be clear of."""
+"""Positions of a screw that are tried along half an edge, and poses in which they must be free."""
 
 
 @dataclass(frozen=True, eq=False)
 class PosedBody:
-    """All points that are no farther than `half` from a point, a line or the inside of a polygon, in p poses."""
+    """A body in p poses: all points no farther than `half` from a point, a line or the inside of a polygon."""
 
     name: str  # of the kind of body: several may have it
     role: Role
@@ -133,7 +133,7 @@ class PosedPart:
     direction: float = 0.5 * math.pi  # of the travel [rad]
     depth: float | None = None  # out of the plane [m]; None if nothing is known of it
     pieces: int = 1  # separate pieces that the mechanism is put together from, bought ones included
-    assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
+    assumed: str = ""  # dimensions that were assumed because the specification has none, as one clause; empty if none
     pin: float | None = None  # diameter of its pins, which rub as they turn [m]; None without pins
     faults: tuple[str, ...] = ()  # parts that do not bear their loads, or cannot be made, each in a sentence
 
@@ -161,11 +161,11 @@ def swept(bodies: Iterable[PosedBody]) -> Any:
     return union_all([body.shape(pose) for body in bodies for pose in range(len(body.core))])
 
 
-def clear_places(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
-    """Return a place next to each corner of a rectangle where a screw is reached beside all that moves, in all poses.
+def screw_positions(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
+    """Return a position next to each corner of a base plate where a screw can be reached beside all that moves.
 
-    Places along the edges are tried, the nearest to the corner first; a corner from which half of both edges is covered
-    has no screw. Where fewer than two are left, the screws are in the corners, below what moves.
+    Positions along the edges are tried, the nearest to the corner first; a corner from which half of both edges is
+    covered has no screw. If fewer than two are left, the screws are in the corners, below what moves.
 
     Parameters
     ----------

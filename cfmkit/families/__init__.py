@@ -181,7 +181,7 @@ def _package_of(name: str) -> dict[str, str]:
     if name in FAMILY_MODULES or name in _REGISTERED_FAMILIES:
         return {}
     offers = entry_point_plugins.offers()
-    return next((entry_point_plugins.code_of(offer) for offer in offers if offer.name == name), {})
+    return next((entry_point_plugins.code_identity(offer) for offer in offers if offer.name == name), {})
 
 
 def origins() -> dict[str, dict[str, str]]:

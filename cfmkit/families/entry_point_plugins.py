@@ -1,11 +1,11 @@
-"""Families of other packages, by the entry points of what is installed: listed without importing anything.
+"""Mechanism families that other installed packages offer: found by entry points, listed without importing them.
 
 A package adds a family by an entry point of the group ``cfmkit.families``, its name that of the family and its value
-``module:record``. Reading the entry points is left to `os.scandir` and a few small files: importing
-`importlib.metadata` alone takes longer than the list may. As there, the first of two folders of one package on the
-path counts. What lies in zip files is not found.
+``module:record``. The entry points are read from the small files that installers write, since importing
+`importlib.metadata` alone takes longer than listing may. As in `importlib.metadata`, the first one counts of a package
+that is on the path twice. Packages in zip files are not found.
 
-A family that is needed is imported, which runs code of that package.
+A family that is used is imported, which runs code of its package; if that fails, the error says why (`Unusable`).
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Family
 
 ENTRY_POINT_SECTION = "[cfmkit.families]"
-"""What stands above the entry points of the group."""
+"""Heading of the group in a file of entry points."""
 
 _INFO_PATTERN = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
-"""Folders in which an installer says what it has installed."""
+"""Name of a folder in which an installer describes a package, with the package's name and version."""
 
 
 class Unusable(UsageError):
@@ -102,7 +102,7 @@ def _entries(info: str) -> Iterator[tuple[str, str]]:
 
 
 def usable_names(taken: Iterable[str]) -> tuple[str, ...]:
-    """Return the names that are offered once and not taken; nothing is imported."""
+    """Return the names of families that one package offers and cfmkit has not taken; nothing is imported."""
     own = [one.name for one in offers()]
     return tuple(name for name in own if own.count(name) == 1 and name not in set(taken))
 
@@ -135,7 +135,7 @@ def _import_record(offer: InstalledFamily) -> Family | str:
     from cfmkit.families.base import function_named
 
     try:
-        with redirect_stdout(sys.stderr), _interrupts_apart():  # standard output is for results
+        with redirect_stdout(sys.stderr), _distinguish_ctrl_c():  # standard output is for results
             record = function_named(offer.target)
             return _fault_of(record, offer) or record
     except _Interrupted:
@@ -151,7 +151,7 @@ class _Interrupted(StoppedBySignal):
 
 
 @contextmanager
-def _interrupts_apart() -> Iterator[None]:
+def _distinguish_ctrl_c() -> Iterator[None]:
     """Let Ctrl-C raise an exception that no package raises by itself."""
     usual = signal.getsignal(signal.SIGINT)
     if usual is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
@@ -171,10 +171,10 @@ def _interrupts_apart() -> Iterator[None]:
 def _sentence_of(error: BaseException) -> str:
     """Return what an exception of a package says, in one line; to say it may fail, too."""
     try:
-        reported = visible(" ".join(str(error).split()))
+        message = visible(" ".join(str(error).split()))
     except Exception:
-        reported = ""
-    return f"{type(error).__name__}{': ' if reported else ''}{reported}"
+        message = ""
+    return f"{type(error).__name__}{': ' if message else ''}{message}"
 
 
 def _fault_of(record: Any, offer: InstalledFamily) -> str:
@@ -237,8 +237,8 @@ def _is_of_kind(value: Any, kind: str) -> bool:
     return isinstance(value, {"str": str, "bool": bool, "int": int, "Search": Search}[kind])
 
 
-def code_of(offer: InstalledFamily) -> dict[str, str]:
-    """Return what computes a family of another package: the package, its version and the SHA-256 of its files."""
+def code_identity(offer: InstalledFamily) -> dict[str, str]:
+    """Return the identity of the code of a family: its package, the version and the SHA-256 of its files."""
     from pathlib import Path
 
     from cfmkit.store.content_hashes_and_versions import file_hash, tree_hash

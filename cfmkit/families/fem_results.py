@@ -56,14 +56,6 @@ FEM_DEFINITIONS = {
 """Name -> dimension and definition; computed by `solid.adaptive_solution` and `nominal_stress_beside_fillets`."""
 
 
-def unknown_to_beams() -> dict[str, Quantity]:
-    """Return these scalar results without values, for models other than the solid."""
-    return {
-        name: Quantity(None, *about, "only the model of the part as a solid has it")
-        for name, about in FEM_DEFINITIONS.items()
-    }
-
-
 @dataclass(frozen=True, eq=False)
 class FilletRow:
     """One fillet with its largest stress."""

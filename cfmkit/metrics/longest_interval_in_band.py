@@ -57,20 +57,6 @@ def extremes(
     return place
 
 
-def extreme(
-    function: Callable[[FloatArray], FloatArray], place: float, step: float, span: tuple[float, float]
-) -> float:
-    """Return where a function is largest near a place, within a span; `step` says how far off that may be.
-
-    Examples
-    --------
-    >>> round(extreme(np.sin, 1.5, 0.25, (0.0, 3.0)), 4)
-    1.5708
-    """
-    low, high = (np.array([end]) for end in span)
-    return float(extremes(lambda near: function(near[0])[None, :], np.array([place]), step, (low, high))[0])
-
-
 def flat_window(
     travel: FloatArray, force: FloatArray, flatness: float, force_at: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray]:

@@ -28,6 +28,10 @@ MEAN_RTOL = 1e-13
 """A mean that is smaller than this part of the largest effort is rounding: sums of 10 000 points stay below it."""
 
 
+EXTREME_RTOL = 1e-7
+"""A sum of both extremes that is smaller than this part of their distance is what their search leaves, with room."""
+
+
 class Spread(NamedTuple):
     """Mean and extremes of the effort over the points in a window, times `sign` so that the mean is not negative."""
 
@@ -75,7 +79,8 @@ def ripple(found: Spread) -> Number:
 
 def half_band(found: Spread) -> Number:
     """Return (max - min) / (max + min)."""
-    return _share(found.max - found.min, found.max + found.min, found.error)
+    width = found.max - found.min
+    return _share(width, found.max + found.min, _larger(EXTREME_RTOL * width, found.error))
 
 
 def deviation_from_mean(found: Spread) -> Number:
@@ -107,7 +112,7 @@ def _either(which: Number, one: Number, other: Number) -> Number:
 
 
 def _larger(one: Number, other: Number) -> Number:
-    return max(one, other) if isinstance(one, float) else np.maximum(one, other)
+    return max(one, other) if isinstance(one, float) and isinstance(other, float) else np.maximum(one, other)
 
 
 def _share(part: Number, whole: Number, error: Number) -> Number:

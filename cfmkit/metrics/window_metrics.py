@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from functools import partial
 from math import isnan, sqrt
+from operator import attrgetter, methodcaller
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,8 +24,11 @@ from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 from cfmkit.results import LargestStress, OwnStress
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.branch_views import Branch
+    from cfmkit.metrics.metrics_of_rows import RowsInWindow
     from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 
@@ -237,6 +241,25 @@ def effort_after(branch: Branch, time: float) -> float:
     return float(branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time))
 
 
+# --- the same of many curves, (d,) each; functions with names, since studies are pickled -----------------------------
+
+
+def _extreme(which: int, rows: RowsInWindow) -> FloatArray:
+    return np.asarray(rows.many.extremes[which])
+
+
+def _of_spread(function: Callable[[spread.Spread], FloatArray], rows: RowsInWindow) -> FloatArray:
+    return function(rows.many.spread)
+
+
+def _deviations_from_target(rows: RowsInWindow) -> FloatArray:
+    return np.asarray(spread.deviation_from_target(rows.many.spread, rows.curves.target))
+
+
+def _where_known(function: Callable[[RowsInWindow], FloatArray], rows: RowsInWindow) -> FloatArray:
+    return rows.where_known(function(rows))
+
+
 _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
 _DING = "[Ding 2022, sec. 6.2]"
 
@@ -246,7 +269,7 @@ IN_WINDOW = (
         "effort",
         f"mean {{effort}} over the points in the window, its ends included {_TABLE_3}",
         mean,
-        lambda rows: rows.many.mean,
+        attrgetter("many.mean"),
         worst="farthest-from-target",
     ),
     Definition(
@@ -254,21 +277,21 @@ IN_WINDOW = (
         "effort",
         f"standard deviation (n - 1) of the {{effort}} over the points in the window {_TABLE_3}",
         standard_deviation,
-        lambda rows: rows.many.deviation,
+        attrgetter("many.deviation"),
     ),
     Definition(
         "force_max",
         "effort",
         f"largest {{effort}} in the window {_TABLE_3}",
         largest,
-        lambda rows: rows.many.extremes[0],
+        partial(_extreme, 0),
     ),
     Definition(
         "force_min",
         "effort",
         f"smallest {{effort}} in the window {_TABLE_3}",
         smallest,
-        lambda rows: rows.many.extremes[1],
+        partial(_extreme, 1),
         worst="smallest",
     ),
     Definition(
@@ -276,28 +299,28 @@ IN_WINDOW = (
         "ratio",
         f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING}",
         ripple,
-        lambda rows: spread.ripple(rows.many.spread),
+        partial(_of_spread, spread.ripple),
     ),
     Definition(
         "half_band",
         "ratio",
         "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
         half_band,
-        lambda rows: spread.half_band(rows.many.spread),
+        partial(_of_spread, spread.half_band),
     ),
     Definition(
         "deviation_from_mean",
         "ratio",
         f"largest |F - mean|/mean of the {{effort}} in the window {_DING}",
         deviation_from_mean,
-        lambda rows: spread.deviation_from_mean(rows.many.spread),
+        partial(_of_spread, spread.deviation_from_mean),
     ),
     Definition(
         "deviation_from_target",
         "ratio",
         "largest |F - target|/target of the {effort} in the window",
         deviation_from_target,
-        lambda rows: spread.deviation_from_target(rows.many.spread, rows.curves.target),
+        _deviations_from_target,
     ),
     Definition(
         "rms_to_target",
@@ -305,7 +328,7 @@ IN_WINDOW = (
         "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
         "the start of the window excluded [Bilancia 2019, eq. 8]",
         rms_to_target,
-        lambda rows: rows.where_known(rows.rms_to_target()),
+        partial(_where_known, methodcaller("rms_to_target")),
     ),
     Definition(
         "deviation_from_curve",
@@ -329,7 +352,7 @@ IN_WINDOW = (
         "largest |F| of the {effort} in the window over the largest {effort} of one spring or member there, which is "
         "the derivative of its energy by the {motion}; 0 is a perfect balancer",
         static_balance,
-        lambda rows: rows.where_known(rows.static_balance()),
+        partial(_where_known, methodcaller("static_balance")),
         of_parts=True,
     ),
 )
@@ -349,14 +372,14 @@ LOADS = (
         "stress",
         "largest stress in the window, of all load cases",
         stress_max,
-        lambda rows: rows.where_known(rows.stress_max()),
+        partial(_where_known, methodcaller("stress_max")),
     ),
     Definition(
         "safety_factor",
         "factor",
         "allowable stress over the largest stress in the window, of all load cases; 1 or more is within the limit",
         safety_factor,
-        lambda rows: rows.where_known(rows.safety_factor()),
+        partial(_where_known, methodcaller("safety_factor")),
         worst="smallest",
     ),
 )

@@ -1,8 +1,8 @@
-"""Holes in samples along a way, and the way that each sample stands for.
+"""Holes in measured samples, and the length that each sample represents in an average over the travel.
 
-Samples stand where machine and clock put them. A mean over them is a mean over the way only if each counts for the way
-that it stands for. Where the way to the next sample is far longer than is usual there, nothing is known of what lies
-between: a hole.
+Samples are spaced as machine and clock put them, so each must be weighted by the length that it represents. A hole is a
+step to the next sample that is far longer than is usual there: nothing is known of what lies in it. For recordings,
+measured profiles and surfaces.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-LARGEST_HOLE = 0.02
-"""Part of the window: with a larger hole in it no number over the window can be known."""
+MAX_HOLE_SHARE = 0.02
+"""Largest hole, as a share of the window, with which a value over the window is still known."""
 
 HOLE_STEP_RATIO = 3.0
-"""Samples that are farther apart than so many usual steps leave a hole: a spike or two that are left out do not."""
+"""Longest step that is no hole, in usual steps: one or two outliers that were removed do not leave a hole."""
 
 N_NEIGHBOUR_STEPS = 10
-"""Steps to either side of one that say what is usual there: recorders change their step on the way."""
+"""Steps to either side of one from which the usual step there is taken, since recorders may change their step."""
 
 STEP_PERCENTILE = 80.0
-"""Percentile of those: of 21 steps four may be larger, as where single samples stand in a hole."""
+"""Percentile of those that is the usual step: up to four long ones among 21 do not raise it."""
 
 
 def usual_steps(places: FloatArray) -> FloatArray:
-    """Return what is usual around each step, (n - 1,), between (n,) places in increasing order [m or rad]."""
+    """Return the usual step around each step, (n - 1,), between (n,) places in increasing order [m or rad]."""
     from scipy.ndimage import percentile_filter
 
     steps = np.diff(places)
@@ -57,8 +57,8 @@ def holes_between(places: FloatArray, low: float, high: float) -> list[tuple[flo
     return [(start, stop) for start, stop in inside if start < stop]
 
 
-def weights(places: FloatArray) -> FloatArray:
-    """Return the way that each sample stands for, half of that to each neighbour, (n,); holes count as usual steps.
+def sample_weights(places: FloatArray) -> FloatArray:
+    """Return the length that each sample represents, half of each step beside it, (n,); holes count as usual steps.
 
     Parameters
     ----------

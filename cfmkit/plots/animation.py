@@ -1,7 +1,7 @@
-"""The mechanism in motion beside its curve, as a GIF or a film for slides.
+"""Animation of the moving mechanism beside its curve, for slides: the bytes of a GIF or an mp4.
 
-The poses are those of the page (`cfmkit.plots.poses_in_one_svg`), there and back. GIF needs nothing more; a film
-needs the program ``ffmpeg``.
+The poses are those of the HTML page (`cfmkit.plots.poses_in_one_svg`), forth and back. An mp4 needs the program
+``ffmpeg``.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 FRAME_WIDTH, FRAME_HEIGHT = 240.0, 100.0
-"""Of a frame [mm]; with `DOTS_PER_INCH` 960 x 400 dots, half a slide."""
+"""Size of a frame [mm]; with `DOTS_PER_INCH` it has 960 x 400 pixels, half a slide."""
 
 DOTS_PER_INCH = 101.6
-"""Dots per inch: a whole number of dots per millimetre, and even numbers of them in all, as films need."""
+"""Pixels per inch: four per millimetre, so that width and height are even numbers of pixels, as mp4 needs."""
 
 FRAME_DURATION = 90
-"""Of each frame: 11 a second, so that there and back takes three seconds."""
+"""Duration of each frame [ms]: with 11 a second, forth and back takes three seconds."""
 
 
 @apply_style
 def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
-    """Return the frames of one way, each (height, width, 3): the mechanism on the left, a cursor in the curve."""
+    """Return the frames of one sweep, (height, width, 3) each: the mechanism, and a cursor in its curve."""
     figure = new_figure(FRAME_WIDTH, FRAME_HEIGHT)
     figure.dpi = DOTS_PER_INCH
     left, bottom, right, top = moving.box
     scale = min(104.0 / (right - left), 88.0 / (top - bottom))
     size = ((right - left) * scale, (top - bottom) * scale)
-    pose = axes_mm(figure, (60.0 - size[0] / 2.0, 48.0 - size[1] / 2.0, *size))
+    mechanism_axes = axes_mm(figure, (60.0 - size[0] / 2.0, 48.0 - size[1] / 2.0, *size))
     diagram, curve = axes_mm(figure, (136.0, 14.0, 98.0, 74.0)), result.curve
     motion, effort = to_border(curve.motion, curve.motion_dimension), to_border(curve.effort, curve.kind)
     names = list(dict.fromkeys(curve.branches))
@@ -60,19 +60,19 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     diagram.set_ylabel(f"{curve.kind} [{border_unit(curve.kind)}]")
     figure.text(0.02, 0.97, result.spec.name, va="top", weight="bold", size=NORMAL_FONT + 2.0)
     cursor = diagram.axvline(0.0, color=TROUBLE_RED, linewidth=1.0, linestyle="--")
-    reported = diagram.text(0.98, 0.03, "", transform=diagram.transAxes, ha="right", color=TEXT_GREY)
+    place_label = diagram.text(0.98, 0.03, "", transform=diagram.transAxes, ha="right", color=TEXT_GREY)
     places = to_border(moving.motion, curve.motion_dimension)
-    found = []
+    frames_of_sweep = []
     for number, place in enumerate(places):
-        pose.clear()
-        moving.draw(pose, number)
-        pose.set_axis_off()
+        mechanism_axes.clear()
+        moving.draw(mechanism_axes, number)
+        mechanism_axes.set_axis_off()
         cursor.set_xdata([place, place])
-        reported.set_text(f"{place:.4g} {border_unit(curve.motion_dimension)}")
+        place_label.set_text(f"{place:.4g} {border_unit(curve.motion_dimension)}")
         canvas: Any = figure.canvas
         canvas.draw()
-        found.append(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
-    return found
+        frames_of_sweep.append(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
+    return frames_of_sweep
 
 
 def animation(result: Result, moving: Moving, kind: str) -> bytes:
@@ -81,9 +81,9 @@ def animation(result: Result, moving: Moving, kind: str) -> bytes:
     Parameters
     ----------
     result, moving : Result, Moving
-        What was solved, and how its family draws it.
+        The solved mechanism, and its poses as its family draws them.
     kind : {"gif", "mp4"}
-        Of the file.
+        Format of the file.
 
     Raises
     ------
@@ -92,8 +92,8 @@ def animation(result: Result, moving: Moving, kind: str) -> bytes:
     """
     if kind == "mp4":
         require_ffmpeg()
-    there = frames(result, moving)
-    whole = [*there, *there[-2:0:-1]]
+    sweep = frames(result, moving)
+    whole = [*sweep, *sweep[-2:0:-1]]
     return _gif(whole) if kind == "gif" else _film(whole)
 
 
@@ -133,6 +133,6 @@ def _film(whole: Sequence[NDArray[np.uint8]]) -> bytes:
         ]
         done = subprocess.run(command, input=b"".join(map(bytes, whole)), capture_output=True, check=False)
         if done.returncode:
-            reported = " ".join(done.stderr.decode(errors="replace").split())
-            raise UsageError(f"--animate mp4: ffmpeg could not write the film: {reported[:200]}")
+            complaint = " ".join(done.stderr.decode(errors="replace").split())
+            raise UsageError(f"--animate mp4: ffmpeg could not write the film: {complaint[:200]}")
         return out.read_bytes()

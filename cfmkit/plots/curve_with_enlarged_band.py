@@ -1,7 +1,7 @@
-"""The picture of every constant-force mechanism: its curve, and the band it should keep, enlarged.
+"""Main figure of a result, the same for every family: force over displacement, or torque over angle.
 
-Where the whole curve, drawn from zero, leaves the ripple too small to be seen, the
-picture has two panels: the whole above, the requirement bands below.
+If the whole curve, drawn from zero, leaves the ripple too small to see, a second panel below enlarges the range that is
+to be constant: that of the requirement bands, or of the window of the analysis if there are none.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 Interval = tuple[float, float]
 
 ENLARGE_BELOW = 0.45
-"""The band gets a panel of its own if it takes less than this fraction of the whole picture's height: above it the
-panel would enlarge it to little more than twice."""
+"""Share of the height below which the range gets a panel of its own: above it that would enlarge it little more than
+twice."""
 
 MIN_BAND_SHARE = 0.002
 """The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""
 
 
 @apply_style
-def loop_figure(result: Result, look: CurveLook | None = None, subject: str = "") -> Figure:
+def curve_figure(result: Result, look: CurveLook | None = None, subject: str = "") -> Figure:
     """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat.
 
     Parameters
@@ -77,7 +77,7 @@ def _motion_range(upper: Axes, curve: Curve) -> Interval:
 
 
 def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:
-    """Return motion and effort [SI] that deserve a panel of their own; None if the whole shows them well."""
+    """Return the range of motion and of effort [SI] to enlarge; None if the whole curve shows it well."""
     curve = result.curve
     bands = bands_of(result)
     spans = [(band.start, band.stop) for band in bands] or [_window(result)]
@@ -97,7 +97,7 @@ def choose_enlarged_range(result: Result, look: CurveLook) -> tuple[Interval, In
 
 
 def _window(result: Result) -> Interval:
-    """Return the motion to look at where no requirement names one."""
+    """Return the motion to enlarge if there are no requirement bands."""
     window = window_of(result)
     if window is not None:
         return window.lo, window.hi

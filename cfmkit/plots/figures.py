@@ -29,9 +29,9 @@ def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]
     if not result.curves:
         return {}
     if family.draw is None:
-        from cfmkit.plots.curve_with_enlarged_band import loop_figure
+        from cfmkit.plots.curve_with_enlarged_band import curve_figure
 
-        return {"curve": partial(loop_figure, result)}
+        return {"curve": partial(curve_figure, result)}
     makers: Mapping[str, Callable[[], Figure]] = import_module(family.draw).figures(result)
     return makers
 

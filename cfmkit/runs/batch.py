@@ -19,7 +19,7 @@ from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, RunTask, Verb, journal_of, long_run, run_analysis, run_design, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch_sources_and_outcomes import SKIPPED_MESSAGE, Entry
-from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, earlier, list_gone
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, list_gone, read_earlier_batch
 from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 
 if TYPE_CHECKING:
@@ -433,7 +433,7 @@ def batch(
         raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")
     reference = "" if compare is None else os.fspath(compare)
     begins = accept and batch_output_files.check_reference(reference, place)
-    before = None if compare is None or begins else earlier(reference)
+    before = None if compare is None or begins else read_earlier_batch(reference)
     watched = monitor or Unwatched()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
@@ -443,7 +443,7 @@ def batch(
             changed = changes_of(before, entries, place, tolerance)
             compared = BatchComparison(reference, tolerance, changed, list_gone(before, entries))
         code = exit_code(entries, watched.stopped)
-        if compared is not None and compared.beyond and not watched.stopped and not accept:
+        if compared is not None and compared.changes_beyond_tolerance and not watched.stopped and not accept:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
         written = batch_output_files.write(
             folder,

@@ -1,6 +1,8 @@
-"""Files of `export`: the part in the requested formats, decks of its elastic parts, and its drawing on paper.
+"""Contents of the files that `export` makes, for the command and the Python API; nothing is written here.
 
-Nothing here touches a disk.
+Three kinds: files of the outlines to cut or print (DXF, SVG, CSV, and bodies), decks of the elastic parts for a
+finite-element solver, and the dimensioned drawing (png, pdf). In the code, `outlines` is a `Drawing`: contours with
+notes and warnings.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 DECK_FORMAT = "inp"
-"""Format of a deck of a finite-element solver: of elastic parts, which the drawing alone does not tell."""
+"""Format of decks of a finite-element solver, which need more than the outlines: the elastic parts."""
 
 DRAWING_FORMATS = ("png", "pdf")
 """Formats of the dimensioned drawing."""
@@ -33,10 +35,10 @@ def export_files(
     tolerance: str | float | None = None,
     formats: str | Sequence[str] | None = None,
 ) -> tuple[dict[str, bytes], Drawing, dict[str, CfmError]]:
-    """Return the files of `export` by name, the drawing with its notes and warnings, and why formats could not be made.
+    """Return the files by name, the outlines with notes and warnings, and errors of formats not made.
 
-    A body, a deck or a drawing on paper that cannot be made does not stop the other formats; if there is nothing else,
-    its error is raised.
+    A body, a deck or a dimensioned drawing that cannot be made does not stop the other formats; if there is nothing
+    else, its error is raised.
 
     Parameters
     ----------
@@ -62,21 +64,21 @@ def export_files(
     wanted = _formats(formats, DEFAULT_FORMATS)
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
-    width, near = read_length(kerf, "--kerf"), read_length(tolerance, "--tolerance")
-    drawn = drawing_of(spec, family(spec.family), near)
-    found = files(drawn, width, near, [one for one in wanted if one in DEFAULT_FORMATS])
+    kerf_width, max_deviation = read_length(kerf, "--kerf"), read_length(tolerance, "--tolerance")
+    outlines = drawing_of(spec, family(spec.family), max_deviation)
+    exported = files(outlines, kerf_width, max_deviation, [one for one in wanted if one in DEFAULT_FORMATS])
     failed: dict[str, CfmError] = {}
     for name in (one for one in wanted if one not in DEFAULT_FORMATS):
         try:
             if name in DRAWING_FORMATS:
-                found |= _drawing_on_paper(drawn, spec, name)
+                exported |= _drawing_on_paper(outlines, spec, name)
             else:
-                found |= _decks(spec) if name == DECK_FORMAT else files(drawn, None, near, [name])
+                exported |= _decks(spec) if name == DECK_FORMAT else files(outlines, None, max_deviation, [name])
         except CfmError as error:
             failed[name] = error
-    if failed and not found:
+    if failed and not exported:
         raise next(iter(failed.values()))
-    return found, drawn, failed
+    return exported, outlines, failed
 
 
 def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Drawing:
@@ -86,17 +88,17 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
-    drawn = import_module(record.outline).drawing(spec, *given)
-    drawn = replace(drawn, warnings=(*drawn.warnings, *_thin(drawn, spec)))
-    return engrave_labels(drawn, spec.name)
+    outlines = import_module(record.outline).drawing(spec, *given)
+    outlines = replace(outlines, warnings=(*outlines.warnings, *_thin_walls(outlines, spec)))
+    return engrave_labels(outlines, spec.name)
 
 
 MAX_NAMED_WALLS = 3
-"""Thin walls that one line names."""
+"""Most thin walls that a warning names."""
 
 
-def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
-    """Yield which walls of a part are thinner than the process makes that is stated for it."""
+def _thin_walls(outlines: Drawing, spec: Spec) -> Iterator[Finding]:
+    """Yield a warning if walls of a part are thinner than the stated manufacturing process can make."""
     from cfmkit.export.thin_walls import thin_walls
     from cfmkit.results import THIN_WALL, Finding
     from cfmkit.specs.units import format_short
@@ -105,7 +107,7 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
     if (
         process is None
         or not (least := process.thinnest)
-        or not (walls := thin_walls(drawn.contours, least, drawn.tolerance))
+        or not (walls := thin_walls(outlines.contours, least, outlines.tolerance))
     ):
         return
     first, *others = [
@@ -122,13 +124,13 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
     )
 
 
-def _drawing_on_paper(drawn: Drawing, spec: Spec, name: str) -> dict[str, bytes]:
+def _drawing_on_paper(outlines: Drawing, spec: Spec, name: str) -> dict[str, bytes]:
     """Return the dimensioned drawing in one format."""
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.runs.part_on_paper import part_on_paper
 
     form = FigureForm(formats=(name,))
-    return dict(form.files({"drawing": lambda: part_on_paper(drawn, spec)}))
+    return dict(form.files({"drawing": lambda: part_on_paper(outlines, spec)}))
 
 
 def _decks(spec: Spec) -> dict[str, bytes]:
@@ -150,9 +152,9 @@ def _decks(spec: Spec) -> dict[str, bytes]:
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
     """Return the formats that are requested; of a text those between commas."""
-    from cfmkit.export import FILE_FORMATS as DRAWN
+    from cfmkit.export import FILE_FORMATS as OUTLINE_FORMATS
 
-    known = (*DRAWN, DECK_FORMAT, *DRAWING_FORMATS)
+    known = (*OUTLINE_FORMATS, DECK_FORMAT, *DRAWING_FORMATS)
     words = usual if given is None else given.split(",") if isinstance(given, str) else given
     names = tuple(dict.fromkeys(word.strip().lower() for word in words))
     for name in names:

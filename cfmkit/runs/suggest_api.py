@@ -1,4 +1,4 @@
-"""Proposals as Python asks for them: a request by a file, by keywords, or by both."""
+"""The function `cfmkit.suggest` for scripts and notebooks: requirements from keywords or a file, ranked proposals."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def suggest(
     process : str, optional
         How it is made.
     adjustable : sequence of str, optional
-        Lowest and highest force of the adjustment.
+        Range over which the constant force must be adjustable, its lowest and its highest value.
     hysteresis : str or float, optional
         Largest energy loss of a cycle, as a share of its work.
     cycles : int, optional
         Required life.
     min_yield : str or float, optional
-        Share of manufactured parts that must meet all of it: the key `yield` of the file.
+        Smallest share of manufactured parts that meet all requirements, as 0.95 or ``"95 %"``: the key `yield`.
     safety : str or float, optional
         Smallest safety factor.
     springs : str or sequence of str, optional
@@ -91,7 +91,7 @@ def suggest(
     from cfmkit.runs.read_suggest_file import read_request
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import serial
-    from cfmkit.studies.suggest.search import suggest as searched
+    from cfmkit.studies.suggest.search import suggest as search_families
 
     def format_value(value: Any) -> str:
         return "[" + ", ".join(map(format_value, value)) + "]" if isinstance(value, list | tuple) else str(value)
@@ -116,4 +116,4 @@ def suggest(
     name = None if request is None else os.fspath(request)
     block = read_request(name, {key: format_value(value) for key, value in keys.items()})
     run = Run(seed, time_budget=read_time(time_budget), executor=serial if jobs == 1 else Pool(jobs))
-    return SuggestionsView.of(searched(block.request(), run, block.prefer), block)
+    return SuggestionsView.of(search_families(block.request(), run, block.prefer), block)

@@ -1,4 +1,4 @@
-"""Values of options and of arguments of the Python functions: numbers in SI, or texts with a unit."""
+"""Lengths, windows and targets from options and arguments of Python functions: numbers in SI, or texts with units."""
 
 from __future__ import annotations
 
@@ -25,28 +25,30 @@ def read_length(length: str | float | None, option: str) -> float | None:
     return value
 
 
-def read_window(text: Window | str | tuple[float, float] | None, kind: Kind) -> Window | None:
-    """Return the window that text such as ``40 mm:210 mm`` says, or two numbers in m or rad; a window as it is.
+def read_window(window: Window | str | tuple[float, float] | None, kind: Kind) -> Window | None:
+    """Return a window from text ``40 mm:210 mm`` or from two numbers in m or rad; a `Window` or None as it is.
+
+    The ends are lengths if the `kind` of the curve is a force, and angles if it is a torque.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If it is malformed.
+        If it is malformed, or not increasing.
     """
-    if text is None or isinstance(text, Window):
-        return text
-    if not isinstance(text, str):
-        low, high = text
-        return Window(low, high)
-    ends = text.split(":")
-    if len(ends) != 2:
-        raise UsageError(f"--window: {text!r} is not 'from:to'; write e.g. --window '40 mm:210 mm'")
-    try:
-        low, high = (read_quantity(end, "length" if kind == "force" else "angle") for end in ends)
-    except QuantityError as error:
-        raise UsageError(f"--window: {error}") from None
+    if window is None or isinstance(window, Window):
+        return window
+    if isinstance(window, str):
+        ends = window.split(":")
+        if len(ends) != 2:
+            raise UsageError(f"--window: {window!r} is not 'from:to'; write e.g. --window '40 mm:210 mm'")
+        try:
+            low, high = (read_quantity(end, "length" if kind == "force" else "angle") for end in ends)
+        except QuantityError as error:
+            raise UsageError(f"--window: {error}") from None
+    else:
+        low, high = window
     if not low < high:
-        raise UsageError(f"--window: {text!r} must be increasing")
+        raise UsageError(f"--window: {window!r} must be increasing")
     return Window(low, high)
 
 

@@ -1,4 +1,4 @@
-"""Changes of the metrics of many specifications since an earlier batch."""
+"""Comparison of a batch with an earlier one, for `cfmkit batch --compare`: changed metrics and statuses."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class BatchComparison:
     gone: tuple[str, ...]  # folders of specifications that are not there any more
 
     @property
-    def beyond(self) -> tuple[MetricChange, ...]:
+    def changes_beyond_tolerance(self) -> tuple[MetricChange, ...]:
         """The changes that are larger than the tolerance."""
         return tuple(one for one in self.changes if one.beyond)
 
@@ -50,13 +50,13 @@ class BatchComparison:
         return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
 
 
-def earlier(folder: str) -> Known:
-    """Return what a batch found, by folder of the specification; one that wrote nothing has no metrics.
+def read_earlier_batch(folder: str) -> Known:
+    """Return the results of an earlier batch by folder of the specification; one that wrote nothing has no metrics.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If the folder is none of a batch.
+        If the folder is not one of a batch.
     """
     whole = _read_json(os.path.join(folder, "metrics.json"))
     if whole is None or not isinstance(listed := whole.get("specs"), list):
@@ -87,7 +87,7 @@ def changes(
     Parameters
     ----------
     known : mapping of str to Earlier
-        What `earlier` returns.
+        The earlier results, from `read_earlier_batch`.
     entries : sequence of Entry
         What was found now; those that the earlier batch did not have are new, and no change.
     folder : str
@@ -101,7 +101,7 @@ def changes(
         if before is None or entry.skipped:
             continue
         if (before.status, before.exit_code) != (entry.status, int(entry.code)):
-            ends = _ends(before.status, before.exit_code), _ends(entry.status, int(entry.code))
+            ends = _outcome_text(before.status, before.exit_code), _outcome_text(entry.status, int(entry.code))
             found.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
             own = _read_json(os.path.join(folder, entry.folder, "metrics.json")) or {}
@@ -111,8 +111,8 @@ def changes(
     return tuple(found)
 
 
-def _ends(status: str, code: int) -> str:
-    """Return how a specification ended: a curve may be complete and miss a requirement."""
+def _outcome_text(status: str, code: int) -> str:
+    """Return the outcome of a specification in words: a curve may be complete and miss a requirement."""
     missed = code == ExitCode.REQUIREMENT_MISSED
     return f"{status}, requirement missed" if missed and status == Status.COMPLETE.key else status
 

@@ -1,4 +1,4 @@
-"""The computation of a study at each of its points, and the record of it.
+"""Evaluation of one point of a study (sweep, sensitivity, manufactured parts): varied values in, a row of metrics out.
 
 A `Study` holds everything that decides the result of a point but the varied values.
 Whatever goes wrong at a point becomes a row with a status and without values: an
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.units import Ends
 
     Designer = Callable[[Any, Run], Design]
-    Deliver = Callable[[Spec, Designer, Run], Design]
+    DesignMaker = Callable[[Spec, Designer, Run], Design]
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
@@ -79,8 +79,8 @@ class Row:
     warnings: tuple[str, ...] = ()  # names of what the user must know, sorted
 
 
-def of_perfect_parts(spec: Spec, designer: Designer, run: Run) -> Design:
-    """Return what a family's designer makes of a specification: no margins for a yield, no verification."""
+def design_without_margins(spec: Spec, designer: Designer, run: Run) -> Design:
+    """Return the design of a family for parts without errors: no margins for a yield, no verification."""
     return designer(spec, run)
 
 
@@ -95,9 +95,10 @@ class Study:
     curves: bool = False  # whether curves are kept
     seed: int = 0  # random seed of an analysis
     findings: bool = True  # whether the names of findings are noted
-    # what makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes
-    deliver: Deliver = of_perfect_parts
-    made: bool = False  # whether points are manufactured parts, whose values need not agree as stated ones do
+    # designs the mechanism of a point, ``make_design(spec, designer, run)``; default: the family's designer alone
+    make_design: DesignMaker = design_without_margins
+    # whether points are manufactured parts: stated values must agree with each other, those of parts need not
+    manufactured: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -131,7 +132,16 @@ class Study:
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
-        about = [RECORD_VERSION, self.paths, noted, self.design, self.curves, self.seed, self.findings, self.made]
+        about = [
+            RECORD_VERSION,
+            self.paths,
+            noted,
+            self.design,
+            self.curves,
+            self.seed,
+            self.findings,
+            self.manufactured,
+        ]
         about += [computing, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
@@ -148,7 +158,7 @@ class Study:
         cfmkit.errors.SpecError
             If it is not valid.
         """
-        return self.plain.replace(dict(zip(self.paths, values, strict=True)), as_made=self.made)
+        return self.plain.replace(dict(zip(self.paths, values, strict=True)), as_made=self.manufactured)
 
     @cached_property
     def plain(self) -> Spec:
@@ -156,7 +166,7 @@ class Study:
         return self.spec.model_copy(update={"sweep": None, "sensitivity": None})
 
     def evaluate(self, values: Sequence[Any]) -> Row:
-        """Return what becomes of one point; nothing is raised but what ends the process."""
+        """Return the row of one point; nothing is raised but what ends the process."""
         try:
             return self.row(self.solve(self.variant(values)))
         except CfmError as error:
@@ -171,7 +181,7 @@ class Study:
         record, run = family(spec.family), Run(self.seed)
         if not self.design or record.design is None:
             return windows_judged(record.with_envelope(record.analyze(spec, run), self.names))
-        design = self.deliver(spec, record.design, Run(self.seed))
+        design = self.make_design(spec, record.design, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
         result = windows_judged(record.with_envelope(record.analyze(design.spec, run), self.names))
@@ -195,7 +205,7 @@ class Study:
     def quantities(self, result: Result, surveys: Surveys | None = None) -> tuple[Quantity, ...]:
         """Return what each metric of the study is on a result, with the reason where it has no value.
 
-        `surveys` is where what is found out of the curve is noted for later.
+        `surveys` is a cache of values derived from the curve, shared between calls.
         """
         surveys = {} if surveys is None else surveys
         extra = values_of_family(family(result.spec.family).values)

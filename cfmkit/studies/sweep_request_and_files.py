@@ -71,7 +71,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
         raise UsageError(f"{family(spec.family).phrase} cannot be designed, only analysed")
     names = request.metrics or (block.metrics if block else ())
     metrics = metrics_of(spec, names, sample_curve(spec, plan, design))
-    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed, deliver=run_design), plan)
+    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed, make_design=run_design), plan)
 
 
 def _example(spec: Spec) -> str:

@@ -242,7 +242,7 @@ def _variants(study: Study, plan: Plan, indices: Sequence[int]) -> Variants:
     some = np.array(indices) - start
     columns = (column[some] for column in plan.block(start, stop))
     values = dict(zip(plan.paths, columns, strict=True))
-    return Variants(study.plain, values, lambda k: study.variant(plan.point(indices[k])), len(indices), study.made)
+    return Variants(study.plain, values, lambda k: study.variant(plan.point(indices[k])), len(indices), study.manufactured)
 
 
 def _parts(

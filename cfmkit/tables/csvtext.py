@@ -1,11 +1,10 @@
-"""CSV of our own: RFC 4180, UTF-8, line feeds, header ``force [N]``, no comment lines.
+"""Writing and strict reading of cfmkit's own CSV files, without loss: `read_csv` returns the table given to `to_csv`.
 
-Floats stand in the fewest digits that read back as the same float, integers
-without a dot, and what is missing is an empty cell. A cell is quoted where the
-format needs it, and where a text would otherwise read as a number. A text that a
-spreadsheet would compute as a formula has an apostrophe before it: names come from
-other people, and a formula can fetch what is in other cells. `read_csv` takes it
-away, and gives back exactly what `to_csv` was given.
+They are RFC 4180 in UTF-8 with line feeds, headers such as ``force [N]``, no comment lines. Floats have the fewest
+digits that read back as the same float, integers no dot, missing values are empty cells. A cell is quoted if the format
+needs it, or if a text would otherwise read as a number. A text that a spreadsheet would compute as a formula gets an
+apostrophe before it, which `read_csv` removes: names come from other people, and a formula can fetch what is in other
+cells.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 _CHUNK_ROWS = 8192
-"""Rows that are text at one time: large enough for speed, small beside the table itself."""
+"""Rows that are formatted at one time: large enough for speed, small beside the table itself."""
 
 _INTEGER_PATTERN = re.compile(r"-?(?:0|[1-9][0-9]*)")
 _NUMBER_PATTERN = re.compile(_INTEGER_PATTERN.pattern + r"(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?|-?inf")
@@ -46,9 +45,9 @@ def csv_chunks(table: Table) -> Iterator[bytes]:
     """Yield the CSV of a table piece by piece, for tables that are large."""
     lone = len(table.columns) == 1
     if table.columns:
-        yield _encode_rows([[_text(header)] for header in table.headers])
+        yield _encode_rows([[_format_cell(header)] for header in table.headers])
     for start in range(0, len(table), _CHUNK_ROWS):
-        columns = [_texts(column.values[start : start + _CHUNK_ROWS]) for column in table.columns]
+        columns = [_format_column(column.values[start : start + _CHUNK_ROWS]) for column in table.columns]
         if lone:  # an empty line would not count as a row
             columns = [[text or '""' for text in columns[0]]]
         yield _encode_rows(columns)
@@ -59,19 +58,19 @@ def _encode_rows(columns: Sequence[Sequence[str]]) -> bytes:
     return ("\n".join(map(",".join, zip(*columns, strict=True))) + "\n").encode("utf-8", "backslashreplace")
 
 
-def _texts(values: Values) -> list[str]:
+def _format_column(values: Values) -> list[str]:
     if isinstance(values, tuple):
         if set(map(type, values)) <= {str, type(None)}:  # names of branches and states: few, many times
-            known = {cell: _text(cell) for cell in set(values)}
+            known = {cell: _format_cell(cell) for cell in set(values)}
             return [known[cell] for cell in values]
-        return list(map(_text, values))
+        return list(map(_format_cell, values))
     texts = list(map(repr, values.tolist()))
     if values.dtype.kind == "f" and np.isnan(values).any():
         return ["" if text == "nan" else text for text in texts]
     return texts
 
 
-def _text(cell: Cell) -> str:
+def _format_cell(cell: Cell) -> str:
     if cell is None:
         return ""
     if not isinstance(cell, str):
@@ -102,7 +101,7 @@ def read_csv(source: str | bytes | Path) -> Table:
         If the file cannot be read.
     """
     name = str(source) if isinstance(source, Path) else "CSV"
-    rows = _rows(_decode_source(source, name), name)
+    rows = _parse_rows(_decode_source(source, name), name)
     _, headers = next(rows)
     body = []
     for line, row in rows:
@@ -110,7 +109,7 @@ def read_csv(source: str | bytes | Path) -> Table:
             raise DataError(f"{name}:{line}: has {len(row)} cells, but the header has {len(headers)}")
         body.append(row)
     try:
-        return Table(tuple(map(_column, headers, zip(*body, strict=True) if body else repeat(()))))
+        return Table(tuple(map(_parse_column, headers, zip(*body, strict=True) if body else repeat(()))))
     except CfmError as error:
         raise DataError(f"{name}: {error}") from None
 
@@ -129,16 +128,16 @@ def _decode_source(source: str | bytes | Path, name: str) -> str:
     return text
 
 
-def _rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
+def _parse_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
     """Yield (line number, raw cells) of every row."""
     if '"' not in text and "\r" not in text:
         for line, row in enumerate(text[:-1].split("\n"), start=1):
             yield line, row.split(",")
         return
-    yield from _quoted_rows(text, name)
+    yield from _parse_quoted_rows(text, name)
 
 
-def _quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
+def _parse_quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
     place, start = 0, 1
     row: list[str] = []
     while place < len(text):
@@ -152,13 +151,13 @@ def _quoted_rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
             start, row = start + 1 + sum(cell.count("\n") for cell in row), []
 
 
-def _column(header: str, cells: Sequence[str]) -> TableColumn:
-    """Return the column that these raw cells are."""
+def _parse_column(header: str, cells: Sequence[str]) -> TableColumn:
+    """Return the column of a header and raw cells."""
     match = HEADER_PATTERN.fullmatch(_unquote(header))
     if not match:
         raise CfmError(f"{_unquote(header)!r} is not a header such as 'force [N]'")
     values = _plain_floats(cells)
-    return TableColumn(match["name"], tuple(map(_value, cells)) if values is None else values, match["unit"])
+    return TableColumn(match["name"], tuple(map(_parse_cell, cells)) if values is None else values, match["unit"])
 
 
 def _plain_floats(cells: Sequence[str]) -> FloatArray | None:
@@ -171,7 +170,7 @@ def _plain_floats(cells: Sequence[str]) -> FloatArray | None:
     return array if values and list(map(repr, values)) == list(cells) and not np.isnan(array).any() else None
 
 
-def _value(raw: str) -> Cell:
+def _parse_cell(raw: str) -> Cell:
     if not raw:
         return None
     if _NUMBER_PATTERN.fullmatch(raw):

@@ -1,4 +1,4 @@
-"""Columns of a lab file: names, units and roles.
+"""Columns of the file of a testing machine: the name, unit and role (displacement, force, ...) of each.
 
 Units are read or stated by the user, never guessed. A unit stands in the header as ``Force [N]``, ``Kraft (N)``,
 ``s/mm``, ``Load, N`` or ``travel in mm``, in a line of its own below the names, in the cells (``6.00 N``), in a column
@@ -42,7 +42,7 @@ _OTHER_WORDS = {
 _AMBIGUOUS_UNITS = {"mn"}
 """Spellings without regard to case that could be two units: mN and MN."""
 
-_NUMBERS_OF_ITEMS = {"-": "1", "": "1", "mm/mm": "1"}
+_DIMENSIONLESS_SPELLINGS = {"-": "1", "": "1", "mm/mm": "1"}
 _LABEL_OF_UNITS = re.compile(r"(?i).*(unit|einheit).*")
 _COLUMN_WORDS = {
     "time": ("time", "t", "zeit", "temps", "tiempo", "prüfzeit", "test time"),
@@ -64,7 +64,7 @@ class ColumnInfo:
     name: str  # as in the header, without the unit; "column 1" where there is none
     unit: str | None = None  # as cfmkit spells it; as in the file if it is none; None if it is not stated
     dimension: str | None = None  # of the unit; None if that is of no use here
-    reported: bool = False  # whether --units names the column
+    named_by_option: bool = False  # whether --units names this column
     source: str = ""  # what says the unit, for messages
     unit_column: int | None = None  # where the unit of each cell stands, if beside it
 
@@ -73,13 +73,13 @@ class ColumnInfo:
         """Name and unit for messages: ``'Kraft' [N]``."""
         return f"{quote(self.name)} [{self.unit}]" if self.unit else f"{quote(self.name)} without a unit"
 
-    def states(self, unit: str, source: str, file: str, place: str = "") -> ColumnInfo:
-        """Return the column with a unit that something says of it.
+    def with_unit(self, unit: str, source: str, file: str, place: str = "") -> ColumnInfo:
+        """Return the column with a unit that `source` states for it.
 
         Raises
         ------
         cfmkit.errors.DataError
-            If something else said another one.
+            If another source stated another unit.
         """
         if self.dimension is None:
             return replace(self, unit=unit, dimension=dimension_of(unit), source=source)
@@ -115,7 +115,7 @@ def read_units(text: str | None) -> dict[str, str]:
             )
         if dimension_of(unit) is None:
             raise UsageError(f"--units: {quote(unit)} is not a unit of a time, displacement, angle, force or torque")
-        found[name] = spelt(unit)
+        found[name] = standard_spelling(unit)
     return found
 
 
@@ -142,10 +142,10 @@ def describe(
     """
     columns = [_describe_column(index, *pair, file) for index, pair in enumerate(zip(names, unit_row, strict=True))]
     for index, unit in cells.items():
-        columns[index] = columns[index].states(unit, CELLS_SOURCE, file)
+        columns[index] = columns[index].with_unit(unit, CELLS_SOURCE, file)
     for key, unit in units.items():
         index = _index(key, columns, file)
-        columns[index] = replace(columns[index].states(unit, "--units", file), reported=True)
+        columns[index] = replace(columns[index].with_unit(unit, "--units", file), named_by_option=True)
     return columns
 
 
@@ -183,9 +183,9 @@ def _describe_column(index: int, text: str, below: str, file: str) -> ColumnInfo
         name, unit = text, None  # such as "Force (compression)"
     column = ColumnInfo(index, " ".join(name.strip(' "').split()) or f"column {index + 1}")
     if unit is not None:
-        column = column.states(spelt(unit), HEADER_SOURCE, file)
+        column = column.with_unit(standard_spelling(unit), HEADER_SOURCE, file)
     if under is not None and (dimension_of(under) or unit is None):
-        column = column.states(spelt(under), UNIT_LINE, file)
+        column = column.with_unit(standard_spelling(under), UNIT_LINE, file)
     return column
 
 
@@ -240,17 +240,17 @@ def _fold_case(unit: str) -> str:
 
 
 @lru_cache(maxsize=1024)
-def spelt(unit: str) -> str:
-    """Return a unit as cfmkit spells it; what is none as it is.
+def standard_spelling(unit: str) -> str:
+    """Return a unit in the spelling of cfmkit; a text that is no unit as it is.
 
     Examples
     --------
-    >>> spelt("lbF"), spelt("Inches"), spelt("N·mm"), spelt("kgf-cm"), spelt("sec.")
-    ('lbf', 'in', 'N*mm', 'kgf*cm', 's')
+    >>> [standard_spelling(unit) for unit in ("lbF", "Inches", "N·mm", "kgf-cm", "sec.")]
+    ['lbf', 'in', 'N*mm', 'kgf*cm', 's']
     """
     unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2")
-    if unit in _NUMBERS_OF_ITEMS:
-        return _NUMBERS_OF_ITEMS[unit]
+    if unit in _DIMENSIONLESS_SPELLINGS:
+        return _DIMENSIONLESS_SPELLINGS[unit]
     if is_unit(unit):
         return unit
     if _fold_case(unit) in _words():
@@ -263,13 +263,13 @@ def spelt(unit: str) -> str:
 
 def is_known(unit: str) -> bool:
     """Return whether a text is a unit, in any of the spellings that are read."""
-    return spelt(unit) == "1" or is_unit(spelt(unit))
+    return standard_spelling(unit) == "1" or is_unit(standard_spelling(unit))
 
 
 @lru_cache(maxsize=1024)
 def dimension_of(unit: str) -> str | None:
     """Return which of the dimensions of interest a unit has; None if it has none of them."""
-    symbol = spelt(unit)
+    symbol = standard_spelling(unit)
     common = next((name for name in COLUMN_ROLES if (name, symbol) in COMMON_UNIT_SIZES), None)
     if common or not is_unit(symbol):
         return common
@@ -292,8 +292,8 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     there = {item.dimension for item in numeric}
     complete = [pair for pair in pairs if set(pair) <= there]
     if len(complete) > 1:
-        reported = {item.dimension for item in numeric if item.reported}
-        complete = [pair for pair in pairs if set(pair) <= reported] or complete
+        named_by_option = {item.dimension for item in numeric if item.named_by_option}
+        complete = [pair for pair in pairs if set(pair) <= named_by_option] or complete
     if len(complete) > 1:
         raise DataError(
             f"{name}: there are displacement and force, and angle and torque; name the columns that are meant "
@@ -314,7 +314,7 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
 def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInfo]:
     """Return the columns that could be of a dimension's role: those of --units, else of the usual name, else all."""
     found = [column for column in columns if column.dimension == dimension]
-    found = [column for column in found if column.reported] or found
+    found = [column for column in found if column.named_by_option] or found
     named = [
         column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _COLUMN_WORDS[dimension]
     ]

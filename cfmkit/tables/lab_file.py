@@ -25,7 +25,15 @@ import numpy as np
 
 from cfmkit.errors import DataError
 from cfmkit.specs.units.strict_decimal_number import quote
-from cfmkit.tables.lab_columns import CELLS_SOURCE, ColumnInfo, describe, dimension_of, is_unit_row, spelt, split_header
+from cfmkit.tables.lab_columns import (
+    CELLS_SOURCE,
+    ColumnInfo,
+    describe,
+    dimension_of,
+    is_unit_row,
+    split_header,
+    standard_spelling,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -89,7 +97,7 @@ class Dialect:
         match = _NUMBER_PATTERNS[self.decimal].fullmatch(cell)
         if match is None or (match[2] and dimension_of(match[2]) is None):
             return None
-        return float(match[1].replace(",", ".").replace(" ", "")), spelt(match[2]) if match[2] else ""
+        return float(match[1].replace(",", ".").replace(" ", "")), standard_spelling(match[2]) if match[2] else ""
 
     def is_number(self, cell: str) -> bool:
         """Return whether a cell is a number in this dialect, perhaps with a unit."""
@@ -201,9 +209,9 @@ class LabTable:
             raise DataError(f"{place}: column {column.label} {what}; remove the line or correct it")
         value, unit = found
         if column.unit_column is not None:
-            unit = spelt(row[column.unit_column])
+            unit = standard_spelling(row[column.unit_column])
         if unit and unit != column.unit and (column.source != CELLS_SOURCE or not self._alike(unit, column)):
-            column.states(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
+            column.with_unit(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
         return float(in_si(np.array(value), column.dimension or "", unit or column.unit or ""))
 
     def _alike(self, unit: str, column: ColumnInfo) -> bool:
@@ -355,7 +363,7 @@ def _table(
     names, unit_row, header = _header(lines, shape, range(start, run[0]), run[0] + 1, name)
     rows = [shape.row(lines[index]) for index in run[:: max(len(run) // _N_SAMPLE_LINES, 1)]]
     beside = _unit_columns(rows, shape, names)
-    inside = {k: next(spelt(row[unit]) for row in rows if row[unit]) for k, unit in beside.items()}
+    inside = {k: next(standard_spelling(row[unit]) for row in rows if row[unit]) for k, unit in beside.items()}
     for k in shape.numeric:
         found = [number[1] for row in rows if (number := shape.dialect.number(row[k]))]
         inside |= {k: found[0]} if found and found[0] else {}

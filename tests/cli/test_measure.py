@@ -210,7 +210,7 @@ def test_a_hole_in_the_window_is_named_and_ends_with_6(cli):
     assert done.code == 6
     page = " ".join(done.out.split())
     assert "holes: not recorded: 30 ... 60 mm (up to 30 % of the window)" in page
-    assert "coverage on load 69.697 %" in page
+    assert "coverage on load 69.7 %" in page
     assert "force mean on load no value" in page
     document = json.loads((cli.folder / "out/metrics.json").read_text())
     assert (document["status"], document["metrics"]["force_mean"]["branches"]["load"]["value"]) == ("partial", None)

@@ -9,6 +9,7 @@ import pytest
 from experiment_support import lossy_loop, reference_case, rows, triangle
 
 import cfmkit
+from cfmkit.errors import UsageError
 from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measure_recording, numbers_of
 from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import Recording
@@ -200,3 +201,9 @@ def test_python_measures_files_and_arrays_alike(tmp_path):
             assert found.numbers.filtered[name].value == pytest.approx(value.value, rel=1e-9, abs=1e-12), name
     assert names(*one.warnings) == {"reversals"}
     assert one.data["metrics"]["force_mean"]["unit"] == "N"
+
+
+@pytest.mark.parametrize("window", [(0.09, 0.01), "90 mm:10 mm"])
+def test_a_window_that_does_not_increase_is_refused_as_text_and_as_numbers(window):
+    with pytest.raises(UsageError, match=r"--window: .* must be increasing"):
+        cfmkit.measure(lossy_loop(triangle(2), elastic=1.0), window=window)

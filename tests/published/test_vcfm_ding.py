@@ -246,15 +246,15 @@ def test_worked_designs_by_closed_forms_and_one_exact_pass(stem):
     _, closed, fitted = DESIGNS[stem]
     spec = cfmkit.load(CONFIGS / f"{stem}.yaml")
     sizes = closed_form(spec, spec.design)
-    leaf, side = sizes.leaf, sizes.side
-    mm = [leaf.thickness, leaf.length, leaf.width, side.length, side.width]
+    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
+    mm = [leaf.thickness, leaf.length, leaf.width, spring_leaf.length, spring_leaf.width]
     t2, l2, b2, l1, b1 = (value / MM for value in mm)
     found = (leaf.slenderness, t2, l2, np.degrees(leaf.angle), b2, l1, b1)
     digits = (5e-5, 5e-5, 5e-4, 5e-5, 5e-5, 5e-4, 5e-4)
     for value, wanted, digit in zip(found, closed, digits, strict=True):
         assert wanted is None or value == pytest.approx(wanted, abs=1.1 * digit)
     after, (stress, _) = fit_widths(spec, spec.design, sizes)
-    assert (after.leaf.width / MM, after.side.width / MM) == pytest.approx(fitted, rel=2e-4)
+    assert (after.leaf.width / MM, after.spring_leaf.width / MM) == pytest.approx(fitted, rel=2e-4)
     assert stress == pytest.approx(spec.mechanism.allowable_stress, rel=2e-3)
 
 

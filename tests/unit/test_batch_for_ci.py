@@ -16,6 +16,7 @@ from cfmkit.cli.main import main
 from cfmkit.documents.annotations import workflow_commands
 from cfmkit.documents.markdown import summary
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.metrics.compare import MetricChange
 from cfmkit.studies.batch_sources_and_outcomes import Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes
 
@@ -156,6 +157,13 @@ def test_a_specification_has_one_annotation_that_says_all_of_it():
     assert line.endswith("::force_ripple%0Adeviation")
 
 
+def test_an_annotation_of_many_changes_lists_eight_and_counts_the_others():
+    changed = [MetricChange("a.yaml", f"metric_{number}", 1.0, 2.0, "N", 1.0, True) for number in range(20)]
+    (line,) = workflow_commands([one()], nowhere, changed)
+    assert line.count("1 -> 2 N") == 8
+    assert line.endswith("%0A12 more values in changes.csv")
+
+
 def test_annotations_name_file_and_line_and_let_no_name_through(folder):
     broken = SPEC.replace("family: vcfm", "family: vcfm\nmechansim: 3")
     (folder / "a.yaml").write_text(broken)
@@ -260,7 +268,7 @@ def test_accepted_results_are_the_reference_that_the_next_batch_is_compared_with
     thicker = ["mechanism.positive.width=10.01 mm"]
     assert batch(compare="reference", changes=thicker).exit_code is ExitCode.REQUIREMENT_MISSED
     accepted = batch(compare="reference", changes=thicker, accept=True)
-    assert accepted.compared.beyond
+    assert accepted.compared.changes_beyond_tolerance
     assert accepted.exit_code is ExitCode.OK
     again = batch(compare="reference", changes=thicker)
     assert again.compared.changes == ()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.export.posed_part import PosedBody, clear_places, rectangle, swept
+from cfmkit.export.posed_part import PosedBody, rectangle, screw_positions, swept
 from cfmkit.families.cam.hardware import hardware as cam_hardware
 from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rod, link_width, screw_for
 from cfmkit.families.slider_crank.springs.hardware import hardware as crank_hardware
@@ -137,7 +137,7 @@ def test_screws_of_the_ground_are_reached_beside_what_moves():
     assert [row["count"] for row in table(result) if row["place"].startswith("ground")] == [3]
     assert min(covered.distance(Point(*at)) for at in places) > 2e-3
     ground = rectangle(0.0, 0.0, 0.1, 0.05)
-    corners = clear_places(ground, [PosedBody.line("far", "free", np.array([[1.0, 1.0]]), 0.01)], 0.005)
+    corners = screw_positions(ground, [PosedBody.line("far", "free", np.array([[1.0, 1.0]]), 0.01)], 0.005)
     assert sorted(map(tuple, np.round(corners, 6))) == [(0.005, 0.005), (0.005, 0.045), (0.095, 0.005), (0.095, 0.045)]
 
 

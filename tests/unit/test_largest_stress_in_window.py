@@ -32,7 +32,7 @@ SAMPLES = 400
     ],
 )
 def test_nothing_in_a_window_is_stressed_more(name: str, changes: list[str]) -> None:
-    law = solve(api.load(CONFIGS / name, changes)).everywhere
+    law = solve(api.load(CONFIGS / name, changes)).model_between_points
     assert law is not None
     assert not len(law.corners)
     for first, last in [(0.0, 1.0), (0.013, 0.31), (0.4, 0.77), (0.512, 0.513), (0.8, 1.0)]:

@@ -305,7 +305,7 @@ class TwoLimits:
         self.parts = SimpleNamespace(nominal=np.zeros(2), seed=0, draw=self.draw)
         self._fresh_errors = self.draw(redesign.N_CHECKED_PARTS, redesign.SEARCH_SEED + 1)
 
-    checked = redesign.PartNumbers.count_good_parts
+    count_good_parts = redesign.PartNumbers.count_good_parts
 
     @staticmethod
     def draw(count, seed):
@@ -346,7 +346,7 @@ def test_a_tolerance_that_no_design_meets_ends_with_4_and_names_it(few, tmp_path
 
 
 def test_a_tolerance_that_no_beam_design_meets_ends_with_4_and_names_it(monkeypatch):
-    for name, value in (("CHECKED", 40), ("ROUNDS", 1), ("LOWER", 0)):
+    for name, value in (("N_CHECKED_PARTS", 40), ("MAX_CHECK_ROUNDS", 1), ("N_LOWER_YIELDS", 0)):
         monkeypatch.setattr(redesign, name, value)
     spec = cfmkit.load(LAN)
     wide = {**spec.design.tolerances, "mechanism.nodes.n3.at.0": {"normal": "2 mm"}}
@@ -380,7 +380,7 @@ def with_three_springs(elongation):
 @pytest.mark.parametrize("elongation", ["158.5 mm", pytest.param("150 mm", marks=pytest.mark.slow)])
 def test_the_next_springs_of_a_catalogue_are_tried_where_the_best_ones_miss_the_yield(elongation, monkeypatch):
     """They need 169 mm for the stroke, the next best 183 mm, the third 158.1 mm."""
-    for name, value in (("CHECKED", 20), ("ROUNDS", 1), ("LOWER", 0)):
+    for name, value in (("N_CHECKED_PARTS", 20), ("MAX_CHECK_ROUNDS", 1), ("N_LOWER_YIELDS", 0)):
         monkeypatch.setattr(redesign, name, value)
     given = with_three_springs(elongation)
     others = cfmkit.design(given.replace({"design.yield": None})).next_best

@@ -14,7 +14,7 @@ from cfmkit.families.beam.model import solve
 from cfmkit.metrics import MeasuringFrame, Window, known_metrics, measure, validate_requirements
 from cfmkit.metrics.ranges_many import ManyBranches, band_range, range_95, range_95_fraction
 from cfmkit.metrics.spread import Spread, deviation_from_mean, half_band, ripple
-from cfmkit.results import Result, Status, round_off
+from cfmkit.results import Result, Status
 
 RELATIVE = (
     *("ripple", "half_band", "deviation_from_mean", "range_95", "range_95_fraction"),
@@ -94,10 +94,6 @@ def test_one_curve_and_many_agree_on_what_is_nothing():
     with np.errstate(all="ignore"):
         for metric in (range_95, range_95_fraction, lambda one: band_range(one, 0.01)):
             assert np.isnan(metric(rows)).tolist() == [True, False]
-
-
-def test_rounding_of_a_sum_counts_the_sizes_of_its_parts():
-    assert round_off(np.array([[4.0, 2.0], [-4.0, 1.0]])) == pytest.approx(8e-12)
 
 
 @pytest.mark.parametrize(("rate", "balance"), [(0.5, 0.0), (0.45, 1 / 9), (0.6, 1 / 6)])

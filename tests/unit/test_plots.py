@@ -19,7 +19,7 @@ from plot_support import axes, data_lines, loop_curve, result_of
 
 from cfmkit.families.base import Family
 from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, top_axis, value_text, write_heading
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import plot_curve
 from cfmkit.plots.figures import figures
 from cfmkit.plots.label_placement import Label, place_labels
@@ -43,15 +43,15 @@ ROOT = Path(__file__).parents[2]
 
 def test_drawing_leaves_the_settings_of_the_session_as_they_were():
     before = dict(matplotlib.rcParams)
-    png(loop_figure(result_of()))
+    png(curve_figure(result_of()))
     assert dict(matplotlib.rcParams) == before
 
 
 def test_settings_of_the_session_change_no_picture():
-    expected = png(loop_figure(result_of()))
+    expected = png(curve_figure(result_of()))
     odd = {"font.size": 20, "lines.linewidth": 9, "axes.facecolor": "red", "savefig.bbox": "tight", "axes.grid": False}
     with matplotlib.rc_context(odd):
-        assert png(loop_figure(result_of())) == expected
+        assert png(curve_figure(result_of())) == expected
 
 
 def test_settings_come_back_when_drawing_fails():
@@ -234,13 +234,13 @@ def test_a_name_with_dollar_signs_is_written_as_it_is():
 def test_letters_that_the_font_lacks_alarm_nobody():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert png(loop_figure(result_of(name="恒力机构")))
+        assert png(curve_figure(result_of(name="恒力机构")))
 
 
 def test_a_run_that_did_not_complete_says_so_above_the_picture():
-    figure = loop_figure(result_of(status=Status.PARTIAL, message="the cable ran out"))
+    figure = curve_figure(result_of(status=Status.PARTIAL, message="the cable ran out"))
     assert "partial: the cable ran out" in [text.get_text() for text in figure.texts]
-    assert len(loop_figure(result_of()).texts) == 1
+    assert len(curve_figure(result_of()).texts) == 1
 
 
 def test_the_second_axis_writes_each_value_where_it_belongs():

@@ -8,7 +8,7 @@ from plot_support import axes, band_boxes, flipped, loop_curve, result_of
 
 from cfmkit.curves import Curve
 from cfmkit.plots.bands_from_requirements import bands_of, limits_on
-from cfmkit.plots.curve_with_enlarged_band import choose_enlarged_range, loop_figure
+from cfmkit.plots.curve_with_enlarged_band import choose_enlarged_range, curve_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.style import BAND_GREEN, TROUBLE_RED
 from cfmkit.results import Quantity
@@ -96,7 +96,7 @@ def test_requirements_on_a_value_of_the_family_are_limits_in_its_diagram():
 
 def test_the_band_gets_a_panel_of_its_own_that_shows_all_of_it():
     result = result_of({"metric": "force_ripple", "max": "5 %", "over": (0.02, 0.1)})
-    upper, lower = loop_figure(result).axes
+    upper, lower = curve_figure(result).axes
     ((_, low, _, high),) = band_boxes(lower)
     assert upper.get_xlim() == pytest.approx(lower.get_xlim())
     assert lower.get_ylim()[0] < low < high < lower.get_ylim()[1]
@@ -109,7 +109,7 @@ def test_a_curve_that_shows_well_on_its_own_has_one_panel():
     curve = Curve(motion, 500 * motion, np.repeat("p", 50), np.ones(50, dtype=bool))
     result = result_of(curve=curve, target=None)
     assert choose_enlarged_range(result, CurveLook()) is None
-    assert len(loop_figure(result).axes) == 1
+    assert len(curve_figure(result).axes) == 1
 
 
 def test_rounding_errors_are_not_enlarged():

@@ -33,7 +33,7 @@ def analyze(one):
 def test_both_ways_differ_by_what_pins_and_guide_take(name, parts):
     """The forces follow from the balance of crank and coupler, what is lost from how fast they turn."""
     state = analyze(spec(name, **parts)).state
-    forth, back = state.ways
+    forth, back = state.friction_branches
     scale = np.abs(state.effort).max()
     for way, sign in ((forth, 1.0), (back, -1.0)):
         known = np.isfinite(way.effort)
@@ -47,7 +47,7 @@ def test_both_ways_differ_by_what_pins_and_guide_take(name, parts):
 def test_the_area_of_the_loop_is_shared_by_pins_and_guide(branch):
     found = analyze(spec("bilancia2019", pins=PINS, guide=GUIDE))
     window = found.spec.analysis.window
-    motion, (forth, back) = found.state.motion, found.state.ways
+    motion, (forth, back) = found.state.motion, found.state.friction_branches
     inside = np.isfinite(forth.effort) & (motion >= 0.001) & (motion <= 0.035)
     area = np.trapezoid((forth.effort - back.effort)[inside], motion[inside])
     assert window is not None
@@ -86,7 +86,7 @@ def test_a_mirrored_pair_has_twice_the_force_and_a_free_guide():
     np.testing.assert_allclose(pair.curve.force, 2.0 * one.curve.force, rtol=1e-12)
     assert one.values["guide_force_max"].value > 0 == pair.values["guide_force_max"].value
     rubs = analyze(spec("bilancia2019", copies="mirrored", guide={"friction": 0.3}))
-    np.testing.assert_allclose(rubs.state.ways[0].effort[0], pair.curve.force, rtol=1e-12)
+    np.testing.assert_allclose(rubs.state.friction_branches[0].effort[0], pair.curve.force, rtol=1e-12)
 
 
 def test_the_outline_of_a_mirrored_pair_holds_every_part_twice():
@@ -216,8 +216,8 @@ def test_where_the_guide_holds_the_slider_no_torque_moves_it_and_energy_is_kept_
     })  # fmt: skip
     state = analyze(given).state
     free = state.effort
-    for sign, one in zip((1.0, -1.0), state.ways, strict=True):
+    for sign, one in zip((1.0, -1.0), state.friction_branches, strict=True):
         moves = np.isfinite(one.effort)
         lost = sum(one.lost.values())[moves]
         np.testing.assert_allclose(sign * (one.effort - free)[moves], lost, atol=1e-9 * np.abs(one.effort[moves]).max())
-    assert not np.isfinite(state.ways[0].effort).all()
+    assert not np.isfinite(state.friction_branches[0].effort).all()

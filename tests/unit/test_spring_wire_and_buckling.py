@@ -16,7 +16,7 @@ from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.stock.springs.helical_spring_formulas import END_CONDITION, Wound, buckling_deflection
+from cfmkit.stock.springs.helical_spring_formulas import SEAT_FACTORS, HelicalSpring, buckling_deflection
 from cfmkit.stock.springs.made_to_measure import PIN_SHARE, extension_spring, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE, generic
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
@@ -161,11 +161,11 @@ def test_a_file_has_columns_for_material_and_guide(tmp_path):
         offers(DataSource("b.csv", tmp_path), "compression")
 
 
-@pytest.mark.parametrize("seats", END_CONDITION)
+@pytest.mark.parametrize("seats", SEAT_FACTORS)
 def test_a_slender_spring_buckles_like_a_soft_column(seats):
     """For L >> D the deflection goes to pi^2 D^2 E/(alpha^2 L (2G + E)) / 2: Euler's load of the spring as a bar."""
     young, shear = 206e9, 81.5e9
-    length, coil, alpha = 1.0, 2e-3, END_CONDITION[seats]
+    length, coil, alpha = 1.0, 2e-3, SEAT_FACTORS[seats]
     euler = 0.5 * math.pi**2 * coil**2 * young / (alpha**2 * length * (2 * shear + young))
     assert buckling_deflection(length, coil, seats) == pytest.approx(euler, rel=1e-3)
 
@@ -175,7 +175,7 @@ def test_buckling_is_the_formula_of_en_13906_1():
     g = 81.5 / 206
     for length, nu, seats in ((20.1e-3, 0.5, "fixed-fixed"), (30e-3, 1.0, "pivoted-pivoted")):
         root = math.sqrt(1 - (1 - g) / (0.5 + g) * (math.pi * 3e-3 / (nu * length)) ** 2)
-        spring = Wound("compression", 0.5e-3, 3e-3, 16.0)
+        spring = HelicalSpring("compression", 0.5e-3, 3e-3, 16.0)
         assert spring.buckling_deflection(length, seats) == pytest.approx(
             length * 0.5 / (1 - g) * (1 - root), rel=1e-12
         )
@@ -298,7 +298,7 @@ def test_a_design_takes_springs_that_stand_alone_before_those_that_need_a_rod(vc
 
 
 def test_a_torsion_spring_becomes_narrower_and_longer_as_its_wire_is_conserved():
-    spring = Wound("torsion", 1e-3, 10e-3, 5.0)
+    spring = HelicalSpring("torsion", 1e-3, 10e-3, 5.0)
     turned = math.radians(120)
     turns = 5.0 + 120 / 360
     mean = spring.inner_diameter_wound_up(turned) + spring.wire

@@ -19,7 +19,7 @@ from cfmkit.families.slider_crank.springs.bought_springs import best_sets
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.stock.springs.helical_spring_formulas import Wound
+from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
 
@@ -41,16 +41,16 @@ def test_the_rate_of_a_coil_is_the_twist_of_a_long_straight_wire():
     """Castigliano: the wire of length pi D n carries the torque F D/2, or the bending moment M."""
     d, mean, n, shear, young = 1e-3, 10e-3, 25.0, 72e9, 190e9
     length, polar, plane = math.pi * mean * n, math.pi * d**4 / 32, math.pi * d**4 / 64
-    pulled, wound = (Wound(kind, d, mean, n, shear, young) for kind in ("extension", "torsion"))
+    pulled, wound = (HelicalSpring(kind, d, mean, n, shear, young) for kind in ("extension", "torsion"))
     assert pulled.rate == pytest.approx(shear * polar / (length * (mean / 2) ** 2), rel=1e-12)
     assert wound.rate == pytest.approx(young * plane / length, rel=1e-12)
 
 
 def test_far_from_its_axis_a_coil_is_stressed_as_a_straight_wire():
     wire = 1e-3
-    far = Wound("compression", wire, 1000 * wire, 5.0)
+    far = HelicalSpring("compression", wire, 1000 * wire, 5.0)
     assert far.stress(1.0) == pytest.approx(16 * 0.5 * far.coil / (math.pi * wire**3), rel=2e-3)
-    bent = Wound("torsion", wire, 1000 * wire, 5.0)
+    bent = HelicalSpring("torsion", wire, 1000 * wire, 5.0)
     assert bent.stress(1.0) == pytest.approx(32 / (math.pi * wire**3), rel=2e-3)
     assert far.stress(far.rate * far.deflection_at(300e6)) == pytest.approx(300e6, rel=1e-12)
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import (
     Animate,
-    Computing,
-    Measuring,
+    ComputeOptions,
+    MeasurementOptions,
     Overlay,
     WithReport,
     data_record,
     flag,
-    measuring_words,
+    given_measurement_options,
     option,
     read_measured,
     refuse_without_data,
@@ -39,7 +39,7 @@ HELP_EXAMPLE = "cfmkit analyze cam.yaml --set mechanism.rolling_friction=0.004 -
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnalyzeOptions(Computing, Measuring):
+class AnalyzeOptions(ComputeOptions, MeasurementOptions):
     """Arguments and options."""
 
     report: WithReport = False
@@ -62,7 +62,7 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Document:
     work, inputs = run_analysis, {}
     words: tuple[str, ...] = ()
     if options.data is not None:
-        inputs, words = data_record(options.data), ("--data", options.data, *chain(*measuring_words(options)))
+        inputs, words = data_record(options.data), ("--data", options.data, *chain(*given_measurement_options(options)))
         work = partial(compute_beside, read_measured(options.data, options))
     else:
         refuse_without_data(options)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cfmkit.cli.options import (
-    Changing,
     Fidelity,
     FigureChoice,
     Fresh,
@@ -14,6 +13,7 @@ from cfmkit.cli.options import (
     NoLock,
     Quiet,
     Seed,
+    SpecOptions,
     Timeout,
     WithReport,
     argument,
@@ -36,7 +36,7 @@ HELP_EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
 
 
 @dataclass(frozen=True, kw_only=True)
-class BatchOptions(Changing, FigureChoice):
+class BatchOptions(SpecOptions, FigureChoice):
     """Arguments and options."""
 
     specs: Annotated[

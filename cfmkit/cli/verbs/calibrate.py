@@ -8,12 +8,12 @@ from itertools import chain
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import (
-    Computing,
-    Measuring,
+    ComputeOptions,
+    MeasurementOptions,
     WithReport,
     argument,
     data_record,
-    measuring_words,
+    given_measurement_options,
     option,
     read_measured,
 )
@@ -32,7 +32,7 @@ HELP_EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_frict
 
 
 @dataclass(frozen=True, kw_only=True)
-class CalibrateOptions(Computing, Measuring):
+class CalibrateOptions(ComputeOptions, MeasurementOptions):
     """Arguments and options."""
 
     data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.")]
@@ -69,7 +69,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Document:
     source = read_measured(options.data, options)
     bounds = [("--bounds", text) for text in options.bounds or ()]
     loss = [] if options.loss == CalibrateOptions.loss else [("--loss", options.loss)]
-    words = (options.data, "--fit", options.fit, *chain(*bounds, *loss, *measuring_words(options)))
+    words = (options.data, "--fit", options.fit, *chain(*bounds, *loss, *given_measurement_options(options)))
     verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.failures import answer_to
-from cfmkit.cli.options import Changing, Quiet, argument
+from cfmkit.cli.options import Quiet, SpecOptions, argument
 from cfmkit.documents.document import BAD_TONE, GOOD_TONE, Document, Span, format_bounds, whole_line
 from cfmkit.errors import CfmError, ExitCode, visible
 
@@ -23,7 +23,7 @@ HELP_EXAMPLE = "cfmkit check specs/"
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckOptions(Changing):
+class CheckOptions(SpecOptions):
     """Arguments and options."""
 
     specs: Annotated[

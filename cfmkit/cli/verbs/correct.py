@@ -8,12 +8,12 @@ from itertools import chain
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import (
-    Computing,
-    Measuring,
+    ComputeOptions,
+    MeasurementOptions,
     WithReport,
     argument,
     data_record,
-    measuring_words,
+    given_measurement_options,
     option,
     read_measured,
 )
@@ -27,7 +27,7 @@ HELP_EXAMPLE = "cfmkit correct design.yaml loop.csv --tare start"
 
 
 @dataclass(frozen=True, kw_only=True)
-class CorrectOptions(Computing, Measuring):
+class CorrectOptions(ComputeOptions, MeasurementOptions):
     """Arguments and options."""
 
     data: Annotated[str, argument("DATA.csv", "The measured curve of the part, as for `measure`.")]
@@ -54,7 +54,7 @@ def run(options: CorrectOptions, terminal: Terminal) -> Document:
         raise UsageError("--fit is empty; name one or more values, e.g. --fit mechanism.material.youngs_modulus")
     source = read_measured(options.data, options)
     fit = [] if options.fit is None else ["--fit", options.fit]
-    words = (options.data, *fit, *chain(*measuring_words(options)))
+    words = (options.data, *fit, *chain(*given_measurement_options(options)))
     compute = partial(report_on_corrected, source, options.fit, options.tare is not None)
     verb = Verb("correct", "corrected", compute, data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, Overlay, WithReport, option, seconds
+from cfmkit.cli.options import Animate, ComputeOptions, Fresh, Jobs, Overlay, WithReport, option, seconds
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -21,7 +21,7 @@ HELP_EXAMPLE = "cfmkit design cam.yaml --set design.force='80 N'"
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignOptions(Computing):
+class DesignOptions(ComputeOptions):
     """Arguments and options."""
 
     report: WithReport = False

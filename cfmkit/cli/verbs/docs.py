@@ -1,11 +1,11 @@
-"""``cfmkit docs``: the documentation that comes with the package."""
+"""``cfmkit docs``: list the documentation pages shipped with the package, print one, or search their sections."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.guide import look_for, page, pages, search
+from cfmkit.cli.guide import page, pages, search, words_for_synonym
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.documents.document import Document, Paragraph, Verbatim, field, record_table
 from cfmkit.errors import UsageError, visible
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 HELP_POSITION = 62
 HELP_EXAMPLE = "cfmkit docs --search creep"
 MAX_SECTIONS = 12
-"""On the page of a search."""
+"""Most sections that a search prints; ``--json`` has all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,11 +60,11 @@ def _search(word: str) -> Document:
         If there is none.
     """
     if not (sections := search(word) if word.strip() else []):
-        raise UsageError(f"no page names {visible(word)!r}; `cfmkit docs` lists all pages")
+        raise UsageError(f"no section names {visible(word)!r}; `cfmkit docs` lists all pages")
     records = [{"page": section.page, "section": section.heading, "line": section.line} for section in sections]
 
     def blocks() -> Iterator[Block]:
-        if targets := look_for(word):
+        if targets := words_for_synonym(word):
             yield Paragraph("see", ", ".join(targets))
         columns = (field("page"), field("section", wraps=True), field("line", "", wraps=True))
         yield from record_table("", records[:MAX_SECTIONS], columns)
@@ -72,4 +72,4 @@ def _search(word: str) -> Document:
             yield Paragraph("more", f"{more} sections; --json has all")
         yield Paragraph("read", f"`cfmkit docs {records[0]['page']}` prints a page")
 
-    return Document({"search": word, "look_for": [*look_for(word)], "sections": records}, blocks())
+    return Document({"search": word, "look_for": [*words_for_synonym(word)], "sections": records}, blocks())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.failures import Stopped, report_failure
-from cfmkit.cli.options import Changing, argument, flag, option
+from cfmkit.cli.options import SpecOptions, argument, flag, option
 from cfmkit.documents.document import Document, line, whole_line
 from cfmkit.store.safe_disk_changes import reason
 
@@ -20,7 +20,7 @@ HELP_EXAMPLE = "cfmkit explore cam.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExploreOptions(Changing):
+class ExploreOptions(SpecOptions):
     """Arguments and options."""
 
     spec: Annotated[str, argument("SPEC", "YAML file of one mechanism.")]

@@ -45,7 +45,7 @@ class ExportOptions(OneSpec):
 
 
 def run(options: ExportOptions, terminal: Terminal) -> Document:
-    """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
+    """Write the parts of a spec as files to cut or print, finite-element decks, or a dimensioned drawing."""
     from cfmkit.cli.run_spec_and_print_page import folder_of
     from cfmkit.documents.run_document import warning_of
     from cfmkit.runs.exported_files import export_files
@@ -56,8 +56,8 @@ def run(options: ExportOptions, terminal: Terminal) -> Document:
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
-        drawn, drawing, failed = export_files(spec, options.kerf, options.tolerance, options.format)
-        for name, data in drawn.items():
+        files, drawing, failed = export_files(spec, options.kerf, options.tolerance, options.format)
+        for name, data in files.items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal.arguments)
         code = ExitCode.PARTIAL if failed else ExitCode.OK

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
+from cfmkit.cli.options import FigureChoice, MeasurementOptions, NoLock, Quiet, argument, data_record, flag, option
 from cfmkit.documents.document import Document, GridColumn, Note, PageTable, Written
 from cfmkit.errors import ExitCode
 
@@ -21,7 +21,7 @@ HELP_EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasureOptions(Measuring, FigureChoice):
+class MeasureOptions(MeasurementOptions, FigureChoice):
     """Arguments and options."""
 
     data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, optionally time.")]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
+from cfmkit.cli.options import StudyOptions, Tables, WithReport, flag, option
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.specs.sensitivity_methods import MethodWord, describe_methods, describe_samples
 
@@ -28,7 +28,7 @@ HELP_EXAMPLE = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class SensitivityOptions(Studying):
+class SensitivityOptions(StudyOptions):
     """Arguments and options."""
 
     report: WithReport = False

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
+from cfmkit.cli.options import StudyOptions, Tables, WithReport, flag, option
 from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
 from cfmkit.numerics.unit_cube_samples import SAMPLE_KINDS, list_phrases
 
@@ -28,7 +28,7 @@ HELP_EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
 
 
 @dataclass(frozen=True, kw_only=True)
-class SweepOptions(Studying):
+class SweepOptions(StudyOptions):
     """Arguments and options."""
 
     report: WithReport = False

@@ -1,7 +1,16 @@
-"""Equations of a network with contacts: those of the network without them, bordered by the forces of contacts.
+"""Equilibrium equations of a network of beams with contacts, for Newton's method and for the path-following solver.
 
-Where `ContactAt.closed` is None a contact is closed or open as its force and gap say at each of Newton's steps [HIK]:
-an equilibrium near a guess is found whatever its contacts do. The follower sets it, so that it sees one smooth path.
+They are the equations of the network without contacts (`ContactEquations.plain`), with the force of each contact as a
+further unknown and its gap as a further equation. A discretised network and values of its unknowns go in; gradient and
+Hessian of its energy, linearised equations and equilibria come out.
+
+If `ContactAt.closed` is None, a contact is taken as closed or open by its force and gap at each of Newton's steps
+[HIK]: so an equilibrium near a guess is found whatever its contacts do. The path-following solver sets it to True or
+False, so that the path that it follows is smooth.
+
+Reference
+---------
+[HIK] M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2003) 865: an active set as Newton's method.
 """
 
 from __future__ import annotations

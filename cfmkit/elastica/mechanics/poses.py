@@ -1,4 +1,15 @@
-"""Places of the attachments of a network: X = origin + R(frame) (x, y) + R(rotation) arm."""
+"""Positions of the attachments of a network of beams, from the values of its unknowns, with their derivatives.
+
+A body is a node and what rigid links fix to it. An attachment is a point of a body at which a beam ends or a spring, a
+load or a contact acts. Its position is
+
+    X = origin + R(frame) (x, y) + R(rotation) arm,
+
+where x, y and rotation are the body's unknowns: its displacement in axes of its own, and its turn. `origin` is the
+body's node at rest, `frame` the cosine and sine of the angle of its axes, `arm` leads from that node to the attachment
+at rest. R turns by an angle; the unit of length is that of `Discretisation.scales`. Energies, loads and contacts
+(`energy`, `terms`, `cfmkit.elastica.contact`) are computed from these positions.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +24,16 @@ if TYPE_CHECKING:
 
 
 class AttachmentPoses(NamedTuple):
-    """Places of k attachments and what moves them; d2X/drotation2 = -arm."""
+    """Positions of k attachments with what their derivatives need; the second one by the rotation is -arm."""
 
-    place: Any  # (..., k, 2)
-    arm: Any  # (..., k, 2) turned
-    frame: Any  # (..., k, 2)
-    unknowns: Any  # (k, 4)
+    place: Any  # (..., k, 2) position X
+    arm: Any  # (..., k, 2) from the body's node, turned with the body
+    frame: Any  # (k, 2) cosine and sine of the angle of the body's axes
+    unknowns: Any  # (k, 4) numbers of x, y, rotation of the body, and of the attachment's own rotation
 
     @property
     def jacobian(self) -> Any:
-        """Derivatives of the places by x, y and rotation, (..., k, 2, 3)."""
+        """Derivatives of the positions by x, y and rotation, (..., k, 2, 3)."""
         cos, sin = self.frame[..., 0], self.frame[..., 1]
         jacobian = np.empty((*self.place.shape, 3), np.result_type(self.arm, cos))
         jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 0, 2] = cos, -sin, -self.arm[..., 1]
@@ -30,14 +41,14 @@ class AttachmentPoses(NamedTuple):
         return jacobian
 
     def works(self, force: Any) -> Any:
-        """Return the works of forces (..., k, 2) per unit of x, y and rotation, (..., k, 3)."""
+        """Return the generalised forces along x, y and rotation, (..., k, 3), of forces there (..., k, 2)."""
         fx, fy = force[..., 0], force[..., 1]
         cos, sin = self.frame[..., 0], self.frame[..., 1]
         return stack([fx * cos + fy * sin, fy * cos - fx * sin, fy * self.arm[..., 0] - fx * self.arm[..., 1]])
 
 
 def poses(attachments: Attachments, z: Any, which: Any) -> AttachmentPoses:
-    """Return the poses of attachments at the values of all unknowns, (size,) or of several states (n, size)."""
+    """Return the poses of the attachments `which`, at values of all unknowns: (size,), or (n, size) for n states."""
     unknowns, frame = attachments.unknowns[which], attachments.frame[which]
     cos, sin = frame[:, 0], frame[:, 1]
     x, y, turn = z[..., unknowns[:, 0]], z[..., unknowns[:, 1]], z[..., unknowns[:, 2]]

@@ -1,4 +1,7 @@
-"""The node that a drive by a motion moves, and along which of its axes."""
+"""Search for the node that a prescribed displacement or rotation moves, and for which of its motions that is.
+
+A drive that cannot be applied, because its node is held or moved by a link, is an error of the user.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,12 @@ if TYPE_CHECKING:
 
 
 def find_driven_node(network: Network, drive: Drive) -> tuple[str, int, float] | None:
-    """Return node, local degree of freedom and sense of what a drive moves; None for loads.
+    """Return node, number of its motion and sign of what a drive moves; None if the drive prescribes loads.
 
-    The local number is 0, 1 or 2 in the frame of the node's support, or 3 where the frame turns along the drive.
+    The number is 0 or 1 for the motion along or across the direction of the node's support, and 2 for its rotation. It
+    is 3 if the support holds neither of the first two: its frame is then turned so that its x axis is along the drive.
+    The sign is 1 or -1: a drive may lead against the direction that the support leaves free. Directions may be complex
+    (derivatives are taken by complex steps); their real parts decide.
 
     Raises
     ------

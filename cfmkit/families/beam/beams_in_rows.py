@@ -58,7 +58,7 @@ class BeamRows:
 
     @cached_property
     def _laws(self) -> list[BetweenPoints]:
-        return [law for one in self.each if (law := one.everywhere) is not None]
+        return [law for one in self.each if (law := one.model_between_points) is not None]
 
     @cached_property
     def branches(self) -> Mapping[str, CurveRows]:
@@ -117,7 +117,7 @@ def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]
             solution = solve(specs[index])
         except CfmError:  # its own analysis says what is wrong with it
             continue
-        path, law = solution.path, solution.everywhere
+        path, law = solution.path, solution.model_between_points
         quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
         if quiet and law is not None and solution.accurate.all():
             found[index] = solution
@@ -127,7 +127,7 @@ def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]
 def _may_go_straight_on(spec: BeamSpec) -> bool:
     """Return False for what is no curve over an increasing motion, or more than that; with contacts it has corners."""
     analysis, by_motion = spec.analysis, spec.mechanism.drive.by_motion
-    if spec.mechanism.stops or spec.mechanism.obstacles:
+    if spec.mechanism.has_contacts:
         return False
     plain = analysis.surface is None and getattr(spec, "target_curve", None) is None and not analysis.through_folds
     return plain and by_motion and spec.fidelity != "solid" and spec.extent > 0 and not analysis.imperfection

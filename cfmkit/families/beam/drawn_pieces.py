@@ -1,7 +1,9 @@
-"""Pieces of the part of a beam mechanism: strips, what closes them at nodes, and the blocks at their ends.
+"""Outline pieces of the part of a flat beam mechanism, for export and meshing: strips, joints at nodes, blocks at ends.
 
-One rule: the part is the union of the strips as specified. Where beams meet, the smallest piece closes them that leaves
-the section as thick as the beams; pads, bars and arms lie behind all beams that end at them.
+The network of beams and its strips go in; polygons and discs to unite, and holes to cut, come out. The part is the
+union of the strips as specified. Where beams meet, the gap between them is closed by the smallest piece that leaves the
+section as thick as the beams. Pads at clamps, eyes at pins, arms to nodes and bars along links lie behind all beams
+that end at them.
 """
 
 from __future__ import annotations
@@ -32,13 +34,13 @@ EYE_RADIUS, HOLE_RADIUS = 2.5, 1.2
 """Radii of the eye and of the hole at a pinned support, in thicknesses."""
 
 STANDING_DISTANCE = 1e-4
-"""A beam that ends nearer to its node than this stands on it, in thicknesses, as places do that differ by rounding."""
+"""A beam whose end is nearer to its node than this ends at it [thicknesses]: the two then differ by rounding only."""
 
 CONTINUATION_ANGLE = 1e-6
 """A beam that turns by less than this continues another one [rad]."""
 
 MIN_PAD_SHARE = 0.1
-"""Pads of which less than this share is behind all beams are none."""
+"""A pad is left out if less than this share of it lies behind all beams that end there."""
 
 SQUARE_SINE = 0.1
 """Sine of the angle between a beam and a section at a bend below which the section is that across the beam."""
@@ -103,7 +105,7 @@ def both_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[s
     return {**beams, **{f"{name}'": [strip.mirror(*axis) for strip in strips] for name, strips in beams.items()}}
 
 
-def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float) -> DrawnParts:
+def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], max_deviation: float) -> DrawnParts:
     """Return strips, what closes them where they meet, and the blocks at their ends.
 
     Nothing else is added: pieces that continue each other share their end, however thick each is there.
@@ -111,15 +113,15 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: fl
     halves, axis = both_halves(assembly, beams), mirror_axis(assembly)
     pieces = [strip.piece for strips in halves.values() for strip in strips]
     for name, strips in halves.items():
-        for first, two in itertools.pairwise(strips):
-            pieces += _close_ends([BeamEnd(name, first, True), BeamEnd(name, two, False)])
+        for first, second in itertools.pairwise(strips):
+            pieces += _close_ends([BeamEnd(name, first, True), BeamEnd(name, second, False)])
     for ends in meeting_ends(assembly, halves).values():
         pieces += _close_ends(ends)
     blocks = list(_blocks(assembly, beams))
     solid = [block.shape for block in blocks]
     eyes = [end for node, ends in meeting_ends(assembly, halves).items() if _is_pinned(assembly, node) for end in ends]
     blocks += [
-        DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE_RADIUS * end.thickness, bulge))
+        DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE_RADIUS * end.thickness, max_deviation))
         for node, ends in meeting_ends(assembly, beams).items()
         if _is_pinned(assembly, node)
         for end in ends
@@ -206,8 +208,8 @@ def is_padded(assembly: Assembly, node: str) -> bool:
 
 def moves(assembly: Assembly, node: str) -> bool:
     """Return True if a pad at a node moves: it is driven, guided or linked."""
-    about = assembly.network.nodes[node].support
-    return node in moving_nodes(assembly) or not (about.along and about.across and about.rotation)
+    support = assembly.network.nodes[node].support
+    return node in moving_nodes(assembly) or not (support.along and support.across and support.rotation)
 
 
 def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
@@ -260,9 +262,9 @@ def section_at_bend(ends: Sequence[BeamEnd], direction: float, fillet: float) ->
     return np.array([ends[0].at + reach[0] * line, ends[0].at - reach[1] * line])
 
 
-def disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
-    """Return a polygon whose sides are no farther than `bulge` [m] within the circle."""
-    step = 2.0 * math.acos(max(1.0 - bulge / radius, 0.0))
+def disc(center: FloatArray, radius: float, max_deviation: float) -> FloatArray:
+    """Return a polygon whose sides are no farther than `max_deviation` [m] within the circle."""
+    step = 2.0 * math.acos(max(1.0 - max_deviation / radius, 0.0))
     turn = np.linspace(0.0, 2 * math.pi, max(_N_CIRCLE_CORNERS, math.ceil(2 * math.pi / step)), endpoint=False)
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
@@ -330,7 +332,7 @@ def bars_between_halves(
         mirrored = mirror_points(middle[None], at, direction)[0]
         if np.hypot(*(mirrored - middle)) > 0:
             images = ends_at(assembly, halves, f"{node}'")
-            bars[node] = _bar(middle, mirrored, _shuttle(assembly) or PAD_DEPTH * thick, [*ends, *images])
+            bars[node] = _bar(middle, mirrored, _shuttle_depth(assembly) or PAD_DEPTH * thick, [*ends, *images])
     return bars
 
 
@@ -341,6 +343,6 @@ def _far_side(pad: FloatArray, end: BeamEnd) -> FloatArray:
     return middle
 
 
-def _shuttle(assembly: Assembly) -> float | None:
+def _shuttle_depth(assembly: Assembly) -> float | None:
     part = assembly.spec.mechanism.part
     return part.frame.shuttle if part is not None and part.frame is not None else None

@@ -52,7 +52,7 @@ def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: t
     window : (float, float)
         [m or rad].
     """
-    path, law, winding = solution.path, solution.everywhere, solution.winding
+    path, law, winding = solution.path, solution.model_between_points, solution.winding
     points = replace(solution, keep=np.arange(len(path)), ends=())
     rows, reached = observe(path), points.motion
     ask: Callable[[FloatArray], Path]

@@ -24,9 +24,9 @@ from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
+from cfmkit.families.beam.constant_force_range_and_extremes import travel_of
 from cfmkit.families.beam.contact_spec import rubs
-from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_sides_in_obstacles
-from cfmkit.families.beam.curve_along_its_motion import travel_of
+from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_overlap_at_rest
 from cfmkit.families.beam.findings import findings_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
@@ -36,7 +36,7 @@ from cfmkit.families.beam.scalar_results import SCALAR_QUANTITIES, natural, targ
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.there_and_back import both_ways, join_ways, part_ways
-from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
+from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.rows import values_of_one
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 from cfmkit.results import Result, Status
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
     from cfmkit.families.beam.requested_node_columns import LazyColumns
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.families.beam.tip_on_uneven_surface import Ride
+    from cfmkit.families.beam.tip_on_uneven_surface import SurfaceResult
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
 
@@ -73,7 +73,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
         message = f"no curve: {ending_of(solution).message}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=tuple(findings_of(solution)))
     status, message = _ending(solution)
-    values, along = values_of_one(SCALAR_QUANTITIES, solution) | contact_values(solution), ride(solution)
+    values, along = values_of_one(SCALAR_QUANTITIES, solution) | contact_values(solution), follow_surface(solution)
     curves: tuple[Curve, ...] = (_curve(solution),)
     if along is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()
@@ -91,7 +91,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
-        closed=solution.everywhere if solution.back is None else both_ways(solution),
+        closed=solution.model_between_points if solution.back is None else both_ways(solution),
         winding=solution.winding,
         ends=_ends(solution),
         effort_error=solution.effort_error,
@@ -100,7 +100,7 @@ def analyze(spec: BeamSpec, _run: Run) -> Result:
     )
 
 
-def _findings(solution: Solution, along: Ride | None) -> Iterator[Finding]:
+def _findings(solution: Solution, along: SurfaceResult | None) -> Iterator[Finding]:
     yield from findings_of(solution)
     if along is not None:
         yield from findings_along(along)
@@ -111,7 +111,7 @@ def solve(spec: BeamSpec) -> Solution:
     assembly = assemble(spec)
     _refuse_tight_coils(assembly)
     _refuse_torn_beams(assembly)
-    refuse_sides_in_obstacles(assembly)
+    refuse_overlap_at_rest(assembly)
     if not rubs(spec.mechanism):
         path = trace(assembly.network, assembly.drive(), assembly.control())
         return Solution(assembly, path, *_keep_points(assembly, path))

@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
-from cfmkit.families.beam.curve_along_its_motion import AlongMotion
+from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.network_from_spec import (
@@ -25,7 +25,6 @@ from cfmkit.families.beam.network_from_spec import (
     is_on_axis,
     mirror_axis,
     resolve,
-    thinnest_of,
 )
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing
@@ -33,7 +32,7 @@ from cfmkit.families.beam.part import drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import EXTREME_METRICS, RANGE_METRICS, SCALAR_DEFINITIONS, number_of, target_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points
-from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
+from cfmkit.families.beam.tip_on_uneven_surface import N_PLACES, curve_of, findings_along, follow_surface, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
@@ -119,7 +118,7 @@ class SolidSolution(ShortRepr):
     @property
     def densely(self) -> SolidSolution:
         """The same at many points: what is found along a surface does not depend on how many rows a curve has."""
-        return replace(self, motion=read_only(np.linspace(0.0, self.motion[-1], LOOKED_AT)))
+        return replace(self, motion=read_only(np.linspace(0.0, self.motion[-1], N_PLACES)))
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
@@ -136,7 +135,7 @@ class SolidSolution(ShortRepr):
         return self.error.force * float(np.abs(self.effort).max())
 
     @property
-    def everywhere(self) -> None:
+    def model_between_points(self) -> None:
         """Nothing: a pose between two of these takes seconds."""
 
     @property
@@ -200,7 +199,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     curves: tuple[Curve, ...] = (_curve(solution),)
     values, warnings = _values(solution), tuple(_findings(solution))
     status = Status.PARTIAL if message else Status.COMPLETE
-    if (along := ride(solution.densely)) is not None:
+    if (along := follow_surface(solution.densely)) is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()
         values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
         if along.missing and status is Status.COMPLETE:
@@ -322,7 +321,7 @@ def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
 
 
 def _thinnest(assembly: Assembly) -> float:
-    return min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+    return min(beam.section.thinnest for beam in assembly.network.beams.values())
 
 
 def _stops(spec: BeamSpec) -> list[float]:

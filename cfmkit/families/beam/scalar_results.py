@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.curve_along_its_motion import window_of
+from cfmkit.families.beam.constant_force_range_and_extremes import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import DEFINITIONS as OF_CONTACTS
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
     from cfmkit.elastica.model.beam import Fit
-    from cfmkit.families.beam.curve_along_its_motion import AlongMotion, OnCurve
+    from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion, SolvedMechanism
     from cfmkit.families.beam.solution import Solution
 
 
-def find_in_window(solution: OnCurve, low: float, high: float) -> Any:
+def find_in_window(solution: SolvedMechanism, low: float, high: float) -> Any:
     """Return which accurate points of the curve are in a window."""
     x = solution.motion
     slack = 1e-12 * float(np.abs(x).max())
     return (x >= low - slack) & (x <= high + slack) & solution.accurate
 
 
-def force_at_end(solution: OnCurve) -> float | None:
+def force_at_end(solution: SolvedMechanism) -> float | None:
     """Return the force at the end of the window [N]; None on a curve that turns back or ends before it."""
     if not len(solution.motion) or not (along := solution.along).reaches_end:
         return None
-    return along.back(value_at(along.motion, along.effort, along.end))
+    return along.to_spec_sign(value_at(along.motion, along.effort, along.end))
 
 
-def target_of(solution: OnCurve) -> float | None:
+def target_of(solution: SolvedMechanism) -> float | None:
     """Return the force that `design.rescale` asks for [N], of the sign that the force at the end of the window has."""
     design = solution.spec.design
     if design is None or design.rescale is None or design.rescale.force is None:
@@ -80,24 +80,24 @@ def _significant(values: FloatArray, error: float) -> float:
 # --- along the motion -----------------------------------------------------------------------------------------------
 
 
-def _reading_along(read: Callable[[AlongMotion], float], place: bool = True) -> Callable[[OnCurve], float]:
+def _reading_along(read: Callable[[AlongMotion], float], place: bool = True) -> Callable[[SolvedMechanism], float]:
     """Return what reads a place or a force of the range that ends at d; drives by a displacement alone have it."""
 
-    def function(solution: OnCurve) -> float:
+    def function(solution: SolvedMechanism) -> float:
         if not solution.spec.mechanism.drive.is_displacement:
             return math.nan
         value = read(solution.along)
-        return solution.along.back(value) if place else value
+        return solution.along.to_spec_sign(value) if place else value
 
     return function
 
 
-def _turning(read: Callable[[AlongMotion], float]) -> Callable[[OnCurve], float]:
+def _turning(read: Callable[[AlongMotion], float]) -> Callable[[SolvedMechanism], float]:
     """Return what reads an extreme; none of drives that turn."""
-    return lambda solution: math.nan if _turns(solution) else solution.along.back(read(solution.along))
+    return lambda solution: math.nan if _turns(solution) else solution.along.to_spec_sign(read(solution.along))
 
 
-def _turns(solution: OnCurve) -> bool:
+def _turns(solution: SolvedMechanism) -> bool:
     return solution.spec.mechanism.drive.turns
 
 
@@ -177,7 +177,7 @@ def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window:
 
     Such is the stiffness across the drive of a node that is guided, where the part buckles under its guide.
     """
-    law = solution.everywhere
+    law = solution.model_between_points
     if law is None or not solution.spec.mechanism.drive.is_displacement:
         return False
     for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
@@ -236,7 +236,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "nominal_force": _quantity(
         "force",
         "F_d: force at d, the end of the window or of the travel [Lan, sec. 2]",
-        _reading_along(lambda a: a.nominal),
+        _reading_along(lambda a: a.force_at_end),
     ),
     "range_start": _quantity(
         "length", "c: where the force first reaches 0.95 F_d [Lan, sec. 2]", _reading_along(lambda a: a.start)
@@ -391,7 +391,7 @@ RANGE_METRICS = tuple(SCALAR_QUANTITIES)[: tuple(SCALAR_QUANTITIES).index("allow
 """Those that the curve of any model has."""
 
 
-def number_of(name: str, solution: OnCurve) -> float | None:
+def number_of(name: str, solution: SolvedMechanism) -> float | None:
     """Return a scalar result that the curve has [SI]; None if there is none."""
     value = SCALAR_QUANTITIES[name].function(solution)  # type: ignore[arg-type]
     return float(value) if np.isfinite(value) else None

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
+from cfmkit.elastica.model.contact import NodeOnBeam
 from cfmkit.elastica.results.between_loads import interpolate_loads
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.elastica.results.folding_path_between_points import interpolate_folding_path
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
-from cfmkit.families.beam.curve_along_its_motion import AlongMotion
+from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirror_points, smallest_gap
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica import Path
+    from cfmkit.elastica import Network, Path
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
     from cfmkit.elastica.vibration import Frequencies
@@ -75,7 +76,7 @@ class Solution(ShortRepr):
         return "angle" if self.spec.mechanism.drive.turns else "length"
 
     @cached_property
-    def everywhere(self) -> BetweenPoints | None:
+    def model_between_points(self) -> BetweenPoints | None:
         """The equilibria between the points of the path; None of paths whose motion turns back."""
         drive, axial = self.spec.mechanism.drive, self.spec.stress == "total"
         unit, allowed = self.assembly.effort_unit, self.assembly.allowable_stress
@@ -92,7 +93,7 @@ class Solution(ShortRepr):
     @cached_property
     def winding(self) -> AlongTheWay | None:
         """The equilibria at every place of the way of a path whose motion turns back."""
-        if self.everywhere is not None:
+        if self.model_between_points is not None:
             return None
         return interpolate_folding_path(self.path, lambda path: replace(self, path=path, keep=np.arange(len(path))))
 
@@ -120,7 +121,7 @@ class Solution(ShortRepr):
 
         Where the path turns back, between its points, and of several states at one place the largest.
         """
-        if self.everywhere is not None:
+        if self.model_between_points is not None:
             return self._part_efforts_at(np.ravel(places)).reshape(np.shape(places))
         motion, efforts = self.with_ends.motion, self.with_ends.largest_member_efforts
         low, high = np.minimum(motion[1:], motion[:-1]), np.maximum(motion[1:], motion[:-1])
@@ -130,9 +131,9 @@ class Solution(ShortRepr):
         return np.asarray(np.where((at >= low) & (at <= high), between, 0.0).max(axis=1))
 
     def _part_efforts_at(self, places: FloatArray) -> FloatArray:
-        assert self.everywhere is not None
+        assert self.model_between_points is not None
         found, near = self._solved_part_efforts(places), AT_CORNER * float(np.ptp(self.motion))
-        for corner, *sides in self.everywhere.beside_corners[:, [1, 0, 2]].tolist():
+        for corner, *sides in self.model_between_points.beside_corners[:, [1, 0, 2]].tolist():
             here = np.abs(places - corner) <= near
             if here.any():  # the path has two directions: along one it may be unbounded, along the other it goes on
                 steps = np.array([side - corner for side in sides if side != corner])
@@ -141,8 +142,8 @@ class Solution(ShortRepr):
         return found
 
     def _solved_part_efforts(self, places: FloatArray) -> FloatArray:
-        assert self.everywhere is not None
-        there = self.everywhere.solve_at(places)
+        assert self.model_between_points is not None
+        there = self.model_between_points.solve_at(places)
         alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
         return np.where(there.accurate, alone.largest_member_efforts, np.nan)
 
@@ -240,8 +241,19 @@ class Solution(ShortRepr):
         axis = mirror_axis(self.assembly)
         if axis is not None:
             lines |= {f"{name}'": mirror_points(line, *axis) for name, line in lines.items()}
-        return smallest_gap(lines, halves)
+        return smallest_gap(lines, halves, pairs_in_contact(network))
 
     def beam_force(self, beam: str) -> FloatArray:
         """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
         return read_only(-self.path.end_force(beam, 1)[self.keep])
+
+
+def pairs_in_contact(network: Network) -> set[frozenset[str]]:
+    """Return the pairs of beams whose contact is solved for: one ends at the node of a pad that may touch the other."""
+    return {
+        frozenset((name, contact.beam))
+        for contact in network.contacts
+        if isinstance(contact, NodeOnBeam)
+        for name, beam in network.beams.items()
+        if contact.node in (beam.start, beam.end)
+    }

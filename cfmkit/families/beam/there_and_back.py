@@ -73,7 +73,8 @@ def join_ways(load: Curve, unload: Curve) -> Curve:
 
 def both_ways(solution: Solution) -> BothWays | None:
     """Return the equilibria between the points of both ways; None unless both go over the same motion."""
-    there, back = solution.everywhere, solution.back.everywhere if solution.back is not None else None
+    there = solution.model_between_points
+    back = None if solution.back is None else solution.back.model_between_points
     if there is None or back is None:
         return None
     first, second = (np.array([way.own_points[0], way.own_points[-1]]) for way in (there, back))

@@ -1,4 +1,7 @@
-"""The mechanism as the support of an end-effector: contact force while its tip follows a surface [Lan, sec. IV].
+"""Force between a surface and the tip of an end-effector that a beam mechanism supports [Lan, sec. IV].
+
+The curve of the solved mechanism and the profile of the surface (`analysis.surface`) go in; forces, stress and extremes
+along the surface come out, with warnings where the tip lifts off, jams or cannot reach the surface.
 
 The carrier moves along x; the tip is guided along the drive and follows the heights, so that the mechanism is displaced
 by the preload plus the height. With a slope angle a and friction m the axial force F of the mechanism is held by the
@@ -16,6 +19,7 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +29,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.end_stops import LARGEST_FORCE
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import format_short
 
@@ -34,16 +38,16 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.results.between_points import BetweenPoints
-    from cfmkit.families.beam.curve_along_its_motion import OnCurve
+    from cfmkit.families.beam.constant_force_range_and_extremes import SolvedMechanism
     from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
     from cfmkit.results import Finding
 
 
-LOOKED_AT = 4001
-"""Places along a surface at which extremes are looked for, before the best is refined."""
+N_PLACES = 4001
+"""Places along a surface among which an extreme is searched, before the best one is refined."""
 
 _N_SURFACE_ROWS = 201  # of the curve along a surface that is given by few points
-_CORNER_OFFSET = 1e-9  # of the length: both sides of a corner are looked at
+_CORNER_OFFSET = 1e-9  # share of the length: places so far to both sides of a corner are searched, too
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,12 +66,12 @@ class SurfaceCourse(ShortRepr):
         start = float(self.rows[0])
         beside = _CORNER_OFFSET * (float(self.rows[-1]) - start)
         both = np.concatenate([self.corners - beside, self.corners + beside])
-        every = np.unique(np.concatenate([np.linspace(start, end, LOOKED_AT), self.rows, both]))
+        every = np.unique(np.concatenate([np.linspace(start, end, N_PLACES), self.rows, both]))
         return every[(every >= start) & (every <= end)]
 
 
 def course_of(surface: Surface) -> SurfaceCourse:
-    """Return the course of the surface of an analysis.
+    """Return heights and slopes of the surface of an analysis.
 
     Raises
     ------
@@ -97,7 +101,7 @@ def _of_file(given: FileProfile) -> SurfaceCourse:
     rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _N_SURFACE_ROWS)]))
     if given.between == "smooth":
         spline = CubicSpline(x, y)
-        least = LARGEST_HOLE * (x[-1] - x[0])
+        least = MAX_HOLE_SHARE * (x[-1] - x[0])
         holes = tuple((low, high) for low, high in holes_between(x, x[0], x[-1]) if high - low > least)
         return SurfaceCourse(spline, spline.derivative(), rows, np.zeros(0), holes)
     steps = np.diff(y) / np.diff(x)
@@ -149,8 +153,8 @@ _NO_FORCE = 1e-9  # of the largest force: less is none
 
 
 @dataclass(frozen=True)
-class Ride:
-    """Forces and motions along a surface, as far as the mechanism can follow it."""
+class SurfaceResult:
+    """Forces, motions and scalar results along a surface, as far as the mechanism can follow it."""
 
     # place, height, displacement, (n,): along the surface, of it, and of the mechanism [m]
     place: FloatArray
@@ -172,17 +176,17 @@ class Ride:
     @property
     def missing(self) -> str:
         """Why it ends before the surface does, or has a hole; empty if neither."""
-        reasons = [found.message for found in (self.ending, self.hole) if found is not None]
+        reasons = [warning.message for warning in (self.ending, self.hole) if warning is not None]
         return "; ".join(reasons)
 
 
 @dataclass(frozen=True)
-class Tip:
-    """The mechanism as the tip feels it: over displacements that increase [m], from rest to where it turns back."""
+class TipOnSurface:
+    """Tip on a surface: the curve of the mechanism behind it, up to where that turns back, and the surface."""
 
     surface: Surface  # what the tip follows
     course: SurfaceCourse  # its height and slope
-    # x, effort, stress, stable, (n,): displacements [m], forces [N], largest stresses [Pa], and 1 where stable
+    # x, effort, stress, stable, (n,): increasing displacements [m], forces [N], largest stresses [Pa], and 1 if stable
     x: FloatArray
     effort: FloatArray
     stress: FloatArray
@@ -207,16 +211,16 @@ class Tip:
         """Return the axial force at displacements [N]; at those that are not solved for, that at the nearest one."""
         return values_at(self.x, self.effort, np.clip(displacement, self.x[0], self.x[-1]))
 
-    def contact(self, place: FloatArray, way: int) -> FloatArray:
+    def contact(self, place: FloatArray, direction: int) -> FloatArray:
         """Return the normal force on the way along x (1) or back (-1) [N]; infinite where the tip jams."""
-        slope = way * self.course.slope(place)
+        slope = direction * self.course.slope(place)
         with np.errstate(divide="ignore"):
             return self.force(place) * np.hypot(1.0, slope) / np.maximum(1.0 - self.surface.friction * slope, 0.0)
 
-    def lateral(self, place: FloatArray, way: int) -> FloatArray:
+    def lateral(self, place: FloatArray, direction: int) -> FloatArray:
         """Return the force against the motion along x (1) or back (-1) [N]."""
-        slope = way * self.course.slope(place)
-        return self.contact(place, way) * (slope + self.surface.friction) / np.hypot(1.0, slope)
+        slope = direction * self.course.slope(place)
+        return self.contact(place, direction) * (slope + self.surface.friction) / np.hypot(1.0, slope)
 
     def follows(self, place: FloatArray) -> Any:
         """Return at which places the mechanism follows the surface and presses on it."""
@@ -248,43 +252,43 @@ class Tip:
         )
 
 
-def ride(solution: OnCurve) -> Ride | None:
-    """Return what happens along the surface of the analysis; None if there is no surface."""
+def follow_surface(solution: SolvedMechanism) -> SurfaceResult | None:
+    """Return forces and results along the surface of the analysis; None if there is no surface."""
     surface = solution.spec.analysis.surface
     if surface is None:
         return None
-    tip = _tip(solution, surface)
+    tip = _tip_on_surface(solution, surface)
     rows = tip.course.rows
-    looked_at = tip.course.places(float(rows[-1]))
-    lost = np.flatnonzero(~tip.follows(looked_at))
+    places = tip.course.places(float(rows[-1]))
+    lost = np.flatnonzero(~tip.follows(places))
     end, ending = float(rows[-1]), None
     if len(lost):
         first = int(lost[0])
-        beyond = float(looked_at[first])
+        beyond = float(places[first])
         if first:
-            near = float(looked_at[first - 1])
+            near = float(places[first - 1])
             beyond = bisect(lambda place: not tip.follows(np.array([place]))[0], near, beyond)
             end = float(np.nextafter(beyond, near))
         ending = tip.ending(beyond)
         rows = np.append(rows[rows < end], end) if first else rows[:0]
     u = tip.displacement(rows)
-    ways = (1, -1)
-    contact, lateral = (np.array([of(rows, way) for way in ways]) for of in (tip.contact, tip.lateral))
+    contact, lateral = (np.array([force(rows, 1), force(rows, -1)]) for force in (tip.contact, tip.lateral))
     stress, stable = tip.stress_at(u), np.interp(u, tip.x, tip.stable) == 1
     values = _values(tip, rows, solution.assembly.allowable_stress)
-    shown = Ride(rows, u - surface.preload, u, tip.force(rows), contact, lateral, stress, stable, values, ending)
-    shown = _drop_holes(shown, tip.course.holes)
-    return replace(shown, findings=tuple(_findings(tip, shown, solution.assembly.allowable_stress)))
+    height, force = u - surface.preload, tip.force(rows)
+    result = SurfaceResult(rows, height, u, force, contact, lateral, stress, stable, values, ending)
+    result = _drop_holes(result, tip.course.holes)
+    return replace(result, findings=tuple(_findings(tip, result, solution.assembly.allowable_stress)))
 
 
-def _drop_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
-    """Return a ride without what lies in holes of the surface, and without values if there are any."""
-    holes = tuple(hole for hole in holes if len(found.place) and hole[0] < found.place[-1])
+def _drop_holes(result: SurfaceResult, holes: tuple[tuple[float, float], ...]) -> SurfaceResult:
+    """Return a result without numbers in holes of the surface, and without scalar results if there are any."""
+    holes = tuple(hole for hole in holes if len(result.place) and hole[0] < result.place[-1])
     if not holes:
-        return found
-    unknown = np.any([(found.place > low) & (found.place < high) for low, high in holes], axis=0)
+        return result
+    unknown = np.any([(result.place > low) & (result.place < high) for low, high in holes], axis=0)
     rows: dict[str, Any] = {
-        name: np.where(unknown, np.nan, getattr(found, name))
+        name: np.where(unknown, np.nan, getattr(result, name))
         for name in ("height", "displacement", "force", "contact", "lateral", "stress")
     }
     spans = " and ".join(f"{format_short(low, 'length')} to {format_short(high, 'length')}" for low, high in holes)
@@ -294,10 +298,10 @@ def _drop_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
         "'analysis.surface.profile.between: straight' takes straight lines there for the surface",
         "analysis.surface.profile.between=straight",
     )
-    return replace(found, **rows, values=dict.fromkeys(TIP_DEFINITIONS), hole=hole)
+    return replace(result, **rows, values=dict.fromkeys(TIP_DEFINITIONS), hole=hole)
 
 
-def _tip(solution: OnCurve, surface: Surface) -> Tip:
+def _tip_on_surface(solution: SolvedMechanism, surface: Surface) -> TipOnSurface:
     """Return the mechanism up to where its path turns back: the tip cannot follow it beyond."""
     x, effort, stress = solution.motion, solution.effort, solution.stress
     steps = np.sign(np.diff(x))
@@ -307,26 +311,26 @@ def _tip(solution: OnCurve, surface: Surface) -> Tip:
     x, effort, stress, stable = (
         part[:count][sense] for part in (x, effort, stress, np.asarray(solution.stable, float))
     )
-    if (law := solution.everywhere) is not None:  # with the extremes between the points
+    if (law := solution.model_between_points) is not None:  # with the extremes between the points
         places, effort = law.knots
         x, stress, stable = places, law.stress("", places), np.interp(places, x, stable)
     effort = np.where(np.abs(effort) > _NO_FORCE * np.nanmax(np.abs(effort)), effort, 0.0 * effort)  # at rest: rounding
-    return Tip(surface, course_of(surface), x, effort, stress, stable, law)
+    return TipOnSurface(surface, course_of(surface), x, effort, stress, stable, law)
 
 
-def _values(tip: Tip, rows: FloatArray, allowable: float | None) -> dict[str, float | None]:
+def _values(tip: TipOnSurface, rows: FloatArray, allowable: float | None) -> dict[str, float | None]:
     """Return the scalar results by name; extremes are those of the surface and of the force between all points."""
     numbers: dict[str, float | None] = dict.fromkeys(TIP_DEFINITIONS)
     if not len(rows):
         return numbers
     places = tip.course.places(float(rows[-1]))
     top, bottom = largest(tip.displacement, places), -largest(lambda at: -tip.displacement(at), places)
-    between = np.unique(np.concatenate([np.linspace(bottom, top, LOOKED_AT), np.clip(tip.x, bottom, top)]))
+    between = np.unique(np.concatenate([np.linspace(bottom, top, N_PLACES), np.clip(tip.x, bottom, top)]))
     high, low = largest(tip.force_at, between), -largest(lambda at: -tip.force_at(at), between)
     stress = float(tip.stress_at(between).max())
     contact, lateral = (
-        max(largest(lambda at, of=of, way=way: of(at, way), places) for way in (1, -1))  # type: ignore[misc]
-        for of in (tip.contact, tip.lateral)
+        max(largest(partial(force, direction=direction), places) for direction in (1, -1))
+        for force in (tip.contact, tip.lateral)
     )
     return numbers | {
         "tip_force_min": low,
@@ -341,49 +345,49 @@ def _values(tip: Tip, rows: FloatArray, allowable: float | None) -> dict[str, fl
     }
 
 
-def _findings(tip: Tip, found: Ride, allowable: float | None) -> Iterator[Finding]:
-    """Yield what is wrong with a ride beside its ending."""
-    stress = found.values["surface_stress_max"]
+def _findings(tip: TipOnSurface, result: SurfaceResult, allowable: float | None) -> Iterator[Finding]:
+    """Yield a warning for a stress beyond the allowable one, and for each direction in which the tip jams."""
+    stress = result.values["surface_stress_max"]
     if allowable is not None and stress is not None and stress > allowable:
         yield finding(
             "surface_stress_exceeded",
             f"along the surface the largest stress is {format_short(stress, 'stress')}; the allowable stress is "
             f"{format_short(allowable, 'stress')}",
         )
-    if not len(found.place):
+    if not len(result.place):
         return
-    places = tip.course.places(float(found.place[-1]))
-    for way, reported in ((1, "along x"), (-1, "back")):
-        jammed = ~np.isfinite(tip.contact(places, way))
+    places = tip.course.places(float(result.place[-1]))
+    for direction, direction_name in ((1, "along x"), (-1, "back")):
+        jammed = ~np.isfinite(tip.contact(places, direction))
         if jammed.any():
             place = format_short(float(places[int(jammed.argmax())]), "length")
-            yield finding("tip_jams", f"on the way {reported} the slope at {place} is too steep for the friction")
+            yield finding("tip_jams", f"on the way {direction_name} the slope at {place} is too steep for the friction")
 
 
-def curve_of(found: Ride) -> Curve:
-    """Return the contact along the surface as a curve over the way along it."""
+def curve_of(result: SurfaceResult) -> Curve:
+    """Return forces and motions as a curve over the distance along the surface."""
     extra = {
-        "surface_height": Column(found.height, "length"),
-        "mechanism_displacement": Column(found.displacement, "length"),
-        "contact_force": Column(found.contact[0], "force"),
-        "lateral_force": Column(found.lateral[0], "force"),
-        "contact_force_back": Column(found.contact[1], "force"),
-        "lateral_force_back": Column(found.lateral[1], "force"),
-        "max_stress": Column(found.stress, "stress"),
+        "surface_height": Column(result.height, "length"),
+        "mechanism_displacement": Column(result.displacement, "length"),
+        "contact_force": Column(result.contact[0], "force"),
+        "lateral_force": Column(result.lateral[0], "force"),
+        "contact_force_back": Column(result.contact[1], "force"),
+        "lateral_force_back": Column(result.lateral[1], "force"),
+        "max_stress": Column(result.stress, "stress"),
     }
-    branch = np.repeat(["surface"], len(found.place))
-    return Curve(found.place, found.force, branch, found.stable, extra, label={"over": ("surface", "text")})
+    branch = np.repeat(["surface"], len(result.place))
+    return Curve(result.place, result.force, branch, result.stable, extra, label={"over": ("surface", "text")})
 
 
-def values_along(found: Ride) -> Mapping[str, Quantity]:
-    """Return the scalar results of a ride by name."""
-    if found.hole is not None:
-        reason = found.hole.message.partition(":")[0]
+def values_along(result: SurfaceResult) -> Mapping[str, Quantity]:
+    """Return the scalar results along a surface by name."""
+    if result.hole is not None:
+        reason = result.hole.message.partition(":")[0]
         return {name: Quantity(None, *meant, reason) for name, meant in TIP_DEFINITIONS.items()}
-    return quantities(TIP_DEFINITIONS, found.values)
+    return quantities(TIP_DEFINITIONS, result.values)
 
 
-def findings_along(found: Ride) -> Iterator[Finding]:
-    """Yield what is wrong with a ride."""
-    yield from (item for item in (found.ending, found.hole) if item is not None)
-    yield from found.findings
+def findings_along(result: SurfaceResult) -> Iterator[Finding]:
+    """Yield all warnings of a result along a surface."""
+    yield from (item for item in (result.ending, result.hole) if item is not None)
+    yield from result.findings

@@ -25,7 +25,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
@@ -134,7 +134,7 @@ def loop(result: Result) -> Figure:
     level = Limit(force, f"{name} = {value_text(force, 'force')}")
     constant = solution.assembly.profile.path.law.constant
     look = CurveLook(levels=(level,) if constant else (), regions=tuple(regions(solution)))
-    return loop_figure(result, look, "force over travel of the slider")
+    return curve_figure(result, look, "force over travel of the slider")
 
 
 def regions(solution: Solution) -> list[MarkedRange]:
@@ -376,7 +376,7 @@ N_HEIGHTS = 400
 def built_figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a measured cam, by file stem."""
     return {
-        "loop": partial(loop_figure, result, None, "force over travel, with the measured profile"),
+        "loop": partial(curve_figure, result, None, "force over travel, with the measured profile"),
         "profile": partial(profile, result),
         "shares": partial(shares, result),
     }

@@ -50,7 +50,7 @@ from cfmkit.families.cam.solution_of_measured_cam import Built, Sides
 from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between
 from cfmkit.numerics.rigid_point_registration import (
     CurveFrame,
     Registration,
@@ -213,7 +213,7 @@ def _holes(track: BuiltTrack, places: FloatArray, assembly: Assembly) -> tuple[t
     found = []
     for low, high in holes_between(places, places[0], places[-1]):
         inside = track.slider[(track.contact > low) & (track.contact < high)]
-        if len(inside) and np.ptp(inside) > LARGEST_HOLE * _narrowest_window(track, assembly):
+        if len(inside) and np.ptp(inside) > MAX_HOLE_SHARE * _narrowest_window(track, assembly):
             found.append((float(inside[0]), float(inside[-1])))
     return tuple(found)
 

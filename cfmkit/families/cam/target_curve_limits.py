@@ -1,4 +1,8 @@
-"""Cams whose force follows a curve: which curves they can follow, and why not."""
+"""Limits of cams with a force that varies on purpose: which target curves of force can be made, and why others cannot.
+
+The targets of a design, or the slope law of a profile, go in; the curve as shares of its largest force, or the slope
+law for it, comes out. A curve that no cam can follow raises an error with the reason.
+"""
 
 from __future__ import annotations
 
@@ -20,34 +24,34 @@ if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
-def wanted_curve(target: CamDesign) -> TargetCurve | None:
-    """Return the curve of forces that is wanted; None of a constant force."""
-    return None if target.target is None else target.target.curve(target.force)
+def wanted_curve(design: CamDesign) -> TargetCurve | None:
+    """Return the target curve of a design; None if its force is constant."""
+    return None if design.target is None else design.target.curve(design.force)
 
 
-def largest_force(target: CamDesign) -> float:
-    """Return the force that is wanted, or the largest of a curve [N]."""
-    curve = wanted_curve(target)
-    return target.force or 0.0 if curve is None else curve.extremes(0.0, target.stroke)[1]
+def largest_force(design: CamDesign) -> float:
+    """Return the constant force, or the largest of the target curve [N]."""
+    curve = wanted_curve(design)
+    return design.force or 0.0 if curve is None else curve.extremes(0.0, design.stroke)[1]
 
 
-def check_target(target: CamDesign) -> None:
-    """Raise if no springs that pull the rollers in give the curve of forces."""
-    curve = wanted_curve(target)
+def check_target(design: CamDesign) -> None:
+    """Raise if no springs that pull the rollers against the cam can give the target curve of a design."""
+    curve = wanted_curve(design)
     assert curve is not None
     first, last = curve.extent
-    if not curve.covers(0.0, target.stroke) or 0.0 > first > -float("inf"):
+    if not curve.covers(0.0, design.stroke) or 0.0 > first > -float("inf"):
         known = f"{mm(first)} to {mm(last)}"
         raise Infeasible(
             finding(
                 "target_curve",
-                f"the target curve goes from {known}, and the slider from 0 mm to {mm(target.stroke)}; let its points "
+                f"the target curve goes from {known}, and the slider from 0 mm to {mm(design.stroke)}; let its points "
                 "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
             ),
             {"design.stroke": format_at_most(last)} if last > 0 >= first else None,
         )
-    shape = curve.to_points(0.0, target.stroke)
-    places = np.linspace(0.0, max(target.stroke, shape.places[-1]), 2001)
+    shape = curve.to_points(0.0, design.stroke)
+    places = np.linspace(0.0, max(design.stroke, shape.places[-1]), 2001)
     force = np.asarray(curve.evaluate(places))
     lowest = int(np.argmin(force[1:])) + 1
     if force[lowest] <= 0 or force[0] < 0:
@@ -71,13 +75,13 @@ def check_target(target: CamDesign) -> None:
         )
 
 
-def target_shape(target: CamDesign, slider: float) -> ThroughPoints | None:
-    """Return the force less the weight of the slider [N], as shares of the largest; None of a constant force."""
-    curve = wanted_curve(target)
+def target_shape(design: CamDesign, slider_weight: float) -> ThroughPoints | None:
+    """Return the target force less the weight of the slider [N], as shares of its largest; None if it is constant."""
+    curve = wanted_curve(design)
     if curve is None:
         return None
-    wanted, most = curve.to_points(0.0, target.stroke), largest_force(target) - slider
-    return replace(wanted, values=tuple((value - slider) / most for value in wanted.values))
+    wanted, most = curve.to_points(0.0, design.stroke), largest_force(design) - slider_weight
+    return replace(wanted, values=tuple((value - slider_weight) / most for value in wanted.values))
 
 
 def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: float) -> CurveSlopeLaw:

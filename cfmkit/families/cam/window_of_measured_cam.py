@@ -1,4 +1,9 @@
-"""The window in which a cam as it was built is judged, and which part of it was measured."""
+"""Window over which a cam is evaluated from its measured profile, and how much of that window was measured.
+
+`Built` is the solved cam as built, with its measured flanks. It is computed over travels that count from its own start;
+`Built.origin` added to one gives the displacement of the specification. Where a flank was not measured the force is not
+known (`Built.unmeasured`).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
+from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE
 from cfmkit.specs.units import window_places
 
 if TYPE_CHECKING:
@@ -16,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def travel_window(built: Built) -> tuple[float, float]:
-    """Return the window in travels, by default all of them [m]."""
+    """Return the travels at which the window begins and ends, by default the whole travel [m]."""
     window = built.assembly.spec.analysis.window
     if window is None:
         return float(built.travel[0]), float(built.travel[-1])
@@ -25,21 +30,21 @@ def travel_window(built: Built) -> tuple[float, float]:
 
 
 def large_holes(built: Built) -> tuple[tuple[float, float], ...]:
-    """Return the travels in the window at which the force is not known [m]."""
+    """Return the intervals of travel in the window that were not measured, unless they are very small [m]."""
     start, stop = travel_window(built)
     inside = ((max(low, start), min(high, stop)) for low, high in built.unmeasured)
-    return tuple((low, high) for low, high in inside if high - low > LARGEST_HOLE * (stop - start))
+    return tuple((low, high) for low, high in inside if high - low > MAX_HOLE_SHARE * (stop - start))
 
 
 def profile_coverage(built: Built) -> float:
-    """Return which part of the window is known."""
+    """Return the share of the window that was measured, 0 to 1."""
     start, stop = travel_window(built)
     missing = sum(max(min(high, stop) - max(low, start), 0.0) for low, high in built.unmeasured)
     return 1.0 - missing / (stop - start)
 
 
 def window_mask(built: Built) -> NDArray[np.bool_]:
-    """Return which travels lie in ``analysis.window``."""
+    """Return which travels lie in ``analysis.window``, (n,); all if there is no window, or if it holds fewer than 3."""
     place, window = built.travel + built.origin, built.assembly.spec.analysis.window
     if window is None:
         return np.ones(len(place), dtype=bool)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
     from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
     from cfmkit.families.suggestion_request import MaterialBlock, Request
-    from cfmkit.stock.springs.helical_spring_formulas import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
 
 @dataclass(frozen=True)
@@ -391,7 +391,7 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
         # that of the pivot is on the other side of the links: first it takes as little as it can
         least = shortest_torsion_spring(*turns["pivot"], widest, pin)
         deep = room - (0.0 if least is None else least.body_length_wound_up(turns["pivot"][1]))
-    bought: dict[str, Wound] = {}
+    bought: dict[str, HelicalSpring] = {}
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and request.depth is not None:
             deep = room - max((height_of(other, coil, turns[other][1]) for other, coil in bought.items()), default=0.0)
@@ -405,7 +405,7 @@ def add_custom_springs(spec: SliderCrankSpec, request: Request) -> SliderCrankSp
     return spec.replace({"mechanism.springs.bought": tuple({"at": name, **as_stated(bought[name])} for name in turns)})
 
 
-def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:
+def _no_spring(name: str, turn: tuple[float, float], coil: HelicalSpring | None) -> str:
     dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
     reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"

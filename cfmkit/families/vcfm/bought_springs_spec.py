@@ -13,7 +13,7 @@ from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire
 from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
-    from cfmkit.stock.springs.helical_spring_formulas import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
 
 class BoughtSprings(SpringSupport):
@@ -50,7 +50,7 @@ class BoughtSprings(SpringSupport):
         return self
 
     @property
-    def coil(self) -> Wound | None:
+    def coil(self) -> HelicalSpring | None:
         """Its wire, coil and turns; None if they are not stated."""
         return None if self.wound is None else self.wound.to_wound(self.kind)
 

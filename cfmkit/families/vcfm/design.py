@@ -1,10 +1,25 @@
-"""From targets to sizes: closed forms, then one pass of the exact model, then the stress.
+"""Design of a vcfm, a variable constant-force mechanism: sizes of its leaves and its spring for a force and a stroke.
 
-With F_c = K h and dF = K dr the rise is h = F_c dr/dF. The stroke gives the thickness, since the linear region is
-(4 h/3) sqrt(1 - (pi/Q)^2) long; the stress gives the shortest leaf; K_n = K its width. The spring is as long as its
-stress at full travel and preload allows. Forces are exactly linear in the widths, so that the two factors that make the
-exact force flattest at F_c are those of a linear least-squares fit: one pass is all there is to do. Where a sheet fixes
-the widths, lengths and numbers are found in a few passes (`leaf_sizing`).
+In such a mechanism [D] n V-shaped leaves that buckle, with negative stiffness, stand beside a spring of positive
+stiffness (a diamond of four leaves, or of two); the preload of the spring adjusts the constant force. The specification
+with the targets goes in; one with all sizes comes out, or the limit that cannot be met with the nearest feasible value.
+The sizes of one leaf are called `leaf`, those of one leaf of the spring `spring_leaf`.
+
+Symbols: F_c constant force, dF its increase by the preload dr, K stiffness of the spring, K_n negative stiffness of all
+leaves, h rise of a leaf, t its thickness, Q = h/t.
+
+1. Closed forms. F_c = K h and dF = K dr, so the rise is h = F_c dr/dF. The stroke gives the thickness, since the region
+   of constant stiffness is (4 h/3) sqrt(1 - (pi/Q)^2) long, the stress the shortest leaf, K_n = K the width of the
+   leaves. The spring is as long as its stress at full travel and preload allows.
+2. The exact model. Forces are linear in both widths, so a linear least-squares fit gives the two factors that make the
+   exact force flattest at F_c. If a sheet fixes the widths, lengths and numbers are found in a few passes
+   (`leaf_sizing`).
+3. Lengths are increased if the exact stress is too large.
+
+Reference
+---------
+[D] B. Ding, X. Li, Y. Li, Robotica (2022), variable constant-force compliant mechanism; the theory is in
+    docs/theory_vcfm.md.
 """
 
 from __future__ import annotations
@@ -32,10 +47,10 @@ from cfmkit.families.vcfm.leaf_sizing import (
     followable_stroke,
     leaf_of_sheet,
     next_leaf,
-    next_side,
+    next_spring_leaf,
     shortest_leaf,
-    side_of_sheet,
     sized_leaf,
+    spring_leaf_of_sheet,
     stress_unreachable,
     thickness_for,
 )
@@ -57,7 +72,7 @@ if TYPE_CHECKING:
 
 
 MAX_ROUNDS = 8
-"""Limits met one after the other on the way to what is feasible."""
+"""Most limits that are met one after the other until the nearest feasible values meet all of them."""
 
 
 def design(spec: VcfmSpec, run: Run) -> Design:
@@ -96,9 +111,9 @@ def _attempt(spec: VcfmSpec) -> Design:
     if allowable is None:
         message = "a design needs an allowable stress: add 'mechanism.material.yield_strength'"
         return Design(None, Status.INVALID, message)
-    if target.level <= 0:
-        reported = f"the target curve is {newton(target.level)} in the middle of the leaves' linear region"
-        return no_design(finding("target_curve", f"{reported}: it must be above 0 there ('design.target')"))
+    if target.required_force <= 0:
+        message = f"the target curve is {newton(target.required_force)} in the middle of the leaves' linear region"
+        return no_design(finding("target_curve", f"{message}: it must be above 0 there ('design.target')"))
     sizes = closed_form(spec, target)
     active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
     if target.refine:
@@ -136,23 +151,25 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
         leaf = sized_leaf(spec, target, thickness, length)
     else:
         count, leaf = leaf_of_sheet(spec, target, thickness, length, sheet)
-    side = spring_side(spec, target, leaf, spec.mechanism.flexures.thickness)
+    spring_leaf = size_spring_leaf(spec, target, leaf, spec.mechanism.flexures.thickness)
     if sheet is not None:
-        side = side_of_sheet(partial(spring_side, spec, target, leaf), side, target.min_thickness or 0.0, sheet)
-    sizes = DesignSizes(leaf, side, onset_and_exit(leaf), count)
+        size, least = partial(size_spring_leaf, spec, target, leaf), target.min_thickness or 0.0
+        spring_leaf = spring_leaf_of_sheet(size, spring_leaf, least, sheet)
+    sizes = DesignSizes(leaf, spring_leaf, onset_and_exit(leaf), count)
     check_width(spec, target, leaf)
     check_room(target, sizes)
     return sizes
 
 
-def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip, thickness: float) -> LeafStrip:
-    """Return a leaf of the diamond: as long as its stress at the end of the linear region and full preload allows."""
-    made, positive = spec.mechanism.material, spec.mechanism.flexures
+def size_spring_leaf(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip, thickness: float) -> LeafStrip:
+    """Return a leaf of the spring, as long as its stress at the end of the linear region and full preload requires."""
+    material, spring = spec.mechanism.material, spec.mechanism.flexures
     deflection = 0.5 * (float(onset_and_exit(leaf)[1]) + target.preload_stroke)
-    e, tilt = made.modulus, positive.angle
+    e, tilt = material.modulus, spring.angle
     length = sqrt(3.0 * e * thickness * deflection * cos(tilt) / (spec.mechanism.allowable_stress or 1.0))
-    side = LeafStrip(length, tilt, thickness, 1.0, e, made.poisson)
-    return replace(side, width=float(target.level / target.height / Diamond(side, share_of(positive)).stiffness))
+    unit = LeafStrip(length, tilt, thickness, 1.0, e, material.poisson)
+    stiffness = target.required_force / target.height
+    return replace(unit, width=float(stiffness / Diamond(unit, share_of(spring)).stiffness))
 
 
 def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
@@ -180,7 +197,7 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
 
 def write_sizes(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     """Return the spec with the sizes written into its mechanism."""
-    leaf, side = sizes.leaf, sizes.side
+    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
     return spec.replace(
         {
             "mechanism.bistable.half_beams": sizes.half_beams,
@@ -188,37 +205,37 @@ def write_sizes(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
             "mechanism.bistable.angle": float(leaf.angle),
             "mechanism.bistable.thickness": float(leaf.thickness),
             "mechanism.bistable.width": float(leaf.width),
-            "mechanism.positive.length": float(side.length),
-            "mechanism.positive.thickness": float(side.thickness),
-            "mechanism.positive.width": float(side.width),
+            "mechanism.positive.length": float(spring_leaf.length),
+            "mechanism.positive.thickness": float(spring_leaf.thickness),
+            "mechanism.positive.width": float(spring_leaf.width),
         }
     )
 
 
 LENGTH_MARGIN = 1.01
-"""On that where a leaf length is proposed: the exact model changes widths by less than a percent."""
+"""Margin on the least width when a leaf length is proposed: the exact model changes widths by less than a percent."""
 
 LENGTH_STEP, MOST_STEPS = 1.002, 10_000
-"""Of leaf lengths that are proposed: leaves are made longer by so much, and so often at most, until they are wide."""
+"""Factor from one leaf length to the next until leaves are wide enough, and the most lengths tried."""
 
 ENVELOPE_MARGIN = 1.02
-"""On the room that is proposed: the exact stress may lengthen the spring, and so widen it."""
+"""Margin on an envelope that is proposed: the exact stress may lengthen the spring, and so widen it."""
 
 
 @dataclass(frozen=True)
 class DesignSizes:
-    """One leaf and one of the spring, the ends of the linear region [m], and the number of leaves."""
+    """Sizes that a design writes into the mechanism."""
 
-    leaf: LeafStrip
-    side: LeafStrip
-    linear: tuple[float, float]
-    half_beams: int
+    leaf: LeafStrip  # one leaf
+    spring_leaf: LeafStrip  # one leaf of the spring
+    linear: tuple[float, float]  # ends of the region in which the stiffness of the leaves is constant [m]
+    half_beams: int  # number of leaves
 
 
 def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
     """Raise if the design needs more room than there is."""
-    spans = {"leaves": 2.0 * float(sizes.leaf.reach), "spring": 2.0 * float(sizes.side.reach)}
-    widths = {"leaves": sizes.leaf.width, "spring": sizes.side.width}
+    spans = {"leaves": 2.0 * float(sizes.leaf.reach), "spring": 2.0 * float(sizes.spring_leaf.reach)}
+    widths = {"leaves": sizes.leaf.width, "spring": sizes.spring_leaf.width}
     for path, limit, found in (("max_span", target.max_span, spans), ("max_width", target.max_width, widths)):
         name = max(found, key=lambda key: found[key])
         if limit is not None and found[name] > limit * (1 + 1e-9):
@@ -249,15 +266,16 @@ def refine_sizes(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> Desi
         if max(over) <= 1.0 + 1e-4:
             return sizes
         # stress falls with the square of a length; a leaf that was given stays
-        leaf, side = sizes.leaf, sizes.side
+        leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
         if over[0] > 1.0 + 1e-4:
             if target.leaf_length is not None:
                 break
             leaf = sized_leaf(spec, target, leaf.thickness, float(leaf.length) * sqrt(1.0005 * over[0]))
         if over[1] > 1.0 + 1e-4:
-            longer = float(side.length) * sqrt(1.0005 * over[1])
-            side = replace(side, length=longer, width=side.width * (longer / side.length) ** 3)
-        sizes = replace(sizes, leaf=leaf, side=side)
+            longer = float(spring_leaf.length) * sqrt(1.0005 * over[1])
+            wider = spring_leaf.width * (longer / spring_leaf.length) ** 3
+            spring_leaf = replace(spring_leaf, length=longer, width=wider)
+        sizes = replace(sizes, leaf=leaf, spring_leaf=spring_leaf)
     worst = max(stresses)
     raise Infeasible(
         finding(
@@ -274,13 +292,13 @@ def _refined_for_sheet(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes, s
     allowable, least = spec.mechanism.allowable_stress or 0.0, target.min_thickness or 0.0
     for _ in range(MAX_PASSES):
         fitted, stresses = fit_widths(spec, target, sizes)
-        wide, stiff = fitted.leaf.width / sheet, fitted.side.width / sheet
+        wide, stiff = fitted.leaf.width / sheet, fitted.spring_leaf.width / sheet
         over = [stress / allowable for stress in stresses]
         if max(over) <= 1.0 + 1e-4 and max(abs(wide - 1.0), abs(stiff - 1.0)) <= FORCE_RTOL:
             return sizes
         count, leaf = next_leaf(sizes.half_beams, sizes.leaf, wide, over[0], target.height)
-        side = next_side(sizes.side, stiff, over[1], least)
-        sizes = DesignSizes(leaf, side, onset_and_exit(leaf), count)
+        spring_leaf = next_spring_leaf(sizes.spring_leaf, stiff, over[1], least)
+        sizes = DesignSizes(leaf, spring_leaf, onset_and_exit(leaf), count)
     raise stress_unreachable(sizes.leaf, max(stresses), allowable)
 
 
@@ -315,11 +333,13 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
             followable_stroke(target.height, sizes.leaf),
         )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-    wanted = np.full(len(places), target.level) if target.curve is None else _follow_curve(target.curve, places)
+    wanted = (
+        np.full(len(places), target.required_force) if target.curve is None else _follow_curve(target.curve, places)
+    )
     (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
-    leaf, side = sizes.leaf, sizes.side
-    wider = replace(leaf, width=float(leaf.width * wide)), replace(side, width=float(side.width * stiff))
-    fitted = replace(sizes, leaf=wider[0], side=wider[1])
+    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
+    wider = replace(leaf, width=float(leaf.width * wide)), replace(spring_leaf, width=float(spring_leaf.width * stiff))
+    fitted = replace(sizes, leaf=wider[0], spring_leaf=wider[1])
     end = np.concatenate([[_rest(sampler, full, (wide, stiff))], np.linspace(0.0, last, 201)])
     stresses = float(sampler.leaves(end).stress.max()), float(sampler.spring(np.array([last + full]))[1].max())
     return fitted, stresses

@@ -18,7 +18,7 @@ from cfmkit.families.vcfm.part import bodies
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
@@ -78,7 +78,7 @@ def force(result: Result) -> Figure:
     levels = () if np.isnan(alone) else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
     look = CurveLook(levels=levels, regions=_range_beyond(solution))
-    return loop_figure(nominal, look, "force over travel of the shuttle, from the unloaded position")
+    return curve_figure(nominal, look, "force over travel of the shuttle, from the unloaded position")
 
 
 def _range_beyond(solution: Solution) -> tuple[MarkedRange, ...]:

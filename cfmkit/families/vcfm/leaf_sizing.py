@@ -45,7 +45,7 @@ N_RESCALES = 4
 MAX_ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""
 WIDTH_RTOL = 1e-6
-"""TravelShare of the width that is left when sizes are found."""
+"""Share of the width by which it may be off when sizes are found."""
 MAX_PASSES, FORCE_RTOL = 12, 1e-5
 """Of the exact model for a sheet, and how far its force may then be off: five passes are usual."""
 MOST_LEAVES = 1000
@@ -69,7 +69,9 @@ def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: flo
     """Return a leaf as wide as the stiffness wants, F_c/h = n P_cr/X."""
     made, rise = spec.mechanism.material, target.height
     leaf = LeafStrip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
-    width = target.level / rise * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
+    width = (
+        target.required_force / rise * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
+    )
     return replace(leaf, width=float(width))
 
 
@@ -244,14 +246,16 @@ def leaf_of_sheet(
     return count, replace(leaf, width=sheet)
 
 
-def side_of_sheet(sized: Callable[[float], LeafStrip], side: LeafStrip, least: float, sheet: float) -> LeafStrip:
+def spring_leaf_of_sheet(
+    sized: Callable[[float], LeafStrip], spring_leaf: LeafStrip, least: float, sheet: float
+) -> LeafStrip:
     """Return a leaf of the spring as wide as the sheet is thick.
 
     Parameters
     ----------
     sized : callable
         The leaf of some thickness that the stress allows, with the width that its stiffness needs.
-    side : LeafStrip
+    spring_leaf : LeafStrip
         One of them.
     least : float
         Thinnest leaf that can be made [m].
@@ -259,11 +263,13 @@ def side_of_sheet(sized: Callable[[float], LeafStrip], side: LeafStrip, least: f
         [m]
     """
     for _ in range(MAX_ROUNDS):
-        side = sized(float(side.thickness) * (side.width / sheet) ** (2.0 / 3.0))
-        if abs(side.width / sheet - 1.0) < WIDTH_RTOL:
+        spring_leaf = sized(float(spring_leaf.thickness) * (spring_leaf.width / sheet) ** (2.0 / 3.0))
+        if abs(spring_leaf.width / sheet - 1.0) < WIDTH_RTOL:
             break
-    longer = max(1.0, least / float(side.thickness))
-    return replace(side, thickness=longer * side.thickness, length=longer * side.length, width=sheet)
+    longer = max(1.0, least / float(spring_leaf.thickness))
+    return replace(
+        spring_leaf, thickness=longer * spring_leaf.thickness, length=longer * spring_leaf.length, width=sheet
+    )
 
 
 def next_leaf(have: int, leaf: LeafStrip, stiffer: float, over: float, rise: float) -> tuple[int, LeafStrip]:
@@ -291,14 +297,14 @@ def next_leaf(have: int, leaf: LeafStrip, stiffer: float, over: float, rise: flo
     return count, replace(leaf, length=length, angle=asin(rise / length))
 
 
-def next_side(side: LeafStrip, stiffer: float, over: float, least: float) -> LeafStrip:
+def next_spring_leaf(spring_leaf: LeafStrip, stiffer: float, over: float, least: float) -> LeafStrip:
     """Return a leaf of the spring `stiffer` times as stiff, with the allowable stress or the least thickness [m].
 
     `over` is its stress over the allowable one.
     """
-    slope = stiffer ** (1.0 / 3.0) * float(side.thickness / side.length)
-    length = max(float(side.length) * stiffer ** (1.0 / 3.0) * over, least / slope)
-    return replace(side, thickness=slope * length, length=length)
+    slope = stiffer ** (1.0 / 3.0) * float(spring_leaf.thickness / spring_leaf.length)
+    length = max(float(spring_leaf.length) * stiffer ** (1.0 / 3.0) * over, least / slope)
+    return replace(spring_leaf, thickness=slope * length, length=length)
 
 
 def stress_unreachable(leaf: LeafStrip, stress: float, allowable: float) -> Infeasible:

@@ -196,9 +196,9 @@ def _design_around(
 ) -> LeavesAroundSprings | Miss:
     """Return the leaves around some springs by closed forms, or what the springs miss."""
     label, law = f"{springs.count} x {springs.name or 'the spring'}", coils(springs)
-    left = target.level - law.tension
+    left = target.required_force - law.tension
     if left <= 0:
-        return Miss(label, law.tension / target.level, "their initial tension alone is more than the force")
+        return Miss(label, law.tension / target.required_force, "their initial tension alone is more than the force")
     rise, preload = left / law.stiffness, (target.adjustment or 0.0) / law.stiffness
     reachable = 4.0 * rise / 3.0
     ratios = [
@@ -327,7 +327,7 @@ def _fit_width(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -
         if sampler.problem:
             return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
         leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-        wide = float(leaves @ (target.level - spring) / (leaves @ leaves))
+        wide = float(leaves @ (target.required_force - spring) / (leaves @ leaves))
         fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
         ends = np.linspace(-_rest(sampler, wide, own_target.preload_stroke), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable

@@ -117,7 +117,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 pairs = spec.mechanism.bistable.half_beams // 2
                 variant = name_variant(f"{pairs} V{'s' if pairs > 1 else ', guided'}", request, block)
                 # of made parts those with thick leaves are most alike: an error of the thickness counts three times
-                thick = min(sizes.leaf.thickness, sizes.side.thickness)
+                thick = min(sizes.leaf.thickness, sizes.spring_leaf.thickness)
                 promise = over["across"] * over["along"] if request.good_parts is None else -thick
                 promise += WIDE_LAST * _is_too_wide(request, block, sizes)
                 found.append(
@@ -141,7 +141,9 @@ def _is_too_wide(request: Request, block: MaterialBlock, sizes: DesignSizes) -> 
     """Return True if the Vs or the spring probably cannot curl, and stiffen by more than the band of the request."""
     material = MaterialSpec.model_validate(dict(block))
     strain = request.strength_used * (material.allowable(1.0) or 0.0) / material.modulus
-    return any(is_too_wide(request, float(one.width), float(one.thickness), strain) for one in (sizes.leaf, sizes.side))
+    return any(
+        is_too_wide(request, float(one.width), float(one.thickness), strain) for one in (sizes.leaf, sizes.spring_leaf)
+    )
 
 
 def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
@@ -216,7 +218,7 @@ def _lengths(spec: VcfmSpec, request: Request) -> Any:
             sizes = closed_form(made, made.design)  # type: ignore[arg-type]
         except Infeasible:
             continue
-        if min(sizes.leaf.thickness, sizes.side.thickness) >= request.thinnest:
+        if min(sizes.leaf.thickness, sizes.spring_leaf.thickness) >= request.thinnest:
             yield made, sizes
 
 
@@ -227,14 +229,14 @@ def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     far below as its leaves rise, less half of what preload and travel compress it by. The corners stay half a block
     below the leaf before and after the travel.
     """
-    frame, leaf, side, target = spec.mechanism.frame, sizes.leaf, sizes.side, spec.design
-    corner = float(side.reach) + 1.5 * frame.block
+    frame, leaf, spring_leaf, target = spec.mechanism.frame, sizes.leaf, sizes.spring_leaf, spec.design
+    corner = float(spring_leaf.reach) + 1.5 * frame.block
     if target is None or corner + frame.block > float(leaf.reach):
         return spec
     share, rise, preload = corner / float(leaf.reach), float(leaf.rise), float(target.preload_stroke)
     end = FARTHEST * float(sizes.linear[1])
     closest = max(0.5 * preload + share * rise, 0.5 * (preload + end) + share * (rise - end))
-    clearance = max(frame.block, closest - float(side.rise) - 0.5 * frame.block)
+    clearance = max(frame.block, closest - float(spring_leaf.rise) - 0.5 * frame.block)
     if clearance >= frame.clearance:
         return spec
     # lengths above zero need no other check
@@ -245,17 +247,19 @@ def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
 def _room_over(request: Request, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, float]:
     """Return what a design needs of the envelope over what there is, by side."""
     frame, pairs = spec.mechanism.frame, spec.mechanism.bistable.half_beams // 2
-    leaf, side = sizes.leaf, sizes.side
-    halves = leaf.reach + 0.5 * frame.shuttle_width + frame.block, side.reach + 1.5 * frame.block
+    leaf, spring_leaf = sizes.leaf, sizes.spring_leaf
+    halves = leaf.reach + 0.5 * frame.shuttle_width + frame.block, spring_leaf.reach + 1.5 * frame.block
     across = 2.0 * float(max(halves))
     target = spec.design
     corner = max(
-        frame.corner, float(sizes.linear[1]) + (target.preload_stroke if target else 0.0) - 2 * float(side.rise)
+        frame.corner, float(sizes.linear[1]) + (target.preload_stroke if target else 0.0) - 2 * float(spring_leaf.rise)
     )
-    along = (pairs - 1) * frame.spacing + 2.0 * frame.clearance + 2.0 * frame.block + 2.0 * float(side.rise) + corner
+    along = (
+        (pairs - 1) * frame.spacing + 2.0 * frame.clearance + 2.0 * frame.block + 2.0 * float(spring_leaf.rise) + corner
+    )
     over = {"across": across / request.envelope[0], "along": along / request.envelope[1]}
     if request.depth is not None:
-        over["depth"] = float(max(leaf.width, side.width)) / request.depth
+        over["depth"] = float(max(leaf.width, spring_leaf.width)) / request.depth
     return over
 
 
@@ -285,7 +289,7 @@ def _springs_beside(request: Request, spec: VcfmSpec, travel: float, place: floa
     """Yield springs of the generic series, in numbers that have about the rate wanted, for a place as long [m]."""
     target = spec.design
     assert target is not None
-    softest, preload = target.level / target.height, target.preload_stroke
+    softest, preload = target.required_force / target.height, target.preload_stroke
     for one in chain(generic("compression"), generic("extension")):
         wide = one.outer_diameter or 0.0
         # a pulled spring stands above a shuttle that goes down, and the preload moves its other end up

@@ -68,7 +68,7 @@ def target_of(spec: VcfmSpec) -> float | None:
     if spec.mechanism.springs is not None:
         stiffness = coils(spec.mechanism.springs).stiffness
     else:
-        stiffness = design.level / design.height if design.height else 0.0
+        stiffness = design.required_force / design.height if design.height else 0.0
     target = design.force + stiffness * preload
     return target if stiffness and target > 0 else None
 

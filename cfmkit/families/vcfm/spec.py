@@ -179,7 +179,7 @@ class VcfmDesign(DesignBlock):
         return None if self.target is None else self.target.curve(self.force)
 
     @property
-    def level(self) -> float:
+    def required_force(self) -> float:
         """The force, of a curve that in the middle of the leaves' linear region, two thirds of their rise [N]."""
         if self.curve is not None:
             return float(self.curve.evaluate(2.0 / 3.0 * (self.rise or 0.0)))
@@ -190,14 +190,14 @@ class VcfmDesign(DesignBlock):
         """Rise of the leaves [m]."""
         if self.rise is not None or self.adjustment is None:
             return self.rise or 0.0
-        return (self.preload or 0.0) * self.level / self.adjustment
+        return (self.preload or 0.0) * self.required_force / self.adjustment
 
     @property
     def preload_stroke(self) -> float:
         """Preload for the whole adjustment [m]; 0 where none is wanted."""
         if not self.adjustment:
             return self.preload or 0.0
-        return self.preload or (self.rise or 0.0) * self.adjustment / self.level
+        return self.preload or (self.rise or 0.0) * self.adjustment / self.required_force
 
 
 class Measured(Model):

@@ -21,7 +21,7 @@ from cfmkit.specs.units.strict_decimal_number import quote
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
 from cfmkit.specs.yamlio.path_notation import Path, parse_indices, to_dotted
 from cfmkit.specs.yamlio.text_decoding import MAX_FILE_BYTES, Fault
-from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, Reading, read_text
+from cfmkit.specs.yamlio.tree_builder import MAX_DEPTH, ParsedYaml, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +42,7 @@ class YamlDocument:
     problems: tuple[Problem, ...] = ()  # every fault found while reading
     base: YamlDocument | None = None  # what gives the values that this one does not have: see `base_file.with_base`
     _lines: tuple[str, ...] = field(default=(), repr=False, compare=False)  # of the text
-    _reading: Reading = field(default_factory=Reading, repr=False, compare=False)
+    _reading: ParsedYaml = field(default_factory=ParsedYaml, repr=False, compare=False)
     _spoilt: tuple[Path, ...] = field(default=(), repr=False, compare=False)
     _options: tuple[tuple[Path, str], ...] = field(default=(), repr=False, compare=False)
 
@@ -212,7 +212,7 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
         )
         for fault in reading.faults
     )
-    spoilt = tuple(fault.path for fault in reading.faults if fault.path and fault.spoils)
+    spoilt = tuple(fault.path for fault in reading.faults if fault.path and fault.makes_value_unusable)
     return YamlDocument(reading.tree, source, folder, problems, None, lines, reading, spoilt)
 
 
@@ -224,7 +224,7 @@ def _lines_of(data: bytes | str) -> tuple[str, ...]:
     return tuple(re.split("\r\n|[\r\n\x85\u2028\u2029]", text.removeprefix("\ufeff")))
 
 
-def _no_block(reading: Reading) -> Fault:
+def _no_block(reading: ParsedYaml) -> Fault:
     what = "a list" if isinstance(reading.tree, tuple) else "a single value"
     reported = "the file is empty" if reading.tree is None else f"the file holds {what}, not keys"
     line, column = reading.values.get((), (1, 1))

@@ -18,17 +18,13 @@ _FOREIGN_MARKS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """Something wrong at a place of a source, before it is known whose source that is.
-
-    `spoils` says that the value at `path` is unusable, so that nothing more should be
-    said about it.
-    """
+    """Something wrong at a place of a source, before it is known whose source that is."""
 
     line: int
     column: int
     path: tuple[str | int, ...]
     message: str
-    spoils: bool = True
+    makes_value_unusable: bool = True  # whether nothing more should be said about the value at `path`
 
 
 class Unreadable(Exception):

@@ -1,7 +1,7 @@
-"""From the parser's events to plain Python, with the place of every key and value.
+"""Strict reading of a YAML specification into plain Python values, with line and column of every key and value.
 
-Of PyYAML only the scanner and the parser read what users write: what a scalar means is decided in
-`cfmkit.specs.yamlio.scalars`, and tags, anchors, merge keys and second documents do not exist here.
+PyYAML is used as scanner and parser only. Scalars are read by `cfmkit.specs.yamlio.scalars`; tags, anchors, merge keys
+and second documents are faults. Faults are collected, in plain words (`ParsedYaml.faults`).
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ if TYPE_CHECKING:
 
 
 _YAML_LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
-"""libyaml where PyYAML has it; its complaints vary with its version, so errors are reported by the one in Python."""
+"""libyaml if PyYAML has it, which is fast, then PyYAML's own parser, for the words of errors: those of libyaml vary."""
 
 MAX_DEPTH = 32
-MOST_NODES = 100_000
-MOST_FAULTS = 1000
+MAX_NODES = 100_000
+MAX_FAULTS = 1000
 _WHOLE_PATTERN, _DIGIT_PATTERN = re.compile("[-+]?[0-9]+"), re.compile("[0-9]")
 _ZERO_PATTERNS, _WITH_UNIT = re.compile("[-+]?0+"), re.compile("(?>[0-9]+(?:[eE][-+]?[0-9]+)?) *[^-+0-9., ].*")
 
 
 @dataclass
-class Reading:
-    """A source as far as it could be read.
+class ParsedYaml:
+    """Content of a YAML source, as far as it could be read.
 
     `keys` and `values` hold (line, column) by path. `broken` says that the tree is
     not complete, so that what is missing in it means nothing; `unparsed` that this is
@@ -62,22 +62,22 @@ class Reading:
     unparsed: bool = False
 
 
-def read_text(data: bytes | str) -> Reading:
+def read_text(data: bytes | str) -> ParsedYaml:
     """Return what a source says, with every fault found in it."""
     try:
         text, faults = replace_odd_characters(decode(data))
     except Unreadable as stop:
-        return Reading(faults=[stop.fault], broken=True)
+        return ParsedYaml(faults=[stop.fault], broken=True)
     reading = _parse(text)
     # An odd character may well be the reason why the rest is no YAML.
     reading.faults = faults if reading.unparsed and faults else faults + reading.faults
     return reading
 
 
-def _parse(text: str) -> Reading:
-    """Return the reading of clean text, by the fast parser, or in the words of the one that is everywhere."""
+def _parse(text: str) -> ParsedYaml:
+    """Return the content of clean text; errors are worded by the last of the parsers, which every installation has."""
     for loader in _YAML_LOADERS:
-        reading = Reading()
+        reading = ParsedYaml()
         try:
             reading.tree = _Builder(reading, yaml.parse(text, Loader=loader)).document()
             return reading
@@ -87,7 +87,7 @@ def _parse(text: str) -> Reading:
             return reading
         except yaml.YAMLError as error:
             fault = fault_of(error)
-    return Reading(faults=[fault], broken=True, unparsed=True)
+    return ParsedYaml(faults=[fault], broken=True, unparsed=True)
 
 
 def read_trusted(text: str) -> Any:
@@ -96,9 +96,9 @@ def read_trusted(text: str) -> Any:
 
 
 class _Builder:
-    """Takes events one by one and fills a `Reading`."""
+    """Takes parser events one by one and fills a `ParsedYaml`."""
 
-    def __init__(self, reading: Reading, events: Iterator[Event]) -> None:
+    def __init__(self, reading: ParsedYaml, events: Iterator[Event]) -> None:
         self.reading = reading
         self.events = events
         self.nodes = 0
@@ -128,8 +128,8 @@ class _Builder:
 
     def _count(self, event: Event, path: Path) -> None:
         self.nodes += 1
-        if self.nodes > MOST_NODES:
-            raise Unreadable(_fault(event, (), f"more than {MOST_NODES} values; put long data into a separate file"))
+        if self.nodes > MAX_NODES:
+            raise Unreadable(_fault(event, (), f"more than {MAX_NODES} values; put long data into a separate file"))
         if len(path) > MAX_DEPTH:
             raise Unreadable(_fault(event, (), f"blocks and lists are nested more than {MAX_DEPTH} deep"))
 
@@ -140,8 +140,8 @@ class _Builder:
         elif anchor:
             self._complain(event, path, f"'&{anchor}' (an anchor) is not read; remove it")
         if tag := getattr(event, "tag", None):
-            reported = tag.replace("tag:yaml.org,2002:", "!!")
-            self._complain(event, path, f"the tag {quote(reported)} is not read; write the plain value")
+            message = tag.replace("tag:yaml.org,2002:", "!!")
+            self._complain(event, path, f"the tag {quote(message)} is not read; write the plain value")
 
     def _scalar(self, event: ScalarEvent, path: Path) -> Any:
         try:
@@ -173,7 +173,7 @@ class _Builder:
         block: dict[str, Any] = {}
         last, key = None, ""  # the value before, and its key
         while not isinstance(event := next(self.events), MappingEndEvent):
-            if flow and last is not None and _goes_on(last, event):
+            if flow and last is not None and _continues_number(last, event):
                 self._decimal_comma(last, event, (*path, key))
                 if not _is_empty(following := next(self.events)):
                     self._node(following, (*path, ""))
@@ -181,8 +181,8 @@ class _Builder:
             key = self._key(event, path)
             here = (*path, key)
             if first := self.reading.keys.get(here):
-                reported = f"the key {quote(key)} was given in line {first[0]} already; keep one"
-                self._complain(event, here, reported, spoils=False)
+                message = f"the key {quote(key)} was given in line {first[0]} already; keep one"
+                self._complain(event, here, message, makes_value_unusable=False)
             self.reading.keys.setdefault(here, _place(event))
             last = next(self.events)
             block.setdefault(key, self._node(last, here))
@@ -191,9 +191,9 @@ class _Builder:
     def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
         """Complain about a number that YAML ended at its decimal comma, as in ``{pivot: 28,303 N*mm/rad}``."""
         before, after = getattr(whole, "value", ""), getattr(rest, "value", "")
-        reported = f"{quote(f'{before},{after}')} has a decimal comma; write {before}.{after}"
+        message = f"{quote(f'{before},{after}')} has a decimal comma; write {before}.{after}"
         if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
-            self._complain(whole, path, reported)
+            self._complain(whole, path, message)
 
     def _key(self, event: Event, path: Path) -> str:
         """Return a key; what is not a plain name is complained about and replaced by its text."""
@@ -209,14 +209,14 @@ class _Builder:
             self._complain(event, path, "'<<' (a merge key) is not read; write the keys out")
         return event.value
 
-    def _complain(self, event: Event, path: Path, message: str, spoils: bool = True) -> None:
-        if len(self.reading.faults) >= MOST_FAULTS:
-            raise Unreadable(_fault(event, (), f"more than {MOST_FAULTS} faults; reading stopped here"))
-        self.reading.faults.append(Fault(*_place(event), path, message, spoils))
+    def _complain(self, event: Event, path: Path, message: str, makes_value_unusable: bool = True) -> None:
+        if len(self.reading.faults) >= MAX_FAULTS:
+            raise Unreadable(_fault(event, (), f"more than {MAX_FAULTS} faults; reading stopped here"))
+        self.reading.faults.append(Fault(*_place(event), path, message, makes_value_unusable))
 
 
-def _goes_on(value: Event, key: Event) -> bool:
-    """Return True if what stands where a key should be is the rest of the number before it."""
+def _continues_number(value: Event, key: Event) -> bool:
+    """Return True if an item in the place of a key is the rest of the number before it, as in ``{k: 28,303}``."""
     if not isinstance(value, ScalarEvent) or not isinstance(key, ScalarEvent) or value.style or key.style:
         return False
     return bool(_WHOLE_PATTERN.fullmatch(value.value) and _DIGIT_PATTERN.match(key.value))
@@ -224,7 +224,11 @@ def _goes_on(value: Event, key: Event) -> bool:
 
 def _split_at_comma(value: Event, item: Event) -> bool:
     """Return True if two items of a list are the halves of one quantity: 2 and 5 mm, with no space after the comma."""
-    return _goes_on(value, item) and _adjacent(value, item) and bool(_WITH_UNIT.fullmatch(getattr(item, "value", "")))
+    return (
+        _continues_number(value, item)
+        and _adjacent(value, item)
+        and bool(_WITH_UNIT.fullmatch(getattr(item, "value", "")))
+    )
 
 
 def _adjacent(value: Event, item: Event) -> bool:

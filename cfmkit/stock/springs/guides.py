@@ -8,7 +8,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.offer_type_and_generic_series import guide_rod_for
 
 if TYPE_CHECKING:
-    from cfmkit.stock.springs.helical_spring_formulas import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
     from cfmkit.stock.springs.support_spec import SpringSupport
 
 
@@ -22,7 +22,7 @@ def guide_words(support: SpringSupport) -> list[str]:
     return words
 
 
-def guide_needed(support: SpringSupport, wound: Wound | None, key: str) -> str:
+def guide_needed(support: SpringSupport, wound: HelicalSpring | None, key: str) -> str:
     """Return the remedy for a spring that buckles, in words; `key` is the path of its block."""
     if wound is None:
         return f"guide it on a rod ('{key}.guide_rod') or in a tube, or use a shorter or wider one"
@@ -34,6 +34,6 @@ def guide_needed(support: SpringSupport, wound: Wound | None, key: str) -> str:
     return f"{loose}guide it on a rod of {rod} ('{key}.guide_rod') or in a tube, or use a shorter or wider one"
 
 
-def guide_cure(wound: Wound | None, key: str) -> tuple[str, ...]:
+def guide_cure(wound: HelicalSpring | None, key: str) -> tuple[str, ...]:
     """Return the setting that guides a spring; none if its wire is not known."""
     return () if wound is None else (f"{key}.guide_rod={1e3 * guide_rod_for(wound):.10g} mm",)

@@ -23,7 +23,7 @@ Reference
 ---------
 [W] A. M. Wahl, Mechanical Springs, 2nd ed., McGraw-Hill (1963).
 [Sh] R. G. Budynas, J. K. Nisbett, Shigley's Mechanical Engineering Design, 9th ed., McGraw-Hill (2011), chapter 10.
-[N] R. L. Norton, Machine Design, Prentice Hall, chapter on springs: clearance of a spring in a hole or on a rod.
+[Norton] R. L. Norton, Machine Design, Prentice Hall, chapter on springs: clearance of a spring in a hole or on a rod.
 """
 
 from __future__ import annotations
@@ -41,34 +41,35 @@ if TYPE_CHECKING:
 Kind = Literal["extension", "compression", "torsion"]
 
 SHEAR_MODULUS, YOUNGS_MODULUS = MUSIC_WIRE.shear_modulus, MUSIC_WIRE.youngs_modulus
-"""Of music wire [Pa]. A list may state others."""
+"""Moduli of music wire [Pa], taken for a spring whose list states none."""
 
 tensile_strength = MUSIC_WIRE.tensile_strength
 """Smallest tensile strength of music wire of a diameter [m] in [Pa]; refuses diameters that its table does not list."""
 
 Seats = Literal["fixed-fixed", "fixed-pivoted", "pivoted-pivoted", "fixed-free"]
 
-END_CONDITION: Mapping[Seats, float] = MappingProxyType(
+SEAT_FACTORS: Mapping[Seats, float] = MappingProxyType(
     {"fixed-fixed": 0.5, "fixed-pivoted": 0.707, "pivoted-pivoted": 1.0, "fixed-free": 2.0}
 )
-"""alpha of the buckling of a compression spring [Sh, Table 10-2]; fixed is an end that stands flat on a plate."""
+"""alpha, by which the free length counts in buckling [Sh, Table 10-2]; a fixed end stands flat on a plate."""
 
 SMALL_HOLE, SMALL_HOLE_CLEARANCE, ROD_CLEARANCE = 0.013, 0.10, 0.05
-"""Clearance of a spring on a rod, in diameters of its inside: below 13 mm, and above [N]."""
+"""Inner diameter below which a spring is small [m]; clearance of small and of larger springs on a rod, as shares of it
+[Norton]."""
 
 MAX_GUIDE_CLEARANCE = 0.20
-"""Largest clearance of a guide, in diameters of the inside (rod) or outside (tube): twice that of [N], assumed. In a
-looser one a spring bows as far as the clearance lets it."""
+"""Largest clearance of a guide, in diameters of the inside (rod) or outside (tube): twice that of [Norton], assumed. A
+spring in a looser guide bows as far as the clearance lets it."""
 
 
 @dataclass(frozen=True)
-class Wound:
+class HelicalSpring:
     """Helical spring of round wire."""
 
     kind: Kind  # what it is loaded by
     wire: float  # diameter [m]
     coil: float  # mean diameter [m]
-    turns: float  # active ones
+    turns: float  # active turns, which bend or twist
     shear_modulus: float = SHEAR_MODULUS  # of the wire [Pa]
     youngs_modulus: float = YOUNGS_MODULUS  # of the wire [Pa]
     material: WireName = MUSIC_WIRE.name  # class of the wire, which its moduli may differ from
@@ -101,7 +102,7 @@ class Wound:
 
         Examples
         --------
-        >>> spring = Wound("extension", 2e-3, 12e-3, 20.0)
+        >>> spring = HelicalSpring("extension", 2e-3, 12e-3, 20.0)
         >>> round(spring.loop_stress(80.0) / 1e6, 1), round(spring.stress(80.0) / 1e6, 1)
         (723.2, 382.7)
         """
@@ -133,7 +134,7 @@ class Wound:
 
         Examples
         --------
-        >>> spring = Wound("torsion", 1e-3, 10e-3, 5.0)
+        >>> spring = HelicalSpring("torsion", 1e-3, 10e-3, 5.0)
         >>> round(1e3 * spring.inner_diameter_wound_up(math.pi), 4)
         8.0909
         """
@@ -148,7 +149,7 @@ class Wound:
 
         Examples
         --------
-        >>> slender, squat = (Wound("compression", 1e-3, coil, 20.0) for coil in (8e-3, 16e-3))
+        >>> slender, squat = (HelicalSpring("compression", 1e-3, coil, 20.0) for coil in (8e-3, 16e-3))
         >>> round(1e3 * slender.buckling_deflection(60e-3), 2), squat.buckling_deflection(60e-3)
         (13.62, inf)
         """
@@ -160,7 +161,7 @@ class Wound:
 
         Examples
         --------
-        >>> low, high = Wound("extension", 1e-3, 10e-3, 20.0).usual_initial_tension
+        >>> low, high = HelicalSpring("extension", 1e-3, 10e-3, 20.0).usual_initial_tension
         >>> round(low, 2), round(high, 2)
         (2.38, 3.97)
         """
@@ -170,7 +171,7 @@ class Wound:
         return load * max(stress - spread, 0.0), load * (stress + spread)
 
     @property
-    def fitting_rod(self) -> float:
+    def thickest_guide_rod(self) -> float:
         """Diameter of the thickest rod that guides the spring with clearance [m]."""
         inner = self.inner_diameter
         return inner * (1.0 - (SMALL_HOLE_CLEARANCE if inner < SMALL_HOLE else ROD_CLEARANCE))
@@ -199,12 +200,12 @@ def buckling_deflection(
     free_length, coil : float
         Relaxed length, and mean diameter of the coil [m].
     seats : str
-        How its ends are held, a key of `END_CONDITION`.
+        How its ends are held, a key of `SEAT_FACTORS`.
     moduli : (float, float)
         E and G of the wire [Pa].
     """
     young, shear = moduli
-    slenderness = END_CONDITION[seats] * free_length / coil
+    slenderness = SEAT_FACTORS[seats] * free_length / coil
     inside = 1.0 - 2.0 * math.pi**2 * (young - shear) / (2.0 * shear + young) / slenderness**2
     if inside < 0.0:
         return math.inf

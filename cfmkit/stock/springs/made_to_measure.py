@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
+from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind, tensile_strength
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
 
@@ -36,7 +36,7 @@ N_HALVINGS = 16
 """Of the wire's diameter, where the length decides it."""
 
 
-def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
+def extension_spring(rate: float, stretch: float, room: float) -> HelicalSpring | None:
     """Return the slimmest extension spring of a rate [N/m] that can be stretched so far [m] from at most a length [m].
 
     None if there is none: the body would be longer than the room.
@@ -51,7 +51,7 @@ def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
     return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
-def as_stated(spring: Wound) -> dict[str, Any]:
+def as_stated(spring: HelicalSpring) -> dict[str, Any]:
     """Return designation and wire of a spring as a specification has them."""
     wire, coil = (format_short(size, "length") for size in (spring.wire, spring.coil))
     return {
@@ -60,7 +60,7 @@ def as_stated(spring: Wound) -> dict[str, Any]:
     }
 
 
-def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> Wound | None:
+def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> HelicalSpring | None:
     """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
 
     None if there is none: the body, which is longest when it is wound up, would be longer, or the inside, which is
@@ -79,7 +79,7 @@ def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> W
     return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
-def shortest_torsion_spring(rate: float, turn: float, widest: float, pin: float = 0.0) -> Wound | None:
+def shortest_torsion_spring(rate: float, turn: float, widest: float, pin: float = 0.0) -> HelicalSpring | None:
     """Return the shortest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so wide [m].
 
     None if there is none: the coil would be wider, or too narrow for a pin of that diameter [m].
@@ -107,7 +107,7 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
     >>> [bool(torsion_spring(share * rate, 1.0, 30e-3).outer_diameter <= 5e-3) for share in (0.999, 1.001)]
     [True, False]
     """
-    units = [Wound(kind, 1e-3, index * 1e-3, 1.0) for index in SPRING_INDICES]
+    units = [HelicalSpring(kind, 1e-3, index * 1e-3, 1.0) for index in SPRING_INDICES]
     rate, stress = (np.array(one)[:, None] for one in zip(*((one.rate, one.stress(1.0)) for one in units), strict=True))
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
     index = np.array(SPRING_INDICES)[:, None]
@@ -131,25 +131,25 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
     return np.asarray(np.where(there, rate * low**power / turns(low), 0.0).max(axis=0))
 
 
-def loaded_length(spring: Wound) -> float:
+def loaded_length(spring: HelicalSpring) -> float:
     """Return the length at rest with both loops [m]."""
     return spring.body_length + 2.0 * (spring.coil - spring.wire)
 
 
-def _candidates(kind: Kind, rate: float, deflection: float) -> list[Wound]:
+def _candidates(kind: Kind, rate: float, deflection: float) -> list[HelicalSpring]:
     """Return the spring of each index whose wire is drawn so thick."""
     springs = [_size_spring(kind, index, rate, deflection) for index in SPRING_INDICES]
     return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
 
 
-def _fit_over_pin(springs: list[Wound], turn: float, pin: float) -> list[Wound]:
+def _fit_over_pin(springs: list[HelicalSpring], turn: float, pin: float) -> list[HelicalSpring]:
     """Return the torsion springs that fit over a pin [m] when they are wound up by an angle [rad]."""
     return [spring for spring in springs if PIN_SHARE * spring.inner_diameter_wound_up(turn) >= pin]
 
 
-def _size_spring(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
+def _size_spring(kind: Kind, index: float, rate: float, deflection: float) -> HelicalSpring:
     """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
-    unit = Wound(kind, 1e-3, index * 1e-3, MIN_TURNS)
+    unit = HelicalSpring(kind, 1e-3, index * 1e-3, MIN_TURNS)
     # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls
     # with the 0.145th power: with 1 mm as the unit of the wire
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
@@ -160,4 +160,4 @@ def _size_spring(kind: Kind, index: float, rate: float, deflection: float) -> Wo
     turns = MIN_TURNS * unit.rate * wire**power / rate
     if turns < MIN_TURNS:
         wire, turns = (rate / unit.rate) ** (1.0 / power), MIN_TURNS
-    return Wound(kind, 1e-3 * wire, 1e-3 * index * wire, turns)
+    return HelicalSpring(kind, 1e-3 * wire, 1e-3 * index * wire, turns)

@@ -18,9 +18,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from cfmkit.stock.springs.helical_spring_formulas import (
+    HelicalSpring,
     Kind,
     Seats,
-    Wound,
     buckling_deflection,
     tensile_strength,
 )
@@ -60,7 +60,7 @@ class Offer:
     body_length: float | None = None  # of the coil [m]
     initial_tension: float = 0.0  # load at which it begins to open [N or N m]
     outer_diameter: float | None = None  # of the coil [m]
-    wound: Wound | None = None  # its wire, coil and turns, if they are known
+    wound: HelicalSpring | None = None  # its wire, coil and turns, if they are known
     counts: tuple[int, ...] = (1,)  # numbers in parallel to try
     max_stress: float | None = None  # largest stress allowed in the wire [Pa]; None if not stated
     fatigue: FatigueLaw | None = None  # of the wire
@@ -93,11 +93,11 @@ def generic(kind: Kind) -> tuple[Offer, ...]:
         for index in SPRING_INDICES:
             for turns in TORSION_TURNS if kind == "torsion" else COIL_COUNTS:
                 coil = round(index * wire, 6)  # 4.8, not 4.800000000000001, in what is written of it
-                found.append(_generic(Wound(kind, wire * 1e-3, coil * 1e-3, float(turns))))
+                found.append(_generic(HelicalSpring(kind, wire * 1e-3, coil * 1e-3, float(turns))))
     return tuple(found)
 
 
-def _generic(wound: Wound) -> Offer:
+def _generic(wound: HelicalSpring) -> Offer:
     share = BENDING_SHARE if wound.kind == "torsion" else SHEAR_SHARE
     largest = wound.deflection_at(share * tensile_strength(wound.wire))
     free_length = {
@@ -121,13 +121,13 @@ def _generic(wound: Wound) -> Offer:
     return offer if offer.unguided >= largest else replace(offer, guide_rod=guide_rod_for(wound))
 
 
-def guide_rod_for(wound: Wound) -> float:
+def guide_rod_for(wound: HelicalSpring) -> float:
     """Return the diameter of a rod that guides a compression spring, in whole hundredths of a mm [m]."""
-    return math.floor(1e5 * wound.fitting_rod * (1 + 1e-9)) / 1e5
+    return math.floor(1e5 * wound.thickest_guide_rod * (1 + 1e-9)) / 1e5
 
 
 def unguided_deflection(
-    kind: Kind, free_length: float | None, wound: Wound | None, outer_diameter: float | None, seats: Seats
+    kind: Kind, free_length: float | None, wound: HelicalSpring | None, outer_diameter: float | None, seats: Seats
 ) -> float:
     """Return the deflection [m] up to which a spring does not buckle; infinite if never, or if that is not known.
 

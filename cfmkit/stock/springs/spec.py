@@ -16,7 +16,7 @@ from cfmkit.specs.spec import AS_MADE, Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
-from cfmkit.stock.springs.helical_spring_formulas import Wound
+from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC_SERIES, Offer, generic
 from cfmkit.stock.springs.support_spec import SpringSupport
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES_BY_NAME, WireName, WireOutOfRange
@@ -69,9 +69,11 @@ class WireLimits(Model):
                 object.__setattr__(self, key, getattr(WIRES_BY_NAME[self.material], key))
         return self
 
-    def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> Wound:
+    def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> HelicalSpring:
         """Return a spring of this wire."""
-        return Wound(kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self.material)
+        return HelicalSpring(
+            kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self.material
+        )
 
     def check_wire(self, wire: float | None, coil: float | None) -> None:
         """Raise `ValueError` for a coil that does not wind, or a wire thinner or thicker than its class is drawn.
@@ -110,7 +112,7 @@ class SpringWire(WireLimits):
         self.check_wire(self.wire, self.coil)
         return self
 
-    def to_wound(self, kind: Kind) -> Wound:
+    def to_wound(self, kind: Kind) -> HelicalSpring:
         """Return the wire, loaded as a kind of spring."""
         return self.wound_of(kind, self.wire, self.coil, self.turns)
 
@@ -120,7 +122,7 @@ class SpringWire(WireLimits):
             raise ValueError(_disagree(self.to_wound(kind), stated))
 
 
-def _disagree(wound: Wound, stated: float) -> str:
+def _disagree(wound: HelicalSpring, stated: float) -> str:
     """Return what is wrong with a rate that is not that of wire, coil and turns."""
     alike = [
         one.name
@@ -140,7 +142,7 @@ def is_made(info: ValidationInfo) -> bool:
     return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
 
 
-def check_initial_tension(wound: Wound | None, tension: float) -> None:
+def check_initial_tension(wound: HelicalSpring | None, tension: float) -> None:
     """Raise `ValueError` for an initial tension [N] that cannot be wound into a spring of this wire."""
     if wound is None or not tension:
         return
@@ -290,7 +292,7 @@ class CatalogueSpring(WireLimits, SpringSupport):
         return cls.model_validate((wire.model_dump(exclude_unset=True) if wire else {}) | known)
 
     @property
-    def wound(self) -> Wound | None:
+    def wound(self) -> HelicalSpring | None:
         """Its wire, coil and turns; None if they are not stated."""
         if self.wire is None or self.coil is None or self.turns is None:
             return None

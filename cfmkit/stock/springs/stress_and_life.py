@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
-    from cfmkit.stock.springs.helical_spring_formulas import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 WIRE_DEFINITIONS = {
@@ -47,7 +47,7 @@ WIRE_DEFINITIONS = {
 class SpringInUse:
     """A spring between two loads."""
 
-    wound: Wound | None  # its wire, coil and turns; None if they are not known
+    wound: HelicalSpring | None  # its wire, coil and turns; None if they are not known
     # least, largest: load of one spring, over the travel [N or N m], in the sense of the larger one: the least is
     # negative where the load reverses
     least: float

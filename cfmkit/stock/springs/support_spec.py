@@ -11,7 +11,7 @@ from cfmkit.specs.units import Length, format_short
 from cfmkit.stock.springs.helical_spring_formulas import Seats
 
 if TYPE_CHECKING:
-    from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind
 
 Positive = Field(gt=0)
 
@@ -32,7 +32,7 @@ class SpringSupport(Model):
         None, description="or inner diameter of the tube around it, at most 120 % of its outer diameter"
     )
 
-    def guides(self, wound: Wound | None) -> bool:
+    def guides(self, wound: HelicalSpring | None) -> bool:
         """Return whether a rod or a tube keeps a spring from buckling; where its wire is not known, any that is stated.
 
         A guide with more clearance than `LOOSEST` is none.
@@ -44,7 +44,7 @@ class SpringSupport(Model):
         on_rod = rod is not None and rod >= wound.thinnest_guide_rod * fits
         return on_rod or (tube is not None and tube * fits <= wound.widest_guide_tube)
 
-    def check_guide(self, kind: Kind, wound: Wound | None, outer: float | None) -> None:
+    def check_guide(self, kind: Kind, wound: HelicalSpring | None, outer: float | None) -> None:
         """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
         own = ["seats"] if self.seats != "fixed-fixed" else []
         own += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]

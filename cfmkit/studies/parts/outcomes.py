@@ -72,7 +72,7 @@ def analyze_parts(parts: Parts, values: FloatArray, nominal: Result, run: Run, w
     """Return what becomes of parts with values (n, d) [SI]; `nominal`: the result of the perfect part."""
     spec = parts.spec
     metrics = _metrics_to_note(spec, nominal)
-    study = Study(spec, parts.paths, metrics, seed=run.seed, findings=False, made=True)
+    study = Study(spec, parts.paths, metrics, seed=run.seed, findings=False, manufactured=True)
     work = Work(study, plan_of(parts.parameters, values))
     journal = run.notes if isinstance(run.notes, Journal) else None
     records = computed(work, run.executor, journal, _Progress(run, what, len(values)))

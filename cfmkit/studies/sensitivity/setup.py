@@ -142,7 +142,7 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     groups = together(block, paths)
     method = method_named(block.method)
     refuse_too_many(method.count_points(samples, len(paths), len(groups)), most)
-    study = Study(spec, paths, (), block.design, seed=chosen, deliver=run_design, made=method.draws_parts)
+    study = Study(spec, paths, (), block.design, seed=chosen, make_design=run_design, manufactured=method.draws_parts)
     result = _solve_nominal(study)
     study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
     study, nominal, unvalued = _with_nominal(study, result)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.stacked_line_diagrams import Limit
 from cfmkit.plots.style import apply_style
@@ -24,7 +24,7 @@ def loop(result: Result) -> Figure:
     """Return the force over the displacement, with the force of the plateau."""
     force = result.values["plateau_force"].value or 0.0
     level = Limit(force, f"oblique springs flat: {value_text(force, 'force')}")
-    return loop_figure(result, CurveLook(levels=(level,)), "force over travel of the slider")
+    return curve_figure(result, CurveLook(levels=(level,)), "force over travel of the slider")
 
 
 @apply_style

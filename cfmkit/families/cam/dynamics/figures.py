@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.families.cam.assembly import constant_force
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
@@ -69,7 +69,7 @@ def motion(result: Result) -> Figure:
 def motion_force(result: Result) -> Figure:
     """Return the force over the displacement with the requirement bands, and the quasi-static one."""
     moved: MotionSolution = result.state
-    figure = loop_figure(result, CurveLook(), "force over displacement, in motion and at rest")
+    figure = curve_figure(result, CurveLook(), "force over displacement, in motion and at rest")
     over = to_border(moved.displacement, "length")
     points = np.column_stack([over, to_border(moved.static, "force")])
     moving = np.column_stack([over, to_border(moved.history.force, "force")])

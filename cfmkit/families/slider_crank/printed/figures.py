@@ -12,7 +12,7 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP_
 from cfmkit.families.slider_crank.printed.part import bodies, choose_points
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving
 from cfmkit.plots.poses_in_one_svg import choose_poses as film_poses
@@ -62,7 +62,7 @@ def curve(result: Result) -> Figure:
     """Return the force over the slider's travel, the band that it should keep enlarged."""
     reported = {"lumped": "flexures and rigid links", "beam": "a strip", "solid": "the part as drawn"}
     what = reported[str(result.spec.get_value("analysis.fidelity"))]
-    return loop_figure(result, None, f"force over travel of the slider: {what}")
+    return curve_figure(result, None, f"force over travel of the slider: {what}")
 
 
 def stress_map(result: Result) -> Figure:

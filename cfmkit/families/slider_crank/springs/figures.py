@@ -19,7 +19,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.assembly import assembly_figure
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
-from cfmkit.plots.curve_with_enlarged_band import loop_figure
+from cfmkit.plots.curve_with_enlarged_band import curve_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, choose_poses
@@ -127,7 +127,7 @@ def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
 def scene(result: Result) -> PanelView:
     """Return a box around all positions of the motion, with room for symbols."""
     solution: Solution = result.state
-    link, units = solution.assembly.linkage, solution.units
+    link, units = solution.assembly.linkage, solution.unit_spring_curves
     x = np.concatenate([[0.0], link.crank * np.cos(units.angle[0]), units.position[0]])
     y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle[0])])
     extent = max(float(np.ptp(x)), float(np.ptp(y)))
@@ -191,7 +191,7 @@ def curve(result: Result) -> Figure:
     drive = solution.drive
     over = "crank angle" if drive == "torque" else "travel of the slider"
     heading = f"{drive} over {over}: {_kind(solution)}"
-    figure = loop_figure(result, None, heading)
+    figure = curve_figure(result, None, heading)
     for ax in figure.axes:
         _equilibria(ax, solution, lambda _motion, _energy: 0.0)
         _band(ax, solution)
@@ -200,7 +200,7 @@ def curve(result: Result) -> Figure:
 
 def _kind(solution: Solution) -> str:
     """Return the class of the stiffness in words for a heading."""
-    name = solution.name
+    name = solution.class_name
     return name if name in ("bistable", "tristable", "snap-through") else f"{name} stiffness"
 
 
@@ -237,7 +237,7 @@ def energy(result: Result) -> Figure:
     """Return the energy over the motion with its wells, and the share of each spring."""
     solution: Solution = result.state
     rates = solution.assembly.rates
-    shares = 0.5 * rates[:, None] * solution.units.turn[:, 0] ** 2
+    shares = 0.5 * rates[:, None] * solution.unit_spring_curves.turn[:, 0] ** 2
     series = [Series(solution.energy[0], "all springs", TEXT_INK, prefer=0.75)]
     if (rates > 0.0).sum() > 1:
         series += [
@@ -268,7 +268,9 @@ def springs(result: Result) -> Figure:
     drive, over = solution.drive, motion_scale(solution)
     there = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
     series = [
-        Series(solution.shares[k, 0], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.9 - 0.12 * n)
+        Series(
+            solution.spring_efforts[k, 0], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.9 - 0.12 * n
+        )
         for n, k in enumerate(there)
     ]
     if len(there) > 1:
@@ -285,7 +287,7 @@ def springs(result: Result) -> Figure:
 def joints(result: Result) -> Figure:
     """Return how far each joint turns, against its limit, and the forces inside."""
     solution: Solution = result.state
-    turn, over = solution.units.turn[:, 0], motion_scale(solution)
+    turn, over = solution.unit_spring_curves.turn[:, 0], motion_scale(solution)
     series = [
         Series(turn[k], JOINT_NAMES[k].replace("_", " "), SPRING_COLOURS[k], prefer=0.85 - 0.15 * k) for k in range(3)
     ]
@@ -407,7 +409,12 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     spec: Any = result.spec
     half, hole = eye_and_hole(spec)
     rates, offset = solution.assembly.rates, solution.assembly.linkage.offset
-    way = np.array([[at, offset] for at in (solution.units.position.min(), solution.units.position.max())])
+    way = np.array(
+        [
+            [at, offset]
+            for at in (solution.unit_spring_curves.position.min(), solution.unit_spring_curves.position.max())
+        ]
+    )
     for held in hardware(spec, solution).bodies:
         outline = held.outline()
         parts.edge(ax, np.vstack([outline, outline[:1]]), held.name, color=TEXT_GREY, linewidth=0.6)

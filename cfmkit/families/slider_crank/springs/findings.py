@@ -53,11 +53,13 @@ def _locks(number: int, name: str) -> Rule:
     """Return the rule on places of one of both ways where friction holds the mechanism."""
 
     def holds(solution: Solution) -> Any:
-        return solution.ways is not None and (~np.isfinite(solution.ways[number].effort)[:, 1:]).any(axis=1)
+        return solution.friction_branches is not None and (
+            ~np.isfinite(solution.friction_branches[number].effort)[:, 1:]
+        ).any(axis=1)
 
     def sentence(solution: Solution) -> Sentence:
-        assert solution.ways is not None
-        held = solution.motion[0, ~np.isfinite(solution.ways[number].effort[0])]
+        assert solution.friction_branches is not None
+        held = solution.motion[0, ~np.isfinite(solution.friction_branches[number].effort[0])]
         first, last = (place(solution, float(held[end])) for end in (0, -1))
         return (
             f"on the way {name} the mechanism self-locks from {first} to {last}: the line of force runs inside "
@@ -141,7 +143,7 @@ def _again(solution: Solution) -> Sentence:
     again = _same_poses(rests)
     different = len(set(rests) - {second for _, second in again})
     return (
-        f"{deg(again[0][0])} and {deg(again[0][1])} are the same position: the {solution.name} curve has "
+        f"{deg(again[0][0])} and {deg(again[0][1])} are the same position: the {solution.class_name} curve has "
         f"{different} different stable positions in a full turn",
     )
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.posed_part import PosedBody, clear_places, rectangle
+from cfmkit.export.posed_part import PosedBody, rectangle, screw_positions
 from cfmkit.families.findings import mm as length_in_words
 from cfmkit.families.findings import newton
 from cfmkit.families.hardware import (
@@ -78,7 +78,7 @@ def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     spare = 0.5 * np.maximum(LEAST_GROUND * screw.head - (high - low), 0.0)
     low, high = low - spare, high + spare
     ground, moving = rectangle(*low, *high), tuple(_drawn_bodies(spec, solution, eye, pin))
-    places = clear_places(ground, moving, screw.head)
+    places = screw_positions(ground, moving, screw.head)
     bodies = (
         PosedBody.polygon("ground", "held", ground),
         PosedBody.line("guide", "held", ends, 0.5 * rod.diameter),
@@ -118,8 +118,8 @@ def _drawn_bodies(spec: SliderCrankSpec, solution: Solution, eye: float, pin: fl
 
 def _joints(solution: Solution) -> list[Any]:
     """Return pivot, crank pin and slider pin in all poses, (p, 2) each [m]."""
-    link, angle = solution.assembly.linkage, np.atleast_2d(solution.units.angle)[0]
-    slid = np.atleast_2d(solution.units.position)[0]
+    link, angle = solution.assembly.linkage, np.atleast_2d(solution.unit_spring_curves.angle)[0]
+    slid = np.atleast_2d(solution.unit_spring_curves.position)[0]
     crank = link.crank * np.column_stack([np.cos(angle), np.sin(angle)])
     return [np.zeros_like(crank), crank, np.column_stack([slid, np.full(slid.size, link.offset)])]
 
@@ -139,7 +139,7 @@ def _describe_strength(strength: PartStrength) -> str:
 
 def _guide_loads(spec: SliderCrankSpec, solution: Solution) -> tuple[float, float, float, Any]:
     """Return loads across the guide and along it [N], the slider's travel [m], and both ends of its pin's way [m]."""
-    slid = np.atleast_2d(solution.units.position)[0]
+    slid = np.atleast_2d(solution.unit_spring_curves.position)[0]
     coupler, guide = (np.ravel(entry) for entry in solution.reactions)
     across, pulled = (float(np.abs(entry[np.isfinite(entry)]).max(initial=0.0)) for entry in (guide, coupler))
     legs, offset = spec.mechanism.sets, float(solution.assembly.linkage.offset)

@@ -189,7 +189,7 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
     if short and not start < stop:
         raise CannotBuild(short[0])
     solution = _solution([spec], [assembly], [(start, stop)])
-    finite = np.isfinite(solution.units.effort[assembly.rates > 0.0, 0]).all(axis=0)
+    finite = np.isfinite(solution.unit_spring_curves.effort[assembly.rates > 0.0, 0]).all(axis=0)
     if not finite.all():  # where springs are relaxed in a dead point of the crank: 0/0 in that place alone
         solution = replace(solution, motion=solution.motion[:, finite])
     return solution, short
@@ -247,13 +247,16 @@ def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
 
 def _curve(solution: Solution) -> Curve:
     """Return the curve of one mechanism; with friction the way through the motion and back."""
-    (assembly,), drive, units = solution.assemblies, solution.drive, solution.units
+    (assembly,), drive, units = solution.assemblies, solution.drive, solution.unit_spring_curves
     rate = "rotational_stiffness" if drive == "torque" else "stiffness"
     coupler, guide = solution.reactions
     extra = {
         "stiffness": Column(solution.stiffness[0], rate),
         "energy": Column(solution.energy[0], "energy"),
-        **{f"{drive}_{name}": Column(row[0], drive) for name, row in zip(JOINT_NAMES, solution.shares, strict=True)},
+        **{
+            f"{drive}_{name}": Column(row[0], drive)
+            for name, row in zip(JOINT_NAMES, solution.spring_efforts, strict=True)
+        },
         **({"crank_angle": Column(units.angle[0], "angle")} if drive == "force" else {}),
         "slider_position": Column(units.position[0], "length"),
         **{f"{name}_rotation": Column(row[0], "angle") for name, row in zip(JOINT_NAMES[:3], units.turn, strict=False)},
@@ -262,9 +265,9 @@ def _curve(solution: Solution) -> Curve:
         "guide_force": Column(guide[0], "force"),
     }
     motion = solution.motion[0]
-    if solution.ways is None:
+    if solution.friction_branches is None:
         return Curve(motion, solution.effort[0], extra=extra, kind=drive)
-    forth, back = solution.ways
+    forth, back = solution.friction_branches
 
     def both(one: FloatArray, other: FloatArray) -> FloatArray:
         return np.concatenate([one.ravel(), other.ravel()[::-1]])
@@ -279,7 +282,7 @@ def _curve(solution: Solution) -> Curve:
 
 def _describe_locked(solution: Solution) -> str:
     """Return what to say of places where friction leaves no equilibrium; empty without any."""
-    failed = sum(int((~np.isfinite(way.effort[0, 1:])).sum()) for way in solution.ways or ())
+    failed = sum(int((~np.isfinite(way.effort[0, 1:])).sum()) for way in solution.friction_branches or ())
     points = 2 * solution.motion.shape[1]
     return f"{failed} of {points} points have no equilibrium: friction holds the mechanism" if failed else ""
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.spec import Springs
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
     from cfmkit.results import Result
-    from cfmkit.stock.springs.helical_spring_formulas import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring
 
 N_SHEETS = 3
 """Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
@@ -34,7 +34,7 @@ def part_over_motion(result: Result) -> PosedPart:
     depth, why = _depth(spec, rates, solution.extremes.largest_turns[:, 0])
     joining = hardware(spec, solution)
     return PosedPart(
-        (*bodies(spec, solution, solution.units), *joining.bodies),
+        (*bodies(spec, solution, solution.unit_spring_curves), *joining.bodies),
         direction=0.0,
         depth=depth,
         pieces=3 + int(np.count_nonzero(rates)),
@@ -80,7 +80,7 @@ def _depth(spec: SliderCrankSpec, rates: FloatArray, turns: FloatArray) -> tuple
     return N_SHEETS * part.sheet + below + above, f"; {N_SHEETS} sheets and the springs on both sides of them"
 
 
-def height_of(name: str, coil: Wound, turn: float) -> float:
+def height_of(name: str, coil: HelicalSpring, turn: float) -> float:
     """Return how far the spring of a joint stands out from the links [m]: lying beside the coupler, or at a pin.
 
     There it is longest when it is wound up by `turn` [rad].

@@ -111,8 +111,8 @@ def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any
 
 def _lost_energy(solution: Solution, kind: str) -> FloatArray:
     """Return what pins or guide take over the window, back and forth, (m,) [J]."""
-    assert solution.ways is not None
-    (forth, back), motion = solution.ways, solution.broadcast(solution.motion)
+    assert solution.friction_branches is not None
+    (forth, back), motion = solution.friction_branches, solution.broadcast(solution.motion)
     lost = solution.broadcast(forth.lost[kind] + back.lost[kind])
     low, high = (np.broadcast_to(end, (len(solution), 1)) for end in solution.window_or_motion)
     low, high = np.maximum(low, motion[:, :1]), np.minimum(high, motion[:, -1:])
@@ -135,7 +135,7 @@ def _of_loop(what: str, kind: str) -> Function:
 
 
 def _rubs(solution: Solution) -> bool:
-    return solution.ways is not None
+    return solution.friction_branches is not None
 
 
 def _force_per_degree(solution: Solution) -> FloatArray:

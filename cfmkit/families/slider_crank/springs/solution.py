@@ -1,8 +1,14 @@
-"""Solved slider-cranks with springs as rows: curves, equilibria with their stability, class, constant band.
+"""Solution of m slider-cranks with springs at once: curves, equilibria, stability, bistability class, constant band.
 
-Places are found on a fine grid of its own, cut into monotonic pieces, and sharpened on the closed form: nothing here
-depends on the points of the curve. What all rows have in common (the motion, or what unit springs do along it) is one
-row, and is broadcast.
+Specifications and assembled linkages go in. Each mechanism is a row of every array, (m, 1) or (m, n); what all have in
+common (the motion, or efforts of unit springs along it) is one row, (1, n), and is broadcast. An analysis has m = 1.
+
+Equilibria, turning points and bands are searched on a fine grid, cut into monotonic pieces, and refined on the closed
+form, so that they do not depend on the points of the curve.
+
+Four places of the motion have names: `start` is the unloaded position; `rest`, where all springs are relaxed, is the
+same place or none; `stretched` is the nearest position with crank and coupler in line; around `reference` the constant
+band is measured, and the effort there is `level`.
 
 Reference
 ---------
@@ -50,23 +56,23 @@ if TYPE_CHECKING:
 
 
 N_GRID_PLACES = 1025
-"""Places of the grid. Efforts between them are cubics; classes change within 1e-9 of where they should."""
+"""Places of the grid. Efforts between them are cubics; a class changes within 1e-9 of the exact value of a rate."""
 
 MOTION_RTOL = 1e-9
 """An equilibrium so near to the unloaded position, as a share of the motion, is that position."""
 
 NEXT_TO_START = 1e-9
-"""Share of the motion at which forces with friction are computed at its start: a stretched start itself is 0/0."""
+"""Share of the motion after its start at which forces with friction are computed: they are 0/0 at a stretched start."""
 
 BAND_EDGE_FACTOR = 1.0 + 1e-9
 """An effort on the edge of a band is inside it, whatever the last bits say."""
 
 NO_LEVEL = 1e-9
-"""Share of the largest effort that is no reference of a band."""
+"""Share of the largest effort up to which the effort at the reference is rounding, and there is no band around it."""
 
 
 def target_of(spec: SliderCrankSpec) -> float | None:
-    """Return what the effort is to be [N m or N]; None if the design says nothing about this drive."""
+    """Return the effort that the design requests [N m or N]; None if it requests none for this drive."""
     if spec.design is None:
         return None
     return spec.design.torque if spec.analysis.drive == "torque" else spec.design.force
@@ -82,7 +88,7 @@ def grid_over(drive: Kind, low: Any, high: Any) -> FloatArray:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A place where nothing needs to hold the mechanism."""
+    """Place at which the mechanism stays without being held."""
 
     motion: float  # crank angle [rad] or slider travel [m]
     stable: bool  # whether the energy has a minimum there
@@ -91,7 +97,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(ShortRepr):
-    """Solved mechanisms of one kind, one a row: they differ in numbers only."""
+    """Solved mechanisms, one in each row of every array; their specifications differ in numbers only."""
 
     specs: tuple[SliderCrankSpec, ...]
     assemblies: tuple[Assembly, ...]
@@ -115,11 +121,11 @@ class Solution(ShortRepr):
         """Return values of one row, or of each, (1, ...) or (m, ...), as (m, ...)."""
         return np.broadcast_to(values, (len(self), *np.shape(values)[1:]))
 
-    # --- of the first mechanism -------------------------------------------------------------------------------------
+    # --- values of the first mechanism --------------------------------------------------------------------------------
 
     @property
     def spec(self) -> SliderCrankSpec:
-        """Its specification: words and numbers of points are the same in all."""
+        """Its specification; words and numbers of points are the same in all rows."""
         return self.specs[0]
 
     @property
@@ -140,8 +146,8 @@ class Solution(ShortRepr):
         return tuple(Equilibrium(*one) for one in own)
 
     @property
-    def name(self) -> str:
-        """Its class in words."""
+    def class_name(self) -> str:
+        """Its bistability class in words."""
         return CLASS_NAMES[int(self.classified.kind[0])]
 
     def nearest_of_one(self, stable: bool) -> Equilibrium | None:
@@ -149,7 +155,7 @@ class Solution(ShortRepr):
         place, energy = (float(one[0]) for one in self.nearest(stable))
         return None if np.isnan(place) else Equilibrium(place, stable, energy)
 
-    # --- numbers of each mechanism, (m, 1) --------------------------------------------------------------------------
+    # --- numbers of each mechanism, (m, 1) ----------------------------------------------------------------------------
 
     @cached_property
     def assembly(self) -> Assembly:
@@ -163,7 +169,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def rest(self) -> FloatArray:
-        """Place at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        """Place at which all springs are relaxed; NaN if the motion has none."""
         return self.column(lambda assembly: assembly.rest)
 
     @cached_property
@@ -205,47 +211,47 @@ class Solution(ShortRepr):
         """The window, else all of the motion."""
         return self.window or Several((self.low, self.high))
 
-    # --- curves, (m, n) ---------------------------------------------------------------------------------------------
+    # --- curves, (m, n) -----------------------------------------------------------------------------------------------
 
     @cached_property
-    def units(self) -> UnitCurves:
-        """Efforts of springs of rate 1 along the motion."""
+    def unit_spring_curves(self) -> UnitCurves:
+        """Turns, efforts and stiffnesses of springs of rate 1, and positions of the links, along the motion."""
         return self.assembly.units(self.motion)
 
     @cached_property
-    def forces(self) -> FloatArray:
-        """Efforts of `units` alone, (4, m, n)."""
+    def unit_efforts(self) -> FloatArray:
+        """Efforts of `unit_spring_curves` alone, (4, m, n)."""
         return self.assembly.forces(self.motion)
 
     @cached_property
-    def shares(self) -> FloatArray:
+    def spring_efforts(self) -> FloatArray:
         """Effort of each spring, (4, m, n) [N m or N]."""
-        return self.assembly.weigh(self.forces)
+        return self.assembly.weigh(self.unit_efforts)
 
     @cached_property
     def effort(self) -> FloatArray:
         """Torque [N m] or force [N], without friction."""
-        return np.asarray(self.broadcast(self.assembly.total(self.forces)))
+        return np.asarray(self.broadcast(self.assembly.total(self.unit_efforts)))
 
     @cached_property
     def stiffness(self) -> FloatArray:
         """Derivative of the effort by the motion [N m/rad or N/m]."""
-        return self.assembly.total(self.units.stiffness)
+        return self.assembly.total(self.unit_spring_curves.stiffness)
 
     @cached_property
     def energy(self) -> FloatArray:
         """Energy in all springs [J]."""
-        return 0.5 * self.assembly.total(self.units.turn**2)
+        return 0.5 * self.assembly.total(self.unit_spring_curves.turn**2)
 
     @cached_property
     def effort_error(self) -> FloatArray:
         """Rounding of the sum of the springs' efforts, (m,) [N m or N]."""
-        sizes = np.abs(self.shares).sum(axis=0)
+        sizes = np.abs(self.spring_efforts).sum(axis=0)
         return np.asarray(self.broadcast(ROUND_OFF * sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))))
 
     @cached_property
-    def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:
-        """The motion with friction, forth and back; None if nothing rubs."""
+    def friction_branches(self) -> tuple[FrictionBranch, FrictionBranch] | None:
+        """The curves with friction, forth and back; None if nothing rubs."""
         if not self.assemblies[0].rubbing.there:
             return None
         return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
@@ -254,21 +260,21 @@ class Solution(ShortRepr):
     def reactions(self) -> Ends:
         """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
         driven = self.effort if self.drive == "force" else np.zeros_like(self.effort)
-        coupler, guide = reactions(self.assembly, self.units, driven)
+        coupler, guide = reactions(self.assembly, self.unit_spring_curves, driven)
         return Several((coupler / self.legs, (0.0 if self._is_mirrored else 1.0) * guide / self.legs))
 
     @property
     def _is_mirrored(self) -> bool:
         return self.assemblies[0].rubbing.mirrored
 
-    # --- at every place ---------------------------------------------------------------------------------------------
+    # --- efforts at any place -----------------------------------------------------------------------------------------
 
     def effort_at(self, places: FloatArray, rows: Any = None, name: str = "load") -> FloatArray:
         """Return the effort of a branch at places of each mechanism, or of some, (k, n) [N m or N]."""
-        if places is self.curve.place and name == "load" and self.ways is None:
+        if places is self.curve.place and name == "load" and self.friction_branches is None:
             return self.curve.value
         assembly = self.assembly if rows is None else rows_of(self.assembly, rows)
-        if self.ways is not None:
+        if self.friction_branches is not None:
             return branch(assembly, places, -1.0 if name == "unload" else 1.0).effort
         return assembly.efforts(places)
 
@@ -306,11 +312,11 @@ class Solution(ShortRepr):
         if not found:
             return Several((np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0)))
         rows, low, high, stable = (np.array(one) for one in zip(*found, strict=True))
-        way, assembly = np.where(stable, 1.0, -1.0)[:, None], rows_of(self.assembly, rows)
+        sense, assembly = np.where(stable, 1.0, -1.0)[:, None], rows_of(self.assembly, rows)
         size = np.abs(self.curve.value).max(axis=1)[rows, None]
 
         def excess(at: FloatArray, few: NDArray[np.intp]) -> FloatArray:
-            return np.asarray(way[few] * rows_of(assembly, few).efforts(at) / size[few])
+            return np.asarray(sense[few] * rows_of(assembly, few).efforts(at) / size[few])
 
         root = last_places(excess, low[:, None], high[:, None])[:, 0]
         width = np.broadcast_to((self.high - self.low)[:, 0], len(self))[rows]
@@ -351,9 +357,9 @@ class Solution(ShortRepr):
         level, limit = np.where(known, self.level, 1.0)[:, None], self.tolerance * BAND_EDGE_FACTOR
         outside, inner, beyond = np.abs(value / level - 1.0) > limit, [], []
         for sign in (-1.0, 1.0):  # towards the low end, and towards the high one
-            way, here = sign * place, sign * self.reference
-            first = np.where(outside & (way > here), way, np.inf).min(axis=1, keepdims=True)
-            before = np.maximum(np.where(way < first, way, -np.inf).max(axis=1, keepdims=True), here)
+            ahead, here = sign * place, sign * self.reference
+            first = np.where(outside & (ahead > here), ahead, np.inf).min(axis=1, keepdims=True)
+            before = np.maximum(np.where(ahead < first, ahead, -np.inf).max(axis=1, keepdims=True), here)
             inner.append(sign * before)
             beyond.append(sign * np.where(np.isfinite(first), first, before))
 
@@ -364,7 +370,7 @@ class Solution(ShortRepr):
         low, high = last_places(excess, np.hstack(inner), np.hstack(beyond)).T
         return Several((np.where(known, low, np.nan), np.where(known, high, np.nan)))
 
-    # --- wherever they are ------------------------------------------------------------------------------------------
+    # --- extremes over the motion -------------------------------------------------------------------------------------
 
     @cached_property
     def extremes(self) -> MotionExtremes:
@@ -380,10 +386,10 @@ class Solution(ShortRepr):
     def reaction_extremes(self) -> tuple[Ends, Ends]:
         """Largest and smallest tension in the coupler of one leg, and of its slider's force on the guide, (m,) [N].
 
-        NaN where none is known. With friction of both ways.
+        NaN where none is known. With friction they are those of both branches.
         """
         legs = self.legs[:, 0]
-        if self.ways is not None:
+        if self.friction_branches is not None:
             coupler, guide = self._rubbed_extremes("coupler"), self._rubbed_extremes("guide")
         else:
             coupler, guide = self.extremes.coupler, self.extremes.guide
@@ -391,14 +397,14 @@ class Solution(ShortRepr):
         return Several((coupler[0] / legs, coupler[1] / legs)), Several((size * guide[0], size * guide[1]))
 
     def _rubbed_extremes(self, part: Literal["coupler", "guide"]) -> Ends:
-        """Return extremes of both ways, of all legs; NaN where friction holds the mechanism somewhere."""
+        """Return extremes of both friction branches, of all legs; NaN if friction holds the mechanism somewhere."""
         places, last = self.extremes.places.copy(), self.extremes.last
         places[:, 0] += NEXT_TO_START * (places[:, -1] - places[:, 0])
         found = []
-        for way in (1.0, -1.0):
+        for direction in (1.0, -1.0):
 
-            def force(at: FloatArray, way: float = way) -> FloatArray:
-                return np.asarray(getattr(branch(self.assembly, at, way), part))
+            def force(at: FloatArray, direction: float = direction) -> FloatArray:
+                return np.asarray(getattr(branch(self.assembly, at, direction), part))
 
             values = force(places)
             high, low = extremes(force, places, values, uneven=True, last=np.broadcast_to(last, len(values)))
@@ -407,15 +413,16 @@ class Solution(ShortRepr):
         (high, low), (other_high, other_low) = found
         return np.maximum(high, other_high), np.minimum(low, other_low)
 
-    # --- as metrics see them ----------------------------------------------------------------------------------------
+    # --- rows for metrics ---------------------------------------------------------------------------------------------
 
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
         """The curves by branch; with friction there are two."""
         motion = self.broadcast(self.motion)
         efforts = {"load": self.effort}
-        if self.ways is not None:
-            efforts = dict(zip(("load", "unload"), (self.broadcast(way.effort) for way in self.ways), strict=True))
+        if self.friction_branches is not None:
+            forth, back = (self.broadcast(curves.effort) for curves in self.friction_branches)
+            efforts = {"load": forth, "unload": back}
         full = np.full(len(self), motion.shape[1])
         ends = motion[:, 0], motion[:, -1]
         band = self.settings(lambda spec: spec.analysis.band)[:, 0]
@@ -475,7 +482,7 @@ class ClosedFormEffort(ShortRepr):
 
     @property
     def peaks(self) -> FloatArray:
-        """All places: springs bend the curve on the scale of the linkage, which few points of a curve may miss."""
+        """Places that metrics add to the points of a curve: all, since few points may miss a turn of the curve."""
         return self.places
 
     def effort(self, name: str, places: FloatArray, /) -> FloatArray:

@@ -15,7 +15,7 @@ from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
-    from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound
+    from cfmkit.stock.springs.helical_spring_formulas import HelicalSpring, Kind
 
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
@@ -55,7 +55,7 @@ class Bought(SpringSupport):
         return self.loaded or "extension" if self.at == "slider" else "torsion"
 
     @property
-    def coil(self) -> Wound | None:
+    def coil(self) -> HelicalSpring | None:
         """Its wire, coil and turns; None if they are not stated."""
         return None if self.wound is None else self.wound.to_wound(self.kind)
 
@@ -122,7 +122,7 @@ class Springs(Model):
         known = [rate for rate in rates if rate is not None]
         return float(getattr(self, joint) / sum(known)) if len(known) == len(rates) else 1.0
 
-    def coils_at(self, joint: str) -> list[Wound]:
+    def coils_at(self, joint: str) -> list[HelicalSpring]:
         """Return the springs at a joint whose wire is known."""
         return [one.coil for one in self.bought if one.at == joint and one.coil is not None]
 

@@ -1,7 +1,15 @@
-"""A curve as it is seen along its motion: a travel to the negative side is turned round, and its force with it.
+"""Constant-force range, first peak and valley, and stress limit of a solved beam mechanism, for its scalar results.
 
-So places grow, forces that hold against the motion are positive, and what is said of a travel holds for its mirror
-image, too.
+The range ends at the end d of the window, where the force is F_d, and begins where the force first reaches 0.95 F_d. A
+curve whose travel is negative is mirrored first, and its force with it (`AlongMotion`): so places increase, forces that
+hold against the motion are positive, and one definition serves both directions. `AlongMotion.to_spec_sign` undoes this.
+
+A traced mechanism has a model between the points of its curve: there results are refined by equilibria that are solved
+at them. Of other models cubics through the points decide.
+
+Reference
+---------
+[Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), sec. 2.
 """
 
 from __future__ import annotations
@@ -25,20 +33,20 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
 
 RANGE_BAND = 0.05
-"""Share of F_d by which the force may differ from it: the range begins at 0.95 F_d [Lan, sec. 2]."""
+"""Largest difference of the force from F_d in the range, as a share of F_d [Lan, sec. 2]."""
 
 MAX_REFINEMENTS = 4
-"""Of putting a place right; Lan's mechanism (`configs/beam_lan2010.yaml`) needs three."""
+"""Most equilibria solved to refine one place; Lan's mechanism (`configs/beam_lan2010.yaml`) needs three."""
 
-PLACE_RTOL = 1e-11  # of the travel: a place that moves by less is known
+PLACE_RTOL = 1e-11  # share of the travel: a place that moves by less is refined enough
 
 EXTREME_STENCIL = 0.1 * np.arange(-2.0, 3.0)
-"""Where equilibria are solved for around an extreme, as shares of the way to the next point: wide enough that what the
-solver leaves does not move the place, close enough that a polynomial of degree four does not either."""
+"""Where equilibria are solved around an extreme, as shares of the step of the curve: wide enough that the solver's
+error does not move the extreme, and close enough that a polynomial of degree four through them does not either."""
 
 
-class OnCurve(Observed, Protocol):
-    """Values of a solved mechanism of any model at the points of its curve; forces are those of all copies."""
+class SolvedMechanism(Observed, Protocol):
+    """Solved mechanism of any model: values at the points of its curve; forces are those of all copies."""
 
     @property
     def spec(self) -> BeamSpec:
@@ -46,7 +54,7 @@ class OnCurve(Observed, Protocol):
 
     @property
     def assembly(self) -> Assembly:
-        """The network and what is done to it."""
+        """The network of beams with its drive and limits."""
 
     @property
     def effort_error(self) -> float | None:
@@ -61,21 +69,21 @@ class OnCurve(Observed, Protocol):
         """Whether each point is a stable equilibrium, (n,)."""
 
     @property
-    def everywhere(self) -> BetweenPoints | None:
-        """The model between the points of the curve, where it is so cheap."""
+    def model_between_points(self) -> BetweenPoints | None:
+        """The model at every place between the points; None if it would take seconds, or the curve turns back."""
 
     @property
     def along(self) -> AlongMotion:
-        """The curve along its motion."""
+        """The curve with its travel made positive."""
 
 
-def travel_of(solution: OnCurve) -> tuple[float, float]:
-    """Return where the motion was to start and to end; of a drive by a load, where it did [m or rad]."""
+def travel_of(solution: SolvedMechanism) -> tuple[float, float]:
+    """Return where the motion was to start and to end [m or rad]; under a load, where it did end."""
     start, end = float(solution.motion[0]), float(solution.motion[-1])
     return start, solution.spec.extent if solution.spec.analysis.travel is not None else end
 
 
-def window_of(solution: OnCurve) -> tuple[float, float]:
+def window_of(solution: SolvedMechanism) -> tuple[float, float]:
     """Return the window of the analysis in places, or the whole travel."""
     window = solution.spec.analysis.window
     if window is not None:
@@ -85,13 +93,13 @@ def window_of(solution: OnCurve) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class AlongMotion:
-    """A curve of at least one point, turned round if it leads to the negative side."""
+    """Curve of at least one point, mirrored if its travel is negative, with the results that are read from it."""
 
-    solution: OnCurve  # the solved mechanism
+    solution: SolvedMechanism
 
     @cached_property
     def sense(self) -> float:
-        """Factor of places and forces, 1 or -1: here, and to bring them back."""
+        """Factor of places and forces, 1 or -1, from the specification's signs to these and back."""
         return 1.0 if self.solution.motion[-1] >= self.solution.motion[0] else -1.0
 
     @cached_property
@@ -106,7 +114,7 @@ class AlongMotion:
 
     @cached_property
     def end(self) -> float:
-        """The end of the window, or of the travel [m or rad]."""
+        """The end d of the window, or of the travel [m or rad]."""
         return max(self.sense * end for end in window_of(self.solution))
 
     @property
@@ -118,55 +126,55 @@ class AlongMotion:
     @cached_property
     def knots(self) -> tuple[FloatArray, FloatArray]:
         """Places, increasing, and efforts: of the points, and of extremes between them where the model is known."""
-        law = self.solution.everywhere
-        if law is None:
+        between = self.solution.model_between_points
+        if between is None:
             return self.motion, self.effort
-        x, effort = law.knots
+        x, effort = between.knots
         return (x, effort) if self.sense > 0 else (-x[::-1], -effort[::-1])
 
     @cached_property
     def corners(self) -> FloatArray | None:
         """Places of kinks of the effort [m or rad]; None if the model between the points is not known."""
-        law = self.solution.everywhere
-        return None if law is None else np.asarray(self.sense * law.corners)
+        between = self.solution.model_between_points
+        return None if between is None else np.asarray(self.sense * between.corners)
 
     def effort_at(self, places: FloatArray) -> FloatArray:
         """Return the effort at places, by the model between the points [N or N m]."""
-        assert self.solution.everywhere is not None
-        return np.asarray(self.sense * self.solution.everywhere.effort("", self.sense * places))
+        assert self.solution.model_between_points is not None
+        return np.asarray(self.sense * self.solution.model_between_points.effort("", self.sense * places))
 
     def stress_at(self, places: FloatArray) -> FloatArray:
         """Return the largest stress at places, by the model between the points [Pa]."""
-        assert self.solution.everywhere is not None
-        return self.solution.everywhere.stress("", self.sense * places)
+        assert self.solution.model_between_points is not None
+        return self.solution.model_between_points.stress("", self.sense * places)
 
     def stress_reaches(self, level: float) -> float | None:
         """Return where the largest stress first reaches a level, by the model between the points [m or rad]."""
-        assert self.solution.everywhere is not None
-        found = self.solution.everywhere.stress_reaches(level, self.sense)
+        assert self.solution.model_between_points is not None
+        found = self.solution.model_between_points.stress_reaches(level, self.sense)
         return None if found is None else self.sense * found
 
     # -- the range that ends at d [Lan, sec. 2]; NaN where a value does not exist ------------------------------------
     @cached_property
-    def nominal(self) -> float:
-        """Force at the end of the window [N]; NaN on a curve that turns back, ends before it, or has unknown forces."""
+    def force_at_end(self) -> float:
+        """Force F_d at the end of the window [N]; NaN if the curve turns back, ends before it or has unknown forces."""
         known = len(self.motion) and self.reaches_end and np.isfinite(self.effort).all()
         return value_at(*self.knots, self.end) if known else np.nan
 
     @cached_property
     def start(self) -> float:
-        """Displacement at which the force first reaches 0.95 of that at the end [m]."""
-        if not abs(self.nominal) > (self.solution.effort_error or 0.0):  # else 95 % of it are rounding
+        """Displacement at which the force first reaches 0.95 F_d, where the range begins [m]."""
+        if not abs(self.force_at_end) > (self.solution.effort_error or 0.0):  # else 95 % of it are rounding
             return np.nan
-        place = self._refine(lambda x, force: crossing(x, force / self.nominal, 1 - RANGE_BAND))
+        place = self._refine_place(lambda x, force: crossing(x, force / self.force_at_end, 1 - RANGE_BAND))
         return place if place is not None and place <= self.end and self.end > 0 else np.nan
 
     @cached_property
     def strict_start(self) -> float:
         """Smallest place from which on the force stays within 5 % of its maximum [m]."""
-        if np.isnan(self.start) or self.nominal <= 0:  # no band lies around the force there
+        if np.isnan(self.start) or self.force_at_end <= 0:  # no band lies around the force there
             return np.nan
-        return self._refine(lambda x, force: find_strict_start(x, force, self.end)) or 0.0
+        return self._refine_place(lambda x, force: find_strict_start(x, force, self.end)) or 0.0
 
     def fraction(self, start: float) -> float:
         """Return the range that begins at a place, as a share of the travel."""
@@ -175,9 +183,9 @@ class AlongMotion:
     @cached_property
     def stress_at_end(self) -> float:
         """Largest stress at the end of the window [Pa], beam by beam: the largest of all has kinks."""
-        if np.isnan(self.nominal):
+        if np.isnan(self.force_at_end):
             return np.nan
-        if self.solution.everywhere is not None:
+        if self.solution.model_between_points is not None:
             return float(self.stress_at(np.array([self.end]))[0])
         return max(value_at(self.motion, value, self.end) for value, _ in self.solution.stresses.values())
 
@@ -185,16 +193,16 @@ class AlongMotion:
     def stress_limit(self) -> float:
         """Displacement at which the stress first reaches the allowable one [m], beam by beam."""
         allowable = self.solution.assembly.allowable_stress
-        if np.isnan(self.nominal) or allowable is None:
+        if np.isnan(self.force_at_end) or allowable is None:
             return np.nan
-        if self.solution.everywhere is not None:
+        if self.solution.model_between_points is not None:
             found = self.stress_reaches(allowable)
             return np.nan if found is None else found
         reached = [crossing(self.motion, value, allowable) for value, _ in self.solution.stresses.values()]
         return min((place for place in reached if place is not None), default=np.nan)
 
-    def _refine(self, find: Callable[[FloatArray, FloatArray], float | None]) -> float | None:
-        """Return a place that cubics tell, put right by the equilibrium solved there, if the model can do so."""
+    def _refine_place(self, find: Callable[[FloatArray, FloatArray], float | None]) -> float | None:
+        """Return the place that `find` reads from cubics, refined by equilibria solved there if the model allows it."""
         x, force = self.knots
         place = find(x, force)
         for _ in range(MAX_REFINEMENTS):
@@ -215,17 +223,17 @@ class AlongMotion:
         x, force = self.knots
         bearing = np.flatnonzero(np.abs(force) > (self.solution.effort_error or 0.0))
         begin = float(x[bearing[0] - 1]) if len(bearing) and bearing[0] > 1 else -np.inf
-        return self._turn(first_extreme(x, force, after=begin, corners=self.corners))
+        return self._refine_extreme(first_extreme(x, force, after=begin, corners=self.corners))
 
     @cached_property
     def valley(self) -> tuple[float, float]:
         """The first local minimum after that."""
         if np.isnan(self.peak[0]):
             return np.nan, np.nan
-        return self._turn(first_extreme(*self.knots, -1, after=self.peak[0], corners=self.corners))
+        return self._refine_extreme(first_extreme(*self.knots, -1, after=self.peak[0], corners=self.corners))
 
-    def _turn(self, found: tuple[float, float] | None) -> tuple[float, float]:
-        """Return an extreme from equilibria around it, where the model can be asked; else as found."""
+    def _refine_extreme(self, found: tuple[float, float] | None) -> tuple[float, float]:
+        """Return an extreme, refined by equilibria solved around it if the model allows it; NaN for None."""
         if found is None:
             return np.nan, np.nan
         if self.corners is None or found[0] in self.corners:
@@ -246,8 +254,8 @@ class AlongMotion:
             place, value = place + step * at, float(np.polynomial.polynomial.polyval(at, powers))
         return place, value
 
-    def back(self, value: float) -> float:
-        """Return a place or a force as the specification has it."""
+    def to_spec_sign(self, value: float) -> float:
+        """Return a place or a force with the sign that it has in the specification."""
         return value if self.sense > 0 else 0.0 - value  # not -0
 
 
