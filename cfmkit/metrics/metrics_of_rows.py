@@ -120,7 +120,7 @@ class CurveRows(ShortRepr):
     effort: Callable[[FloatArray, Any], FloatArray]  # at places of some rows, (k, m), (k,) or None for all -> (k, m)
     error: FloatArray  # (d,) numerical error of the effort
     target: FloatArray  # (d,) effort that is wanted, NaN if there is none
-    band: float  # half width of the band of `usable_stroke`, as a fraction
+    band: FloatArray | float  # (d,), or for all: half width of the band of `usable_stroke`, as a fraction
     valid: Ends  # (d,) each, from where to where the mechanism works as intended
     part_efforts: Callable[[FloatArray], FloatArray] | None = None  # largest of one spring or member, (d, m) -> (d, m)
     stress: StressRows | None = None

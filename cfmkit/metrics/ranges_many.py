@@ -229,7 +229,7 @@ def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
 def usable_interval(
     branches: Sequence[ManyBranches],
     target: FloatArray,
-    band: float,
+    band: FloatArray | float,
     valid: FloatArray,
     until: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
@@ -241,7 +241,7 @@ def usable_interval(
         Of one motion.
     target : (d,) array
         What the efforts are compared with, not zero.
-    band : float
+    band : (d,) array or float
         Half width of the band, as a fraction.
     valid, until : (d,) array
         Where the mechanism starts to work as intended, and where it ceases to, by default nowhere.
@@ -252,15 +252,15 @@ def usable_interval(
         until = np.full(len(motion), np.inf)
     else:  # the last place itself, but for rounding, is no limit
         until = np.where(until < last - 1e-9 * (last - motion[:, 0]), until, np.inf)
+    width = np.broadcast_to(band * (1 + BAND_RTOL), len(motion))
     if all(branch.exact is not None for branch in branches):
-        return _solved_interval(branches, target, band * (1 + BAND_RTOL), (valid, until))
+        return _solved_interval(branches, target, width, (valid, until))
     # What is usable of each step between two samples, and whether a new interval begins there.
     steps = _Steps(motion[:, :-1].copy(), motion[:, 1:].copy(), np.zeros(motion[:, 1:].shape, dtype=bool))
     steps.begins[:, 0] = True
-    width = band * (1 + BAND_RTOL)
     for branch in branches:
         ratio = branch.effort / target[:, None] - 1
-        for height in (ratio - width, -width - ratio):
+        for height in (ratio - width[:, None], -width[:, None] - ratio):
             _narrow(motion, height, steps)
     since = np.maximum.accumulate(np.where(steps.begins, np.arange(steps.begins.shape[1]), 0), axis=1)
     start = np.maximum(np.take_along_axis(steps.low, since, axis=1), valid[:, None])
@@ -277,7 +277,7 @@ def usable_stroke(start: FloatArray, end: FloatArray) -> FloatArray:
 
 
 def _solved_interval(
-    branches: Sequence[ManyBranches], target: FloatArray, width: float, valid: tuple[FloatArray, FloatArray]
+    branches: Sequence[ManyBranches], target: FloatArray, width: FloatArray, valid: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return `usable_interval` of branches that are known at every place: its ends are solved for."""
     motion, every = branches[0].motion, np.arange(len(branches[0].motion))
@@ -291,7 +291,7 @@ def _solved_interval(
         for branch in branches:
             if branch.exact is not None:
                 effort = branch.effort if known else branch.exact(at, rows)
-                worst = np.maximum(worst, np.abs(effort / target[rows, None] - 1) - width)
+                worst = np.maximum(worst, np.abs(effort / target[rows, None] - 1) - width[rows, None])
             if branch.excess is not None:
                 worst = np.maximum(worst, branch.excess(at, rows))
         return worst

@@ -9,6 +9,8 @@ import pytest
 from given_points import GivenPoints
 
 import cfmkit
+from cfmkit.families import family
+from cfmkit.families.rows import Variants
 from cfmkit.metrics import split_name
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
@@ -107,3 +109,21 @@ def test_rows_have_the_requirements_that_runs_of_their_own_have(stem):
             wrong = np.abs(together.values[k] - own) > 1e-12 * largest
             assert not wrong.any(), [split_name(study.names[m]) for m in np.flatnonzero(wrong)]
             assert tuple(together.met[k].tolist()) == alone.met
+
+
+@pytest.mark.parametrize("stem", ["cam_catalogue", "slider_crank_bought", "vcfm_ding2022"])
+def test_mechanisms_with_bands_of_their_own_are_solved_together(stem):
+    spec = cfmkit.load(f"configs/{stem}.yaml")
+    bands = np.array([0.01, 0.02, 0.03])
+    study = Study(spec, ("analysis.band",), metrics_of(spec, ("usable_stroke",), cfmkit.analyze(spec).curve))
+    plan = GivenPoints({"analysis.band": bands})
+    variants = Variants(study.plain, dict(zip(plan.paths, plan.columns, strict=True)), study_variant(study, plan), 3)
+    assert [len(members) for members, _ in family(spec.family).rows(variants)] == [3]
+    strokes = evaluate_rows(study, plan, 0, 3).values[:, 0]
+    assert strokes.tolist() == pytest.approx([study.evaluate((band,)).values[0] for band in bands], rel=1e-12)
+    assert (np.diff(strokes) > 0).any()
+
+
+def study_variant(study, plan):
+    """Return the function that makes a variant of a study."""
+    return lambda index: study.variant(plan.point(index))

@@ -151,7 +151,7 @@ def _stack_specs(variants: Variants, rows: Rows) -> CamSpec:
 def _kind(spec: CamSpec) -> str:
     """Return what mechanisms side by side have in common beside the way that their computation takes."""
     analysis = spec.analysis
-    settings = analysis.points, analysis.band, analysis.window, analysis.origin
+    settings = analysis.points, analysis.window, analysis.origin
     return repr((settings, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
 
 

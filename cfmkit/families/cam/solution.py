@@ -300,7 +300,7 @@ class Solution(ShortRepr):
                 partial(self._effort_in_rows, name),
                 self.column(self.effort_error),
                 self.column(target),
-                self.assembly.spec.analysis.band,
+                self.column(self.assembly.spec.analysis.band),
                 valid,
                 partial(self._part_efforts_in_rows, name),
                 self._stress_rows(name, state),

@@ -173,7 +173,7 @@ def _kind(spec: VcfmSpec) -> Hashable | None:
     if analysis.fidelity not in ("truss", "analytic") or spec.target_curve is not None or spec.mechanism.stops:
         return None
     stated = analysis.window is None, analysis.measured is None
-    settings = analysis.points, len(analysis.preloads), analysis.flatness, analysis.band
+    settings = analysis.points, len(analysis.preloads), analysis.flatness
     return analysis.fidelity, spec.mechanism.kinds, *stated, *settings
 
 

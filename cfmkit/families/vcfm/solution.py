@@ -407,7 +407,7 @@ class Solution(ShortRepr):
             curves.force_at,
             self.effort_error,
             self.target,
-            self.spec.analysis.band,
+            np.array([spec.analysis.band for spec in self.specs]),
             (low, np.minimum(high, self.reach)),
             self.part_efforts,
             StressRows(self._stress_samples, self.stress, self.allowable_stress),

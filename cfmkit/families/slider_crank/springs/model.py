@@ -152,7 +152,7 @@ def _plain_numbers(spec: SliderCrankSpec, as_made: bool) -> set[str]:
 
 def _kind(spec: SliderCrankSpec) -> tuple[Any, ...]:
     """Return what mechanisms that are solved together have in common: all but the values of numbers."""
-    return (*map(drop_numbers, (spec.mechanism, spec.analysis, spec.design)), spec.analysis.band)
+    return tuple(map(drop_numbers, (spec.mechanism, spec.analysis, spec.design)))
 
 
 def _flags(assembly: Assembly) -> tuple[bool, ...]:

@@ -34,7 +34,6 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, window_of
-from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone
@@ -425,7 +424,7 @@ class Solution(ShortRepr):
             efforts = {"load": forth, "unload": back}
         full = np.full(len(self), motion.shape[1])
         ends = motion[:, 0], motion[:, -1]
-        band = getattr(self.spec.analysis, "band", MeasuringFrame.band)
+        band = self.settings(lambda spec: spec.analysis.band)[:, 0]
         return {
             name: CurveRows(
                 RowSamples(motion, effort, full),
