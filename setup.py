@@ -30,7 +30,7 @@ LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:)([^)#\s]+)(#[^)\s]*)?\)")
 MECHANICS = "cfmkit/elastica/mechanics"
 MARCH = Extension(
     "cfmkit.elastica.mechanics._march",
-    [f"{MECHANICS}/{name}.c" for name in ("module", "march", "terms", "factor")],
+    [f"{MECHANICS}/{name}.c" for name in ("module", "march", "terms", "contact", "factor")],
     depends=[f"{MECHANICS}/march.h"],
     libraries=[] if os.name == "nt" else ["m"],
     extra_compile_args=[] if os.name == "nt" else ["-O3", "-std=c99"],

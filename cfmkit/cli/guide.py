@@ -162,14 +162,29 @@ NAVIGATION_PAGES = ("index", "glossary")
 
 
 def search(word: str) -> list[PageSection]:
-    """Return the sections that name a word or what the glossary says to look for instead, the best first."""
+    """Return the sections that name a word or what the glossary says to look for instead, the best first.
+
+    Several words that no section has as a phrase are looked for one by one: sections that name all of them.
+    """
+    sections = _score_sections(word)
+    if not sections and len(parts := word.split()) > 1:
+        of_parts = [{section[:2]: section for section in _score_sections(part)} for part in parts]
+        shared = set(of_parts[0]).intersection(*of_parts[1:])
+        sections = [
+            section._replace(score=min(scored[key].score for scored in of_parts))
+            for key, section in of_parts[0].items()
+            if key in shared
+        ]
+    return sorted(sections, key=lambda section: -section.score)
+
+
+def _score_sections(phrase: str) -> list[PageSection]:
     wanted = [
-        (compile_phrases([word]), 1.0),
-        *((compile_phrases([target]), SYNONYM_WEIGHT) for target in words_for_synonym(word)),
+        (compile_phrases([phrase]), 1.0),
+        *((compile_phrases([target]), SYNONYM_WEIGHT) for target in words_for_synonym(phrase)),
     ]
     rated = (_score(name, heading, text, wanted) for name, heading, text in _read_sections())
-    sections = [section for section in rated if section.score > 0]
-    return sorted(sections, key=lambda section: -section.score)
+    return [section for section in rated if section.score > 0]
 
 
 @cache

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LOCATION_PATTERN = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
 """How the fault of a file begins."""
 
+MAX_CHANGES = 8
+"""Changed values in one annotation: GitHub cuts long ones."""
+
 
 def workflow_commands(
     entries: Sequence[Entry],
@@ -56,7 +59,8 @@ def _annotation(one: Entry, place_of: Callable[[str, int], tuple[int, int]], bey
         texts = [one.message]
     elif beyond:
         place["title"] = "changed"
-    texts += [change.sentence for change in beyond]
+    texts += [change.sentence for change in beyond[:MAX_CHANGES]]
+    texts += [f"{len(beyond) - MAX_CHANGES} more values in changes.csv"] * (len(beyond) > MAX_CHANGES)
     if texts:
         return command("error", place, "\n".join(texts))
     if not one.warnings:

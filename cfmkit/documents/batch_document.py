@@ -80,7 +80,7 @@ def _changes(compared: BatchComparison) -> Iterator[Note]:
     for one in beyond[:MAX_CHANGES]:
         yield Note("changed", f"{visible(one.spec)}: {one.sentence}", tone=BAD_TONE, whole=True)
     if len(beyond) > MAX_CHANGES:
-        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more stand in changes.csv", tone=FAINT_TONE)
+        yield Note("changed", f"{len(beyond) - MAX_CHANGES} more values in changes.csv", tone=FAINT_TONE)
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:

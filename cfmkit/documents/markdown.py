@@ -80,7 +80,7 @@ def _comparison_lines(compared: BatchComparison) -> Iterator[str]:
         for one in shown:
             yield f"| {plain(one.spec)} | {'**' * one.beyond}{plain(one.sentence)}{'**' * one.beyond} |"
         if len(compared.changes) > len(shown):
-            yield from ("", f"{len(compared.changes) - len(shown)} more stand in changes.csv.")
+            yield from ("", f"{len(compared.changes) - len(shown)} more values in changes.csv.")
     if compared.gone:
         yield from ("", f"No longer there: {plain(', '.join(compared.gone))}")
 

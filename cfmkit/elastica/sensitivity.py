@@ -30,7 +30,7 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria, dual_arrays
 from cfmkit.elastica.mechanics.designs import design_of, make_up, set_up
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.similar_arrays import discretise_alike
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results import beam_states, stress_extremes
 from cfmkit.elastica.results.path import N_PLACES, load_displacement, node_motion, node_reaction, strain_energy
@@ -103,7 +103,7 @@ class Gradient:
     @cached_property
     def _rates(self) -> FloatArray:
         """Slopes of the free unknowns along the path at the points, (p, free)."""
-        solutions = equations(self.path.mesh).solve_each(self.path.free[self.points], self.at.drive)
+        solutions = equations(self.path.mesh).solve_each(self.path.free[self.points], self.at.drive, quick=True)
         if not (solutions.converged.all() and np.isfinite(solutions.rate).all()):
             raise InputError(SINGULAR_MESSAGE)
         return solutions.rate
@@ -244,7 +244,7 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
         each other, or moves one side of a step only; where sides of beams may touch an obstacle, or contacts have
         friction. Outputs raise it where the tangent is singular at a point.
     """
-    if any(isinstance(contact, BeamOnObstacle) for contact in path.network.contacts):
+    if any(isinstance(contact, BeamSide) for contact in path.network.contacts):
         raise InputError("derivatives by design variables are not known where sides of beams touch obstacles")
     if any(contact.friction for contact in path.network.contacts):
         raise InputError("derivatives by design variables are not known where contacts have friction")

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
 from cfmkit.errors import CfmError, SolutionError, UsageError
 from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare, model_at
 from cfmkit.experiment.parameters_to_fit import DATA_PREFIX, ZERO_OFFSETS
@@ -71,7 +70,7 @@ CALIBRATION_FINDINGS = {
 
 
 @dataclass(frozen=True, repr=False)
-class Calibration(ShortRepr):
+class Calibration:
     """A fitted specification."""
 
     spec: Spec  # with the fitted values, complete
@@ -83,6 +82,13 @@ class Calibration(ShortRepr):
     result: Result  # of the fitted specification
     zeros: Zeros = field(default_factory=Zeros)  # of the recording, as fitted
     warnings: tuple[Finding, ...] = ()  # what the user must know about the fit
+
+    def __repr__(self) -> str:
+        """Return the fitted values [SI] with their 95 % intervals, and the names of the warnings."""
+        pairs = zip(self.parameters, self.fit.values, self.fit.half_widths(), strict=True)
+        fitted = ", ".join(f"{item.path} = {value:.6g} ± {width:.2g}" for item, value, width in pairs)
+        names = ", ".join(dict.fromkeys(item.name for item in self.warnings)) or "none"
+        return f"<Calibration of {self.spec.name!r}: {fitted} (SI, 95 %); warnings: {names}>"
 
 
 def resolve_spec(spec: Spec) -> Spec:

@@ -434,7 +434,7 @@ def require_loop(source: MeasuredCurves) -> None:
         only = source.strokes.measured[0][0].branch
         raise DataError(
             f"{source.recording.name}: holds only the branch {only!r}: without the return stroke there is no loop and "
-            "no hysteresis; if only one stroke was measured, add --one-branch"
+            "no hysteresis; if only one stroke was measured, add --one-branch (in Python one_branch=True)"
         )
 
 

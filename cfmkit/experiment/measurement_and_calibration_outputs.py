@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import MAX_HALF_INTERVAL, UNDETERMINED_MESSAGE, table
 from cfmkit.experiment.coverage import hole_finding
@@ -37,9 +36,12 @@ if TYPE_CHECKING:
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.results import Finding, Quantity
 
+SHOWN_METRICS = 6
+"""Metrics in the text of a report."""
+
 
 @dataclass(frozen=True, repr=False)
-class MeasureReport(ShortRepr):
+class MeasureReport:
     """A measured mechanism with everything that is read off it.
 
     Attributes
@@ -52,6 +54,16 @@ class MeasureReport(ShortRepr):
 
     source: MeasuredCurves
     numbers: Measurement
+
+    def __repr__(self) -> str:
+        """Return the recording, the first metrics that have a value, and the names of the warnings."""
+        values = [
+            f"{name} {item}" for name, item in self.numbers.raw.items() if "[" not in name and item.value is not None
+        ]
+        names = ", ".join(dict.fromkeys(item.name for item in self.warnings)) or "none"
+        count = len(self.source.raw)
+        head = f"{self.source.recording.name}, {count} cycle{'s' * (count != 1)}"
+        return f"<MeasureReport of {head}; {', '.join(values[:SHOWN_METRICS])}; warnings: {names}>"
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
@@ -258,8 +270,7 @@ def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tu
 def reading_line(decisions: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Return the paragraph on how a file was read, its columns and what was subtracted first; nothing of arrays."""
     columns = next((k for k, text in enumerate(decisions) if " = " in text), 0)
-    about_file = f" ({'; '.join(decisions[:columns])})" if columns else ""
-    return (("read", "; ".join(decisions[columns:]) + about_file),) if decisions else ()
+    return (("read", ", ".join((*decisions[columns:], *decisions[:columns]))),) if decisions else ()
 
 
 def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:

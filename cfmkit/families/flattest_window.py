@@ -42,11 +42,9 @@ def flattest(result: Result, length: float) -> tuple[float, float] | None:
 
 def ripples(places: FloatArray, effort: FloatArray, starts: FloatArray, length: float) -> FloatArray:
     """Return (max - min)/max over windows of a length that begin at some places; infinite where the effort ends."""
-    found = np.full(len(starts), np.inf)
-    for number, start in enumerate(starts):
-        inside = (places > start) & (places < start + length)
-        ends = np.interp([start, start + length], places, effort)
-        values = np.concatenate([ends, effort[inside]])
-        if np.isfinite(values).all() and values.max() > 0:
-            found[number] = 1.0 - values.min() / values.max()
-    return found
+    ends = np.interp([starts, starts + length], places, effort)
+    outside = (places <= starts[:, None]) | (places >= starts[:, None] + length)
+    highest = np.maximum(ends.max(axis=0), np.where(outside, -np.inf, effort).max(axis=1))
+    lowest = np.minimum(ends.min(axis=0), np.where(outside, np.inf, effort).min(axis=1))
+    known = np.isfinite(highest) & np.isfinite(lowest) & (highest > 0.0)
+    return np.where(known, 1.0 - lowest / np.where(known, highest, 1.0), np.inf)

@@ -29,12 +29,13 @@ class GuideFriction:
         """Return the friction of a guide; that of None is nothing."""
         if guide is None:
             return cls()
-        return cls(guide.friction, guide.drag, 2.0 * guide.offset / guide.length if guide.length else 0.0)
+        tilt = 0.0 if guide.length is None else 2.0 * guide.offset / guide.length
+        return cls(guide.friction, guide.drag, tilt)
 
     @property
     def there(self) -> bool:
         """Whether anything rubs."""
-        return bool(self.friction or self.drag)
+        return bool(np.any(self.friction) or np.any(self.drag))
 
     def force(self, free: FloatArray, across: FloatArray, off_plane: float, way: float) -> FloatArray:
         """Return the force that moves the slider against the friction of its guide.
@@ -61,7 +62,9 @@ class GuideFriction:
         (n,) array
             [N]; NaN where `free` or `across` is.
         """
-        force = still = free + way * self.drag
+        numbers = (free, self.drag, self.friction, self.tilt, off_plane)
+        shape = np.broadcast_shapes(*(np.shape(number) for number in numbers))
+        force = still = np.broadcast_to(free + way * self.drag, shape)
         if not np.any(self.friction):
             return force
         for _ in range(MAX_NEWTON_STEPS):

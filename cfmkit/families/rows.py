@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache, wraps
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from cfmkit.arrays import LazyMapping
 from cfmkit.errors import CfmError
+from cfmkit.numerics.roots import bracketed_root, bracketed_roots
 from cfmkit.results import Quantity
 from cfmkit.specs.spec import Model
 
@@ -43,7 +45,10 @@ def stack(items: Sequence[T]) -> T:
     found: Any = first
     if len(items) == 1:
         return items[0]
-    if is_dataclass(first):
+    if isinstance(first, Model):
+        columns = {name: stack([vars(item)[name] for item in items]) for name in vars(first)}
+        found = first.model_copy(update=columns)
+    elif is_dataclass(first):
         found = object.__new__(type(first))  # without what is known of the first one
         for name in (*(item.name for item in fields(first)), *getattr(first, "also_stacked", ())):
             vars(found)[name] = stack([getattr(one, name) for one in items])
@@ -54,6 +59,106 @@ def stack(items: Sequence[T]) -> T:
     return found  # type: ignore[no-any-return]
 
 
+class RowsDiffer(Exception):
+    """Mechanisms side by side do not take the same way through a computation; `mask` tells two kinds apart."""
+
+    def __init__(self, mask: NDArray[np.bool_]) -> None:
+        """Keep which of them are of the one kind, (m,); all: each is to be computed alone."""
+        self.mask = mask
+        super().__init__("mechanisms of several kinds")
+
+
+def agree(condition: Any) -> bool:
+    """Return a condition on one mechanism, or the one answer of a column (m, 1).
+
+    Raises
+    ------
+    RowsDiffer
+        If rows of the column differ.
+    """
+    if not np.ndim(condition):
+        return bool(condition)
+    mask = np.ravel(condition)
+    if not mask.all() and mask.any():
+        raise RowsDiffer(mask)
+    return bool(mask[0])
+
+
+def fails(condition: Any) -> bool:
+    """Return what is wrong with one mechanism; of a column (m, 1) nothing may be.
+
+    Raises
+    ------
+    RowsDiffer
+        If it holds for a row of the column: what is wrong with it is said of one mechanism.
+    """
+    if np.ndim(condition) and np.any(condition):
+        raise RowsDiffer(np.ravel(condition))
+    return False if np.ndim(condition) else bool(condition)
+
+
+def remember_plain(count: int) -> Callable[[Callable[..., T]], Callable[..., T]]:
+    """Return a decorator that keeps the last results for plain numbers; those for columns are computed anew."""
+
+    def decorate(function: Callable[..., T]) -> Callable[..., T]:
+        kept = lru_cache(maxsize=count)(function)
+
+        @wraps(function)
+        def call(*given: Any) -> T:
+            try:
+                hash(given)
+            except TypeError:
+                return function(*given)
+            return kept(*given)
+
+        return call
+
+    return decorate
+
+
+def is_column(*values: Any) -> bool:
+    """Return True if one of some numbers is a column."""
+    return any(np.ndim(value) > 0 for value in values)
+
+
+def refuse_columns(*values: Any) -> None:
+    """Raise `RowsDiffer` if one of some numbers is a column: what follows is computed for one mechanism alone."""
+    if is_column(*values):
+        raise RowsDiffer(np.array([True]))
+
+
+def root_between(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
+    """Return `bracketed_root` of one mechanism, or of each row of a column.
+
+    Raises
+    ------
+    ValueError
+        If the function of one mechanism has no root there.
+    RowsDiffer
+        If that is so of some rows.
+    """
+    if not is_column(low, high, function(low)):
+        return bracketed_root(function, low, high)
+    roots = bracketed_roots(function, low, high)
+    fails(np.isnan(roots))
+    return roots
+
+
+def row_of(item: T, row: int) -> T:
+    """Return one row of what is stacked, in plain numbers."""
+    found: Any = item
+    if isinstance(item, np.ndarray):
+        found = item[..., row, 0].tolist() if item.ndim > 1 else item
+    elif isinstance(item, tuple):
+        found = tuple(row_of(value, row) for value in item)
+    elif isinstance(item, Model):
+        found = item.model_copy(update={name: row_of(value, row) for name, value in vars(item).items()})
+    elif is_dataclass(item):
+        found = object.__new__(type(found))
+        vars(found).update({name: row_of(value, row) for name, value in vars(item).items()})
+    return found  # type: ignore[no-any-return]
+
+
 def rows_of(item: T, rows: Any) -> T:
     """Return some rows of what is stacked, with what is known of it; plain numbers hold for every row."""
     found: Any = item
@@ -61,6 +166,8 @@ def rows_of(item: T, rows: Any) -> T:
         found = item[..., rows, :] if item.ndim > 1 else item
     elif isinstance(item, tuple):
         found = tuple(rows_of(one, rows) for one in item)
+    elif isinstance(item, Model):
+        found = item.model_copy(update={name: rows_of(value, rows) for name, value in vars(item).items()})
     elif is_dataclass(item):
         found = object.__new__(type(found))
         vars(found).update({name: rows_of(value, rows) for name, value in vars(item).items()})
@@ -217,9 +324,9 @@ class Variants(Sequence[Any]):
         return self._made[index]
 
 
-def valid(specs: Sequence[T]) -> Iterator[tuple[int, T]]:
-    """Yield (index, specification) of those whose values are valid."""
-    for index in range(len(specs)):
+def valid(specs: Sequence[T], indices: Iterable[int] | None = None) -> Iterator[tuple[int, T]]:
+    """Yield (index, specification) of those, or of some of those, whose values are valid."""
+    for index in range(len(specs)) if indices is None else indices:
         try:
             spec = specs[index]
         except CfmError:  # whoever analyses it alone says what is wrong with it

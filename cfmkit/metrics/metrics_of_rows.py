@@ -41,39 +41,26 @@ class RowSamples:
     values: FloatArray  # (d, n)
     count: NDArray[np.intp]  # (d,) of each row
 
-    @property
-    def _are_alike(self) -> bool:
-        """Whether all curves have the same places."""
-        return self.motion.strides[0] == 0 and bool((self.count == self.motion.shape[1]).all())
-
-    def select_between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[RowSamples, NDArray[np.bool_]]:
-        """Return the samples inside of windows, the ends left out; and which of the columns are of each row."""
-        low, high = (end[:, None] for end in window)
-        margin = np.reshape(slack, (-1, 1))
-        if self._are_alike and all((end == end[0]).all() for end in window):  # one of them tells it of all
-            margin = margin[:1]
-            kept = np.flatnonzero((self.motion[0] > low[0] + margin[0]) & (self.motion[0] < high[0] - margin[0]))
-            some = slice(kept[0], kept[-1] + 1) if len(kept) else slice(0, 0)
-            count = np.full(len(self.motion), len(kept))
-            own = np.ones((len(self.motion), len(kept)), dtype=bool)
-            return RowSamples(self.motion[:, some], self.values[:, some], count), own
-        inside = (self.motion > low + margin) & (self.motion < high - margin)
-        inside &= np.arange(self.motion.shape[1]) < self.count[:, None]
-        count, start = inside.sum(axis=1), inside.argmax(axis=1)
-        index = np.minimum(start[:, None] + np.arange(count.max(initial=0)), self.motion.shape[1] - 1)
-        cut = RowSamples(np.take_along_axis(self.motion, index, 1), np.take_along_axis(self.values, index, 1), count)
-        return cut, np.arange(index.shape[1]) < count[:, None]
+    def find_between(self, window: Ends, slack: FloatArray | float = 0.0) -> NDArray[np.bool_]:
+        """Return which samples are inside of windows, the ends left out, (d, n)."""
+        low, high = window[0] + slack, window[1] - slack
+        motion, count = self.motion, self.count
+        if motion.strides[0] == 0 and all((end == end[0]).all() for end in (low, high, count)):  # all are alike
+            motion, low, high, count = motion[:1], low[:1], high[:1], count[:1]
+        inside = (motion > low[:, None]) & (motion < high[:, None])
+        if (count < motion.shape[1]).any():
+            inside &= np.arange(motion.shape[1]) < count[:, None]
+        return np.broadcast_to(inside, self.motion.shape)
 
     def with_ends(self, window: Ends, values: FloatArray, slack: FloatArray | float = 0.0) -> RowSamples:
         """Return the samples inside of windows and their ends, with values (d, 2) there."""
-        cut, own = self.select_between(window, slack)
-        ends = np.stack(window, axis=1)
-        motion, inner = (np.where(own, item, last[:, 1:]) for item, last in ((cut.motion, ends), (cut.values, values)))
-        return RowSamples(
-            np.hstack([ends[:, :1], motion, ends[:, 1:]]),
-            np.hstack([values[:, :1], inner, values[:, 1:]]),
-            cut.count + 2,
+        inside, ends = self.find_between(window, slack), np.stack(window, axis=1)
+        count = inside.sum(axis=1) + 2
+        motion, inner = (
+            _pack_rows(item, inside, count, last[:, :1], last[:, 1:])
+            for item, last in ((self.motion, ends), (self.values, values))
         )
+        return RowSamples(motion, inner, count)
 
     def merge(self, places: FloatArray, values: FloatArray) -> RowSamples:
         """Return these samples and others, in order and without doubles; others must lie between the ends of a row."""
@@ -82,16 +69,30 @@ class RowSamples:
         motion, known = (np.take_along_axis(item, order, 1) for item in (motion, known))
         new = np.ones(motion.shape, dtype=bool)
         new[:, 1:] = motion[:, 1:] > motion[:, :-1]
-        count = new.sum(axis=1)
-        order = np.argsort(~new, axis=1, kind="stable")[:, : count.max()]
-        order = np.where(
-            np.arange(order.shape[1]) < count[:, None], order, order[np.arange(len(count)), count - 1][:, None]
+        count, last = new.sum(axis=1), motion.shape[1] - 1 - new[:, ::-1].argmax(axis=1)[:, None]
+        new[:, :1] = False  # it stands first
+        motion, known = (
+            _pack_rows(item, new, count + 1, item[:, :1], np.take_along_axis(item, last, 1))[:, :-1]
+            for item in (motion, known)
         )
-        return RowSamples(np.take_along_axis(motion, order, 1), np.take_along_axis(known, order, 1), count)
+        return RowSamples(motion, known, count)
 
     def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: Any = False) -> Ends:
         """Return the largest and the smallest value of a function of each row next to its samples, (d,) each."""
         return extremes(function, self.motion, self.values, uneven, self.count - 1)
+
+
+def _pack_rows(
+    values: FloatArray, kept: NDArray[np.bool_], count: NDArray[np.intp], first: FloatArray, last: FloatArray
+) -> FloatArray:
+    """Return what is kept of each row between its first and its last value, (d, 1) each, which is repeated behind.
+
+    `count` is the length of each row, both ends included.
+    """
+    packed = np.repeat(last, count.max(), axis=1)
+    packed[:, :1] = first
+    packed[:, 1:-1][np.arange(1, packed.shape[1] - 1) < count[:, None] - 1] = values[kept]
+    return packed
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,8 +272,7 @@ class RowsInWindow:
         top = known.extremes(lambda places: stress.at(places, rows))[0]
         for other in beside:
             start, stop = np.maximum(other.motion[:, 0], low), np.minimum(other.motion[:, -1], high)
-            within, inside = other.select_between((start, stop))
-            inner = np.where(inside, within.values, -np.inf).max(axis=1, initial=-np.inf)
+            inner = np.where(other.find_between((start, stop)), other.values, -np.inf).max(axis=1, initial=-np.inf)
             most = np.maximum(inner, np.maximum(_value_at(other, start), _value_at(other, stop)))
             top = np.where(start < stop, np.maximum(top, most), top)
         return top

@@ -121,6 +121,42 @@ def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, 
     return best
 
 
+def bracketed_roots(
+    evaluate: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray, iterations: int = 200
+) -> FloatArray:
+    """Return `bracketed_root` of many functions at once, element by element, with the same steps.
+
+    NaN where a function does not change sign, or is NaN on the way.
+
+    Examples
+    --------
+    >>> bracketed_roots(lambda x: x**3 - np.array([2.0, 9.0]), np.zeros(2), np.full(2, 2.0)).round(12)
+    array([1.25992105,        nan])
+    """
+    with np.errstate(all="ignore"):
+        a, b, fa, fb = np.broadcast_arrays(high, low, evaluate(high), evaluate(low))
+        root = np.where(fa == 0, a, np.where(fb == 0, b, np.nan))
+        searched, share = np.isnan(root) & ((fa > 0) != (fb > 0)) & ~np.isnan(fa + fb), np.full(root.shape, 0.5)
+        for _ in range(iterations):
+            x = a + share * (b - a)
+            fx = evaluate(x)
+            stays = (fx > 0) == (fa > 0)
+            c, fc = np.where(stays, a, b), np.where(stays, fa, fb)
+            b, fb, a, fa = np.where(stays, b, a), np.where(stays, fb, fa), x, fx
+            best = np.where(np.abs(fa) < np.abs(fb), a, b)
+            limit = np.where(b == a, 1.0, 2.0 * FLOAT_EPS * np.abs(best) / np.abs(b - a))
+            ends = searched & ((limit > 0.5) | (fx == 0) | np.isnan(fx))
+            root = np.where(ends, np.where(fx == 0, a, best + 0.0 * fx), root)
+            searched &= ~ends
+            if not searched.any():
+                return root
+            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+            inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+            share = np.where((phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi), inverse, 0.5)
+            share = np.minimum(np.maximum(share, limit), 1.0 - limit)
+    return np.where(searched, best, root)
+
+
 def _next_share(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
     """Return where in [a, b] to look next: inverse quadratic if the three points allow it, else the middle."""
     xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)

@@ -220,7 +220,7 @@ def _rank_parameters(lines: Sequence[IndexLine]) -> list[int]:
 
 
 def _bar_axes(count: int, heading: str, legend: bool = False) -> tuple[Figure, Axes]:
-    below, above = 14.0, 9.0 + 6.0 * legend
+    below, above = 14.0, 9.0 + 10.0 * legend
     figure = new_figure(150, below + above + _ROW_HEIGHT * count + 4.0)
     axes = axes_mm(figure, (_LEFT_MARGIN, below, 150 - _LEFT_MARGIN - 6, _ROW_HEIGHT * count + 4.0))
     _head(figure, heading)
@@ -268,7 +268,7 @@ def draw_bars(found: Findings, number: int) -> Figure:
     _rows(axes, [each[0][k].parameter for k in order])
     axes.set_xlabel("share of the variance [1]" if len(kinds) > 1 else f"{kinds[0].words} [1]")
     if len(kinds) > 1 and axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=SMALL_FONT)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=SMALL_FONT)
     return figure
 
 

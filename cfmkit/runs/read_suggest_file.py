@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import SpecError
+from cfmkit.errors import Problem, SpecError
 from cfmkit.runs.specfile import STDIN_PATH, content, rename_source, standard_input
 from cfmkit.specs.yamlio import read_document
 from cfmkit.studies.suggest.spec import SuggestFile
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.studies.suggest.spec import SuggestBlock
+
+OPTIONS_SOURCE = "options"
+"""Name of a request that has no file."""
 
 
 def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
@@ -31,7 +35,7 @@ def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
         With everything that is wrong with it.
     """
     if name is None:
-        document = read_document("cfmkit: 1\nsuggest: {}\n", "options")
+        document = read_document("cfmkit: 1\nsuggest: {}\n", OPTIONS_SOURCE)
     else:
         document = read_document(standard_input() if name == STDIN_PATH else content(name), name)
     for key, value in keys.items():
@@ -42,4 +46,16 @@ def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
         reported = error
     for key in keys:
         reported = rename_source(reported, f"--set suggest.{key}", f"--{key}")
-    raise reported
+    raise reported if name is not None else _name_missing_options(reported)
+
+
+def _name_missing_options(error: SpecError) -> SpecError:
+    """Return the error of a request without a file with a missing key as a missing option."""
+    return SpecError(
+        [
+            Problem("", 0, 0, "", re.sub(r"^the key '(\w+)' is missing.*", r"--\1 is missing", one.message))
+            if one.source == OPTIONS_SOURCE
+            else one
+            for one in error.problems
+        ]
+    )

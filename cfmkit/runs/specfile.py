@@ -241,7 +241,7 @@ def _design_faults(document: YamlDocument, spec: Spec) -> Iterator[Problem]:
 def place_problem(document: YamlDocument, path: str, message: str) -> Problem:
     """Return a problem with the place of a path in the file, or the option that set it."""
     found = document.problem(path, message)
-    return found if found.line else Problem("--set", 0, 0, path, message)
+    return found if found.line or found.source.startswith("--set") else Problem("--set", 0, 0, path, message)
 
 
 def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:

@@ -80,7 +80,7 @@ class MaterialSpec(Model):
             try:
                 known = material(self.name)
             except UnknownMaterial as error:
-                refuse("Material", {("name",): str(error)})
+                refuse("Material", {("name",): f"{error}; one of your own has 'youngs_modulus' in place of 'name'"})
                 raise
             filled = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
             filled |= {key: law for key, law in assumed_laws(known.name).items() if key not in self.model_fields_set}

@@ -147,9 +147,10 @@ def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...
     """Return an error that there is nothing at a path, and which one could be meant."""
     known = list(paths(spec_type))
     last = path.rpartition(".")[2]
-    same = [one for one in known if one.rpartition(".")[2] == last]
-    near = same or difflib.get_close_matches(path, known, n=1, cutoff=0.6)
-    if near:
+    endings = {one.rpartition(".")[2] for one in known}
+    similar = [last] if last in endings else difflib.get_close_matches(last, endings, n=1, cutoff=0.65)
+    alike = [one for one in known if one.rpartition(".")[2] in similar]
+    if near := difflib.get_close_matches(path, alike, n=1, cutoff=0.0):
         return f"there is no {path!r}; did you mean {near[0]!r}?"
     names = [name for slot in here if slot.model is not None for name in slot.model.model_fields]
     inside = [name for name in names if above or name not in FIXED_BLOCKS]

@@ -36,13 +36,6 @@ def test_analyze_writes_errors_forces_and_figures_and_takes_its_own_resolved_spe
     assert (cli.folder / "out/curve.csv").read_bytes() == (cli.folder / "again/curve.csv").read_bytes()
 
 
-def test_bad_points_are_one_line_and_exit_code_3(cli, built):
-    (cli.folder / "points.csv").write_text("x;y\n" + "1;2\n" * 40)
-    done = cli("analyze", built, "--no-plots")
-    assert done.code == 3
-    assert done.err == "error    points.csv: the column 'x' needs a unit of length in the header: 'x [mm]'\n"
-
-
 def test_a_file_that_is_not_there_is_told_with_its_place(cli, built):
     (cli.folder / "points.csv").unlink()
     done = cli("check", built)

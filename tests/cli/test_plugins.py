@@ -18,7 +18,6 @@ import cfmkit
 from cfmkit import families
 from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
-from cfmkit.families import entry_point_plugins
 from cfmkit.studies.serial_and_cluster_executors import serial
 from cfmkit.studies.suggest import search
 
@@ -28,16 +27,10 @@ SPRINGS = str(plugin_support.PLUGINS[0] / "configs" / "oblique_carrella2007.yaml
 @pytest.fixture
 def site(tmp_path, monkeypatch):
     """An empty folder on the path of modules; the current folder is another one."""
-    folder, here = tmp_path / "site", tmp_path / "here"
-    folder.mkdir()
-    here.mkdir()
-    monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.chdir(here)
-    entry_point_plugins._import_record.cache_clear()
-    entry_point_plugins._offers_on.cache_clear()
-    yield folder
-    packages.forget(folder)
-    entry_point_plugins._import_record.cache_clear()
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with packages.empty_site(tmp_path / "site", monkeypatch) as folder:
+        yield folder
 
 
 @pytest.mark.parametrize(

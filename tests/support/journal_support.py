@@ -22,3 +22,16 @@ def damage_a_record(path, key):
     content = bytearray(path.read_bytes())
     content[content.index(packed) + 5] ^= 0x10
     path.write_bytes(content)
+
+
+class NotesInMemory:
+    """What a search notes, for as long as the test takes."""
+
+    def __init__(self):
+        self.keys = {}
+
+    def find(self, key):
+        return self.keys.get(key)
+
+    def add(self, key, record):
+        self.keys[key] = record

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from cfmkit.families import entry_point_plugins
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
+
+    import pytest
 
 RECORD = "from dataclasses import replace\nfrom spare_family import FAMILY as SPARE\n"
 
@@ -28,7 +34,14 @@ def install(folder: Path, package: str, source: str, *entries: str, kind: str = 
     return module
 
 
-def forget(folder: Path) -> None:
-    """Let the modules in a folder be imported anew."""
+@contextmanager
+def empty_site(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Give an empty folder on the path of modules; what is installed there is forgotten afterwards."""
+    folder.mkdir()
+    monkeypatch.syspath_prepend(str(folder))
+    entry_point_plugins._import_record.cache_clear()
+    entry_point_plugins._offers_on.cache_clear()
+    yield folder
     for path in folder.glob("*.py"):
         sys.modules.pop(path.stem, None)
+    entry_point_plugins._import_record.cache_clear()

@@ -206,6 +206,16 @@ def test_a_requirement_that_cannot_be_read_is_complained_about_once():
     assert [problem.path for problem in caught.value.problems] == ["mechanism", "requirements.0.max"]
 
 
+def test_a_fault_in_a_block_that_an_option_states_names_the_option_and_the_path_inside():
+    document = read_document("family: cam\nmechanism: 1\n", "x").set("requirements=[{metric: force_mean, max: 3 mm}]")
+    with pytest.raises(cfmkit.SpecError) as caught:
+        specfile.bind(document)
+    assert any(
+        str(problem).startswith("--set requirements: requirements.0.max: a bound of 'force_mean': '3 mm' is a length")
+        for problem in caught.value.problems
+    )
+
+
 def test_the_name_of_an_option_stands_for_the_option_that_it_is_short_for():
     error = cfmkit.SpecError([cfmkit.Problem("--set a", 0, 0, "a", "wrong"), cfmkit.Problem("f", 1, 1, "b", "wrong")])
     assert [one.source for one in specfile.rename_source(error, "--set a", "--a").problems] == ["--a", "f"]

@@ -16,6 +16,7 @@ from cfmkit.cli.main import main
 from cfmkit.documents.annotations import workflow_commands
 from cfmkit.documents.markdown import summary
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.metrics.compare import MetricChange
 from cfmkit.studies.batch_sources_and_outcomes import Entry
 from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes
 
@@ -154,6 +155,13 @@ def test_a_specification_has_one_annotation_that_says_all_of_it():
     (line,) = workflow_commands([entry], lambda name, number: (7 + number, 3))
     assert line.startswith("::error file=a.yaml,line=7,col=3,title=requirement missed::")
     assert line.endswith("::force_ripple%0Adeviation")
+
+
+def test_an_annotation_of_many_changes_lists_eight_and_counts_the_others():
+    changed = [MetricChange("a.yaml", f"metric_{number}", 1.0, 2.0, "N", 1.0, True) for number in range(20)]
+    (line,) = workflow_commands([one()], nowhere, changed)
+    assert line.count("1 -> 2 N") == 8
+    assert line.endswith("%0A12 more values in changes.csv")
 
 
 def test_annotations_name_file_and_line_and_let_no_name_through(folder):

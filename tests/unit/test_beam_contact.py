@@ -180,11 +180,14 @@ def test_a_contact_that_cannot_be_is_refused_with_its_place(contacts, place, say
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ("analysis:\n  modes: 1", "natural frequencies are not known with stops"),
+        ("analysis:\n  modes: 1", "natural frequencies are not known with contacts"),
         ("design:\n  rescale: {force: 5 N}\nanalysis:", "do not scale with them"),
         ("analysis:\n  fidelity: solid", "mechanism.stops is not supported"),
         ('requirements:\n  - {metric: "contact_force[wall]", max: 1 N}\nanalysis:', "there are: s"),
-        ("requirements:\n  - {metric: contact_force, max: 1 N}\nanalysis:", "needs the name of a stop or an obstacle"),
+        (
+            "requirements:\n  - {metric: contact_force, max: 1 N}\nanalysis:",
+            "needs the name of a stop, an obstacle or a contact",
+        ),
     ],
 )
 def test_what_is_not_possible_with_contacts_is_refused(more, says):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from journal_support import NotesInMemory
 
 from cfmkit import analyze, dumps, evaluate, load, loads
 from cfmkit.designing.run_many_starts import Clock
@@ -340,21 +341,8 @@ def test_a_force_out_of_reach_is_named_with_the_nearest_one() -> None:
     assert float(text.split()[2]) < 200.0
 
 
-class Recorder:
-    """Notes in memory."""
-
-    def __init__(self) -> None:
-        self.keys: dict[str, Any] = {}
-
-    def find(self, key: str) -> Any:
-        return self.keys.get(key)
-
-    def add(self, key: str, record: Any) -> None:
-        self.keys[key] = record
-
-
 def test_finished_starts_are_noted_and_used_again() -> None:
-    task, notes = lan(), Recorder()
+    task, notes = lan(), NotesInMemory()
     plan = StartBudget(drawn=3, tries=1, meeting=1, flattening=1)
     first = explore(task, plan, (2, 1), "x", Run(notes=notes))
     again = explore(task, plan, (3, 1), "x", Run(notes=notes))
@@ -443,7 +431,7 @@ def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(mo
 
 
 def test_no_time_means_no_start_and_nothing_noted() -> None:
-    notes = Recorder()
+    notes = NotesInMemory()
     late = StartBudget(clock=Clock(0.0))
     result = explore(lan(), late, (2, 1), "x", Run(notes=notes))
     assert (result.found, result.missing, notes.keys) == ({}, 2, {})

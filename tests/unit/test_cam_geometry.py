@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, TrackRows
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, track_of
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.no_mechanism import CannotBuild
@@ -254,9 +254,9 @@ def test_a_dead_point_on_the_corner_is_where_brace_and_roller_are_in_line():
 
 def test_tracks_side_by_side_have_the_states_of_each():
     profile = assemble(cam()).track.profile
-    pairs = zip(profile.roller_radius + np.linspace(-5e-5, 5e-5, 8), np.linspace(0.1998, 0.2002, 8), strict=True)
-    tracks = [Track(profile, float(radius), float(brace)) for radius, brace in pairs]
-    together = TrackRows(tracks)
+    radius, brace = profile.roller_radius + np.linspace(-5e-5, 5e-5, 8), np.linspace(0.1998, 0.2002, 8)
+    tracks = [Track(profile, *numbers) for numbers in zip(radius.tolist(), brace.tolist(), strict=True)]
+    together = track_of(profile, radius[:, None], brace[:, None])
     slider = together.start + np.linspace(0.0, 0.23, 60)
     for some in (np.arange(8), np.array([5, 2])):
         found = together.of_rows(some).states(slider[some])

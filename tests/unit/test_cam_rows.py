@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from given_points import GivenPoints
+from study_rows import compare_rows_with_runs, study_of
 
 import cfmkit
 from cfmkit.families.cam.cams_in_rows import solve_rows
@@ -51,25 +52,14 @@ def work(spec=SPEC, ranges=RANGES, count=60, names=()):
     return Work(Study(spec, plan.paths, metrics_of(spec, names, cfmkit.analyze(spec).curve)), plan)
 
 
-def drawn(spec, draw, count):
-    """Return a study in which up to three numbers of a specification vary at random about their own values."""
-    own = {
-        path: value
-        for path, value in spec.leaves()
-        if path.startswith(("mechanism.", "analysis.")) and isinstance(value, float) and value
-    }
-    chosen = draw.choice(sorted(own), draw.integers(1, 4), replace=False).tolist()
-    ranges = {path: (own[path] * draw.uniform(0.9, 1.1, count)).tolist() for path in chosen}
-    return Listed(spec, ranges)
+def listed(values):
+    """Return a study of points that are given one by one."""
+    return Work(*study_of(SPEC, values))
 
 
-class Listed(Work):
-    """Points of a study, given one by one."""
-
-    def __init__(self, spec, values):
-        super().__init__(
-            Study(spec, tuple(values), metrics_of(spec, (), cfmkit.analyze(spec).curve)), GivenPoints(values)
-        )
+def compare(many):
+    """Return the rows of a study, which are runs of their own."""
+    return compare_rows_with_runs(many.study, many.plan)
 
 
 def members(many):
@@ -79,47 +69,6 @@ def members(many):
     with np.errstate(all="ignore"):
         found = [indices[solved.complete] for indices, solved in solve_rows(variants)]
     return set(np.concatenate([[], *found]).astype(int).tolist())
-
-
-def check_rows_against_single_runs(many, step=1):
-    """Compare rows of a study with a run of each of its points: status, message, warnings, requirements, numbers."""
-    study, plan = many.study, many.plan
-    together = evaluate_rows(study, plan, 0, len(plan))
-    sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
-    force, work = ([k for k, one in enumerate(study.metrics) if one.dimension == kind] for kind in ("force", "energy"))
-    sizes[force] = sizes[force].max(initial=0.0)  # a column may vanish: it is the difference of others
-    sizes[work] = np.maximum(sizes[work], 0.1 * sizes[force].max(initial=0.0))
-    for k in range(0, len(plan), step):
-        alone = study.evaluate(plan.point(k))
-        assert not alone.bug
-        assert together.status(k) == (alone.status, alone.message)
-        assert {name for name, mask in together.warned.items() if mask[k]} == set(alone.warnings), plan.point(k)
-        if not alone.values:
-            continue
-        own = np.array([np.nan if value is None else value for value in alone.values])
-        wrong = ~((np.abs(together.values[k] - own) <= 1e-12 * sizes) | (np.isnan(own) & np.isnan(together.values[k])))
-        found = [(study.names[m], together.values[k, m], own[m]) for m in np.flatnonzero(wrong)]
-        assert not found, dict(zip(plan.paths, plan.point(k), strict=True))
-        assert tuple(together.met[k].tolist()) == alone.met
-    return together
-
-
-@pytest.mark.parametrize("stem", ["cam", "cam_friction", "cam_gravity", "studies/cam_tolerance"])
-def test_a_row_of_a_study_is_a_run_of_its_own(stem):
-    """Whatever is varied, with every metric that a sweep notes."""
-    check_rows_against_single_runs(drawn(config(stem), np.random.default_rng(7), 4))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", range(6))
-@pytest.mark.parametrize("stem", CLOSED)
-def test_every_row_of_a_study_is_a_run_of_its_own(stem, number):
-    spec = config(stem)
-    if number % 2:
-        spec = spec.replace({"analysis.window": ("11 %", "78.3 %"), "design": None})
-    if number % 3 == 2:
-        spec = spec.replace({"analysis.points": 41})
-    check_rows_against_single_runs(drawn(spec, np.random.default_rng(100 + number + 10 * CLOSED.index(stem)), 4))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +85,7 @@ def test_rows_of_cams_that_may_not_exist_or_jam_are_runs_of_their_own(change):
     ranges = {k: v for k, v in RANGES.items() if k not in change and not (spec.design is None and k == "design.force")}
     many = work(spec, ranges, 32)
     assert many.vectorised
-    together = check_rows_against_single_runs(many)
+    together = compare(many)
     assert together.odd
     assert len(members(many)) > 8
 
@@ -205,7 +154,7 @@ SMALL = AROUND | {"mechanism.roller_radius": "7.5 mm:8.5 mm"}
 def test_rows_around_a_cut_cam_are_runs_of_their_own(changes, ranges):
     many = work(config("studies/cam_tolerance").replace(changes), ranges, 8)
     assert many.vectorised
-    check_rows_against_single_runs(many)
+    compare(many)
     assert len(members(many)) >= 4
 
 
@@ -219,9 +168,9 @@ def test_a_sweep_over_any_number_with_the_requirements_of_its_own_is_solved_in_r
 
 
 def test_whoever_runs_on_a_corner_is_a_row_too():
-    many = Listed(SPEC, {"mechanism.roller_radius": [0.0100, 0.0103, 0.0104, 0.0160, 0.0300]})
+    many = listed({"mechanism.roller_radius": [0.0100, 0.0103, 0.0104, 0.0160, 0.0300]})
     assert len(members(many)) == 5
-    rows = check_rows_against_single_runs(many)
+    rows = compare(many)
     corner, peak = (rows.values[:, many.study.names.index(name)] for name in ("undercut_travel", "corner_force_max"))
     assert corner[:2].tolist() == [0.0, 0.0]
     assert (np.diff(corner[1:]) > 0).all()
@@ -230,7 +179,7 @@ def test_whoever_runs_on_a_corner_is_a_row_too():
 
 
 def test_rollers_that_overlap_are_analysed_alone():
-    many = Listed(SPEC, {"mechanism.roller_radius": [0.067, 0.068, 0.0681, 0.150]})
+    many = listed({"mechanism.roller_radius": [0.067, 0.068, 0.0681, 0.150]})
     assert members(many) == {0, 1}
     assert [evaluate_rows(many.study, many.plan, 0, 4).status(k)[0] for k in (2, 3)] == [Status.NO_EQUILIBRIUM] * 2
 
@@ -238,7 +187,7 @@ def test_rollers_that_overlap_are_analysed_alone():
 def test_rows_warn_of_what_each_cam_warns_of():
     spec = SPEC.replace({"mechanism.springs.max_elongation": "130 mm"})
     ranges = RANGES | {"mechanism.rolling_friction": "0:0.3", "mechanism.profile.force_constant": "5 mm:30 mm"}
-    rows = check_rows_against_single_runs(work(spec, ranges, 64, ("force_mean",)))
+    rows = compare(work(spec, ranges, 64, ("force_mean",)))
     assert set(rows.warned) >= {"undercut", "up_jam", "spring_overstretched", "slack_cable"}
 
 
@@ -310,7 +259,7 @@ def test_shares_of_the_travel_are_those_of_each_stroke():
     shares = {"analysis.window": ("1 %", "95 %"), "requirements": []}
     many = work(SPEC.replace(shares), {"mechanism.profile.stroke": "150 mm:245 mm"}, 8)
     assert len(members(many)) == 8
-    check_rows_against_single_runs(many)
+    compare(many)
 
 
 def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_refuses_it():
@@ -323,13 +272,3 @@ def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_
     assert {run(many).row(k).status(0) for k in range(4)} == {
         (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))
     }
-
-
-def test_forces_on_the_corner_of_an_undercut_cam_do_not_depend_on_the_number_of_points():
-    found = []
-    for points in (13, 301, 3001):
-        result = cfmkit.analyze(SPEC.replace({"analysis.points": points, "analysis.window": None}))
-        metrics = cfmkit.metrics.evaluate(result, ["force_max[load]", "force_max[unload]", "corner_force_max"])
-        found.append([quantity.value for quantity in metrics.values()])
-    np.testing.assert_allclose(found, np.broadcast_to(found[-1], (3, 3)), rtol=1e-10)
-    assert found[0][0] == pytest.approx(found[0][2], rel=1e-12)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
+from journal_support import NotesInMemory
 
 from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.bounds_and_rounding import find_active_bounds, round_within_bounds
@@ -113,19 +114,6 @@ def test_rounded_numbers_stay_within_their_bounds() -> None:
 # --- starts ---------------------------------------------------------------------------------------------------
 
 
-@dataclass
-class Recorder:
-    """Notes in memory."""
-
-    keys: dict[str, Any] = field(default_factory=dict)
-
-    def find(self, key: str) -> Any:
-        return self.keys.get(key)
-
-    def add(self, key: str, record: Any) -> None:
-        self.keys[key] = record
-
-
 def test_what_a_start_found_is_the_same_read_from_its_record() -> None:
     found = Optimum(np.array([0.1, 1 / 3]), np.inf, np.zeros(0), SearchEnding.STUCK, 7, 1e-5)
     record = json.loads(json.dumps(OneStart(lambda _: found, UNLIMITED_CLOCK)(3)))
@@ -142,7 +130,7 @@ def squared(number: int) -> dict[str, Any]:
 
 
 def test_finished_starts_are_noted_and_not_done_again() -> None:
-    notes, reported = Recorder(), []
+    notes, reported = NotesInMemory(), []
     means = Run(notes=notes)
     first = run_stage(
         Stage(squared, (0, 1), "x"), means, UNLIMITED_CLOCK, lambda records: reported.append(len(records))
@@ -155,7 +143,7 @@ def test_finished_starts_are_noted_and_not_done_again() -> None:
 
 
 def test_late_no_start_is_begun_and_one_that_ran_out_of_time_is_not_noted() -> None:
-    notes = Recorder()
+    notes = NotesInMemory()
     means = Run(notes=notes)
     assert run_stage(Stage(squared, (0, 1), "x"), means, Clock(0.0), lambda _: None).records == {}
     late = run_stage(Stage(lambda _: {"found": {}, "late": True}, (0,), "x"), means, UNLIMITED_CLOCK, lambda _: None)

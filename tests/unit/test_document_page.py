@@ -201,6 +201,20 @@ def test_a_remedy_costs_a_warning_neither_its_number_nor_its_clause():
     assert text in page_of(short)[1]
 
 
+def test_the_options_of_the_best_point_are_one_line_to_copy_on_a_narrow_page():
+    summary = sweep_summary_of_cam()
+    lines = page_of(sweep_document.document_of(cfmkit.load(CONFIGS / "cam.yaml"), summary, {}, ExitCode.OK), 60)
+    (best,) = [line for line in lines if "best  " in line]
+    assert best.count("--set") == 2
+    assert len(best) > 60
+
+
+def sweep_summary_of_cam():
+    """Return the summary of a sweep over two values."""
+    vary = {"mechanism.roller_radius": ["8 mm", "10 mm"], "mechanism.rolling_friction": [0.001, 0.002]}
+    return cfmkit.sweep(CONFIGS / "cam.yaml", vary=vary, metrics=["force_ripple"]).summary
+
+
 @pytest.mark.parametrize("width", [80, 100])
 def test_names_in_tables_are_whole_and_columns_of_less_weight_give_way(width):
     """Before, `positive.thickness` and `positive.length` were cut to the same letters on a page of 80 columns."""

@@ -139,60 +139,6 @@ def test_points_next_to_each_other_at_the_end_of_a_branch(
     assert [(event.kind, event.after) for event in path.events] == [("bifurcation", 1), ("bifurcation", 0)]
 
 
-def whole(points: Any, sections: Any = (LEAF, LEAF), **control: Any) -> Path:
-    """Return the path of both halves with a shuttle that neither turns nor moves aside."""
-    across = LENGTH * np.cos(ANGLE)
-    nodes = {
-        "left": Node(-across, 0, CLAMPED_SUPPORT),
-        "d": Node(0, RISE, slider_support(np.pi / 2)),
-        "right": Node(across, 0, CLAMPED_SUPPORT),
-    }
-    beams = {"one": Beam("left", "d", sections[0]), "two": Beam("right", "d", sections[1])}
-    return trace(Network(nodes, beams), Displacement("d", -np.pi / 2, points), Control(**control))
-
-
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_where_two_modes_are_critical_at_once_both_leaves_buckle(exact: Path, sign: int, tolerance: float) -> None:
-    """Two equal leaves on one shuttle: with one of them straight the equilibrium is not stable."""
-    path = whole(REGULAR, tolerance=tolerance, sign=sign)
-    assert path.status is PathStatus.COMPLETE
-    assert path.stable.all()
-    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 2), ("bifurcation", 2, 0)]
-    found, half = path.effort[path.at_requested], exact.effort[exact.at_requested]
-    np.testing.assert_allclose(found, 2 * half, rtol=0, atol=10 * tolerance * np.abs(half).max())
-
-
-def test_the_sign_mirrors_the_forms_of_both_leaves() -> None:
-    one, other = (whole(REGULAR[:6], tolerance=1e-6, sign=sign) for sign in (1, -1))
-    for leaf in ("one", "two"):
-        moments = [path.end_force(leaf, 1)[path.at_requested[-1], 2] for path in (one, other)]
-        middle = 0.5 * (moments[0] + moments[1])
-        assert abs(moments[0] - moments[1]) > 10 * abs(middle)
-
-
-@pytest.mark.parametrize("off", [3e-6, 6e-6, 1e-5, 1.5e-5, 2e-5])
-@pytest.mark.parametrize("which", [0, 1])
-@pytest.mark.parametrize("branch", ["stable", "primary"])
-def test_every_point_asked_for_has_its_number_once(exact: Path, branch: Any, which: int, off: float) -> None:
-    path = pressed(np.append(REGULAR, exact.events[which].drive + off * RISE), 1e-6, branch)
-    assert path.status is PathStatus.COMPLETE, path.message
-    assert path.requested[path.at_requested].tolist() == list(range(16))
-
-
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
-@pytest.mark.parametrize("factor", [1 + 1e-4, 1 + 3e-4, 1 + 1e-3, 1.01])
-def test_leaves_that_are_nearly_equal_buckle_one_after_the_other(factor: float, tolerance: float) -> None:
-    """As the sum of two half beams, which do not act on each other."""
-    sections = [Section(1477e6, 6e-3, 7e-4 * one) for one in (1.0, factor)]
-    path = whole(REGULAR, sections, tolerance=tolerance)
-    assert path.status is PathStatus.COMPLETE, path.message
-    assert path.stable.all()
-    halves = [pressed(REGULAR, 1e-9, section=section) for section in sections]
-    expected = sum(half.effort[half.at_requested] for half in halves)
-    np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=0, atol=10 * tolerance * expected.max())
-
-
 def test_a_given_first_step_does_not_keep_a_bifurcation_from_being_found() -> None:
     nodes = {"wall": Node(0, 0, CLAMPED_SUPPORT), "d": Node(LENGTH * np.cos(ANGLE), RISE, slider_support(np.pi / 2))}
     leaf = Network(nodes, {"v": Beam("wall", "d", LEAF)})

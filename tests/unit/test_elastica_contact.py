@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_layouts import with_pads
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -30,7 +31,6 @@ from cfmkit.elastica import (
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import NodeOnObstacle, Stop, circle, line, polyline
-from cfmkit.elastica.model.contact import arc as arc_line
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
@@ -167,34 +167,9 @@ def test_a_curved_leaf_on_a_disc_solves_the_equations_of_shooting(curvature, cen
     assert np.hypot(*(tip_of(path) - centre)) == pytest.approx(radius, rel=1e-11)
 
 
-def layout(seed):
-    """Return a random cantilever with up to four contacts, and a drive out and back."""
-    rng = np.random.default_rng(seed)
-    net = cantilever(nodes=int(rng.integers(3, 6)))
-    names, contacts = list(net.nodes)[1:], []
-    for number in range(int(rng.integers(1, 5))):
-        node = names[int(rng.integers(len(names)))]
-        x, stiffness = net.nodes[node].x, (np.inf if rng.integers(2) else 10 ** rng.uniform(1, 4))
-        low, pad = -rng.uniform(0.01, 0.35) * x * x - 0.005, rng.uniform(0.01, 0.1)
-        outline = [
-            None,
-            line((0.0, low - pad), 0.0),
-            circle((x + 0.05 * rng.normal(), low - pad - 0.2), 0.2),
-            polyline([(-1, low - pad), (0.9 * x, low - pad), (0.9 * x, -9.0)], 0.02),
-            arc_line((x - 0.1, low - pad - 0.4), 0.4, 0.9 * np.pi, 0.2 * np.pi),
-        ][int(rng.integers(5))]
-        if outline is None:
-            contacts.append(Stop(f"s{number}", node, -low, DOWN + 0.2 * rng.normal(), stiffness=stiffness))
-        else:
-            contacts.append(NodeOnObstacle(f"o{number}", node, outline, pad, stiffness))
-    up = np.linspace(0, 1, 9)[1:] * rng.uniform(1, 6)
-    load = (PointLoad("tip", 0.2 * rng.normal(), -1.0),)
-    return replace(net, contacts=tuple(contacts)), Loading(load, np.concatenate([up, up[-2::-1], [0.0]]))
-
-
 @pytest.mark.parametrize("seed", range(12))
 def test_a_random_layout_returns_to_its_own_points_and_keeps_every_condition(seed):
-    path = trace(*layout(seed), Control(tolerance=1e-8))
+    path = trace(*with_pads(seed), Control(tolerance=1e-8))
     assert path.status is PathStatus.COMPLETE
     gap, force = conditions(path)
     largest = max(1.0, force.max())

@@ -131,3 +131,22 @@ def test_slope_of_the_force_is_that_of_differences(path: Path) -> None:
     ]
     low, high = (side.effort[side.at_requested] for side in sides)
     np.testing.assert_allclose(drive_slope(path), (high - low) / (2 * h), rtol=1e-5)
+
+
+def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elements() -> None:
+    """Forces and stability there, and on the symmetric branch that is left."""
+    length, angle = 35e-3, np.radians(7)
+    nodes = {
+        "wall": Node(0, 0, CLAMPED_SUPPORT),
+        "d": Node(length * np.cos(angle), length * np.sin(angle), slider_support(np.pi / 2)),
+    }
+    network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 1e-3))})
+    drive = Displacement("d", -np.pi / 2, np.array([0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3]))
+    stable = trace(network, drive, Control(tolerance=1e-9))
+    symmetric = trace(network, drive, Control(tolerance=1e-9, branch="primary"))
+    found, other = recheck(stable, elements=60), recheck(symmetric, elements=60)
+    force = stable.effort[stable.at_requested]
+    np.testing.assert_allclose(found.effort, force, atol=3e-5 * np.abs(force).max())
+    np.testing.assert_allclose(other.effort, symmetric.effort[symmetric.at_requested], atol=3e-5 * np.abs(force).max())
+    assert found.stable.all()
+    assert other.stable.tolist() == [True, False, False, False, True]

@@ -46,16 +46,6 @@ def test_points_next_to_a_bifurcation_are_reached_on_their_branch(count, sign):
     assert (np.diff(path.drive) > 0).all()
 
 
-@pytest.mark.parametrize("off", [-1e-3, -1e-4, 1e-4, 1e-3])
-@pytest.mark.parametrize("place", [0.9123017, 4.7501750])
-def test_the_force_is_continuous_across_a_bifurcation(place, off):
-    path = pressed(np.array([0.5, place + off, 5.5]))
-    smooth = pressed(np.array([0.5, place - 0.05, place + 0.05, 5.5]))
-    force, around = path.effort[path.at_requested][1], smooth.effort[smooth.at_requested][1:3]
-    assert path.status is PathStatus.COMPLETE
-    assert around.min() - 0.05 <= force <= around.max() + 0.05
-
-
 @pytest.mark.parametrize(("length", "slenderness"), [(80, 3.3), (192, 5), (192, 3.6), (35, 3.15)])
 def test_leaves_that_lie_almost_flat_or_hardly_buckle_keep_their_stable_branch(length, slenderness):
     """A leaf of rise h and thickness h/Q buckles and straightens at 2h/3 (1 -/+ sqrt(1 - (pi/Q)^2)), nearly."""

@@ -8,31 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 from equilibria import equilibria
-from varied_networks import LAN, X, arms, lan, pushed, turned
+from varied_networks import LAN, lan
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
     Beam,
-    Control,
     Displacement,
     Link,
     Network,
     Node,
     Polynomial,
     Section,
-    gradient,
     slider_support,
-    trace,
 )
-from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.design_derivatives import Equilibria, effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.design_derivatives import effort_slopes
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.results import beam_states
-from cfmkit.elastica.results.path import node_motion, strain_energy
 from cfmkit.numerics.dual_array import COMPLEX_STEP
-
-FINE = Control(tolerance=1e-11)
 
 
 def stepped(template: Any, build: Any, x: Any) -> NetworkDesigns:
@@ -43,44 +35,6 @@ def stepped(template: Any, build: Any, x: Any) -> NetworkDesigns:
 
 def lan_pushed(x: Any) -> Any:
     return lan(x), Displacement("n5", -np.pi / 2, np.array([2e-3, 6e-3]))
-
-
-def arms_pushed(x: Any) -> Any:
-    return arms(x), Displacement("d", -np.pi / 2, np.array([2e-3, 6e-3]))
-
-
-CASES = [
-    (lan_pushed, LAN),
-    (arms_pushed, np.array([1.3e-3, 4e-3, 2e-3, 3e-3])),
-    (pushed, X),
-    pytest.param(turned, X, marks=pytest.mark.slow),
-]
-
-
-@pytest.mark.parametrize(("build", "x"), CASES)
-def test_effort_slopes_are_those_of_the_gradient_of_a_trace(build: Any, x: Any) -> None:
-    """By nodes, offsets, shapes, sections, springs, loads, supports: every kind of variable that there is."""
-    net, drive = build(x)
-    known = gradient(trace(net, drive, FINE), build, x).effort
-    at, rates = equilibria(net, drive)
-    found = effort_slopes(at, stepped(at.mesh, build, x), rates)
-    size = np.abs(known * x).max()
-    np.testing.assert_allclose(found * x, known * x, rtol=2e-6, atol=1e-7 * size)
-
-
-def test_unknowns_have_the_slopes_of_differences() -> None:
-    net, drive = arms_pushed(CASES[1][1])
-    x = np.array(CASES[1][1])
-    at, _ = equilibria(net, drive, 10)
-    exact = unknown_slopes(at, stepped(at.mesh, arms_pushed, x))
-    for k in range(len(x)):
-        h = 1e-4 * x[k]
-        sides = [equilibria(*arms_pushed(x + step * h * np.eye(len(x))[k]), 10)[0] for step in (-1, 1)]
-        scales = [side.mesh.scales.length / at.mesh.scales.length for side in sides]
-        node = at.mesh.bodies["b"]
-        moved = [side.z[:, node] * np.array([scale, scale, 1.0]) for side, scale in zip(sides, scales, strict=True)]
-        slope = (moved[1] - moved[0]) / (2 * h)
-        np.testing.assert_allclose(exact[:, k, node], slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
 
 
 def hooked(x: Any) -> Any:
@@ -131,64 +85,3 @@ def test_the_tangent_of_the_path_is_the_adjoint() -> None:
     at, rates = equilibria(net, drive, 8)
     designs = stepped(at.mesh, lan_pushed, LAN)
     np.testing.assert_allclose(effort_slopes(at, designs, rates), effort_slopes(at, designs), rtol=1e-7)
-
-
-def test_the_effort_s_slope_by_an_array_is_a_difference_of_the_functional() -> None:
-    """At a state that is no equilibrium the derivative by a table is that of the gradient along the motion."""
-    net, drive = lan_pushed(LAN)
-    at, rates = equilibria(net, drive, 6)
-    designs = stepped(at.mesh, lan_pushed, LAN)
-    one = design_of(designs, 3)
-    motions = np.tile(at.mesh.rate, (len(at.z), 1))
-    motions[:, at.mesh.free] = rates
-    direct = [
-        (energy.gradient(one, z, drive).imag / COMPLEX_STEP) @ w
-        for z, drive, w in zip(at.z, at.drive, motions, strict=True)
-    ]
-    unit = at.mesh.scales.moment / at.mesh.scales.drive
-    np.testing.assert_allclose(effort_slopes(at, designs, rates)[:, 3], np.array(direct) * unit, rtol=1e-10)
-
-
-@pytest.mark.parametrize(("build", "x"), [*CASES[:2], pytest.param(pushed, X, marks=pytest.mark.slow)])
-def test_slopes_of_other_outputs_are_those_of_the_gradient_of_a_trace(build: Any, x: Any) -> None:
-    """Motions of nodes, energy, forces on the ends of beams, stresses at their ends."""
-    net, drive = build(x)
-    known = gradient(trace(net, drive, FINE), build, x)
-    at, _ = equilibria(net, drive)
-    beam, node = next(iter(net.beams)), "b" if "b" in net.nodes else "n3"
-    ends = np.array([0.0, 1.0])
-
-    def end_force(model: Any, states: Any) -> Any:
-        seen = beam_states.states(model, states, beam, ends)
-        return np.stack([seen.h[:, -1], seen.v[:, -1], seen.moment[:, -1]], axis=-1)
-
-    def stress(model: Any, states: Any) -> Any:
-        seen = beam_states.sections(model, beam, beam_states.states(model, states, beam, ends))
-        return np.stack([seen.bending_stress[:, 0], seen.axial_stress[:, 0]], axis=-1)
-
-    outputs = {
-        "motion": lambda _, states: node_motion(states, node),
-        "energy": lambda _, states: strain_energy(states) * at.mesh.scales.moment,
-        "force": end_force,
-        "stress": stress,
-    }
-    designs = stepped(at.mesh, build, x)
-    slopes = unknown_slopes(at, designs)
-    moved = [
-        Equilibria(design_of(designs, k), at.z + 1j * COMPLEX_STEP * slopes[:, k], at.drive) for k in range(len(x))
-    ]
-    pairs = list(zip(designs.networks, moved, strict=True))
-    found = {
-        name: np.stack([np.imag(output(net, one)) / COMPLEX_STEP for (net, _), one in pairs], axis=-1)
-        for name, output in outputs.items()
-    }
-    sections = known.sections(beam)
-    wanted = {
-        "motion": known.motion[node],
-        "energy": known.energy,
-        "force": known.end_force(beam, 1),
-        "stress": np.stack([sections.bending_stress[:, 0], sections.axial_stress[:, 0]], axis=1),
-    }
-    for name, slopes in wanted.items():
-        size = np.abs(slopes * x).max()
-        np.testing.assert_allclose(found[name] * x, slopes * x, rtol=1e-5, atol=1e-6 * size, err_msg=name)

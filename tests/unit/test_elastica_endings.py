@@ -9,6 +9,7 @@ import pytest
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
+    FREE_SUPPORT,
     PINNED_SUPPORT,
     Beam,
     Control,
@@ -21,6 +22,7 @@ from cfmkit.elastica import (
     PointLoad,
     Rotation,
     Section,
+    TorsionSpring,
     arc,
     slider_support,
     trace,
@@ -109,12 +111,19 @@ def test_a_path_keeps_to_its_number_of_points() -> None:
     assert f"{path.drive[-1]:.6g}" in path.message
 
 
-@pytest.mark.parametrize("nodes", [(Node(0, 0), Node(0.1, 0)), (Node(0, 0, PINNED_SUPPORT), Node(0.1, 0))])
-def test_a_network_that_nothing_holds_has_no_start(nodes: tuple[Node, Node]) -> None:
-    loose = Network(dict(zip("at", nodes, strict=True)), {"x": Beam("a", "t", SECTION)})
-    path = trace(loose, Loading((PointLoad("t", fy=1.0),), np.array([1.0])))
-    assert path.status is PathStatus.NO_START
-    assert len(path) == 0
+@pytest.mark.parametrize("axial", [True, False])
+@pytest.mark.parametrize(("support", "springs"), [
+    (FREE_SUPPORT, ()), (PINNED_SUPPORT, ()), (PINNED_SUPPORT, (TorsionSpring("a", "t", 1.0, 0.1),)),
+])  # fmt: skip
+@pytest.mark.parametrize("drive", [
+    Loading((PointLoad("t", fy=1.0),), np.array([1.0])), Displacement("t", 0.0, np.array([1e-3])),
+])  # fmt: skip
+def test_a_network_that_nothing_holds_has_no_start(support: Any, springs: Any, drive: Any, axial: bool) -> None:
+    section = Section(2e9, 8e-3, 1e-3, axial=axial)
+    nodes = {"a": Node(0, 0, support), "t": Node(0.1, 0)}
+    path = trace(Network(nodes, {"x": Beam("a", "t", section)}, springs=springs), drive)
+    assert (path.status, len(path)) == (PathStatus.NO_START, 0)
+    assert "nothing holds the network" in path.message
 
 
 def test_an_inextensible_arc_is_pulled_until_it_is_taut() -> None:
@@ -154,6 +163,8 @@ def test_a_batch_keeps_what_each_path_reached_and_why_it_ended(workers: int) -> 
     networks = [strip(), arch(), closed, nowhere, strip()]
     found = list(trace_many(networks, PUSH, workers=workers))
     assert [one.status for one in found] == ["COMPLETE", "JUMPS", "INVALID", "INVALID", "COMPLETE"]
+    assert "returns to its start" in found[2].message
+    assert found[2].value is None
     alone = trace(arch(), PUSH)
     assert found[1].message == alone.message
     np.testing.assert_array_equal(found[1].value.effort, alone.effort[alone.at_requested])

@@ -79,7 +79,7 @@ def test_a_singular_tangent_is_told_where_a_derivative_is_asked_for(
         getattr(found, output)
 
 
-def nowhere(_: Any, free: Any, way: Any) -> SolvedStates:
+def nowhere(_: Any, free: Any, way: Any, **options: Any) -> SolvedStates:
     """Return what is told where Newton's method does not converge."""
     unknown = np.full(free.shape, np.nan)
     return SolvedStates(np.zeros(len(way), bool), unknown, unknown, np.zeros(len(way), int), unknown[:, 0])

@@ -16,6 +16,7 @@ import beam_networks
 import numpy as np
 import pytest
 from batch_networks import two_leaves
+from contact_layouts import with_pads
 
 import cfmkit
 from cfmkit.elastica import (
@@ -36,6 +37,7 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
+from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, raise_designs, set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
@@ -87,9 +89,44 @@ def test_gradients_and_hessians_of_c_and_numpy_are_equal_on_200_random_networks(
 @pytest.mark.parametrize("name", CONFIGS)
 def test_gradients_and_hessians_of_c_and_numpy_are_equal_on_the_shipped_configs(name: str) -> None:
     assembly = assemble(cfmkit.load(ROOT / "configs" / name))
-    plain = replace(assembly.network, contacts=())  # contacts are in numpy alone
-    network = discretise(plain, assembly.drive())
+    network = discretise(assembly.network, assembly.drive())
     assert_same_functional(network, random_state(network, 1))
+
+
+@needs_c
+@pytest.mark.parametrize("ramp", [False, True])
+def test_stops_and_pads_of_c_and_numpy_are_equal_on_random_layouts(ramp: bool) -> None:
+    """Open and closed as their forces say, which are of either sign here; by random numbers far from equilibrium."""
+    for seed in range(40):
+        network = discretise(*with_pads(seed), 6)
+        own = equations(network, ramp)
+        assert isinstance(own, CompiledEquations)
+        right = ContactEquations(network, ramp, plain=equations(open_all_contacts(network), ramp))
+        free = random_state(network, seed)[network.free]
+        free[-len(network.contacts) :] *= 10
+        found, known = own.linearise(free, 0.4), right.linearise(free, 0.4)
+        assert found.residual == pytest.approx(known.residual, abs=1e-12 * np.abs(known.residual).max())
+        assert found.tangent == pytest.approx(known.tangent, abs=1e-12 * np.abs(known.tangent).max())
+        assert found.change == pytest.approx(known.change, abs=1e-12)
+        z = own.values(free, 0.4)
+        for mine, its in zip(own.evaluate(z, 0.3, 0.7), right.evaluate(z, 0.3, 0.7), strict=True):
+            assert difference(mine, its) < 1e-12
+        if np.linalg.cond(known.tangent) < 1e12:  # else two rigid floors press on one pad
+            assert own.resolve(free, 0.4, np.ones((1, own.n)))[1] == right.count_unstable(known)
+
+
+@needs_c
+def test_a_path_with_stops_and_pads_of_c_is_that_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    fast = trace(*with_pads(0), Control(tolerance=1e-8))
+    monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
+    slow = trace(*with_pads(0), Control(tolerance=1e-8))
+    events = [[(event.kind, event.number) for event in path.contact_events] for path in (fast, slow)]
+    assert events[0] == events[1]
+    drives = [[event.drive for event in path.contact_events] for path in (fast, slow)]
+    assert drives[0] == pytest.approx(drives[1], rel=1e-10)
+    assert len(drives[0]) == 4
+    assert fast.motion("tip")[fast.at_requested] == pytest.approx(slow.motion("tip")[slow.at_requested], abs=1e-10)
+    assert fast.contact_force(0)[fast.at_requested] == pytest.approx(slow.contact_force(0)[slow.at_requested], abs=1e-9)
 
 
 @needs_c

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from beam_networks import drives, network
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -39,26 +38,6 @@ def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path
     return trace(leaf, Displacement("d", -np.pi / 2, np.asarray(points)), Control(**control))
 
 
-@pytest.mark.parametrize(
-    ("angle", "thickness", "off", "tolerance"),
-    [
-        (0.16564239, 6.755719e-4, -3e-7, 9e-7),
-        (0.32094386, 1.2854059e-3, 9e-7, 4.3e-5),
-        (0.242028, 2.0692e-3, -4e-6, 3e-4),
-    ],
-)
-def test_a_point_beside_a_bifurcation_does_not_end_the_path(
-    angle: float, thickness: float, off: float, tolerance: float
-) -> None:
-    rise = LENGTH * np.sin(angle)
-    end = 1.9 * rise
-    place = pressed(angle, thickness, np.linspace(0, end, 21)[1:]).events[0].drive + off * rise
-    path = pressed(angle, thickness, [place, end], tolerance=tolerance)
-    assert path.status is PathStatus.COMPLETE
-    assert path.stable.all()
-    assert path.drive[path.at_requested] == pytest.approx([place, end], rel=1e-12)
-
-
 def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> None:
     """A leaf of a twelfth of its rise: the end of its branch is passed over."""
     angle = 0.0796134409080207
@@ -66,20 +45,6 @@ def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> N
     assert path.status is PathStatus.COMPLETE
     assert path.stable.all()
     assert path.branch[-1] == "primary"
-
-
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-8])
-@pytest.mark.parametrize("slenderness", [3.4, 5.0, 9.0])
-def test_bifurcations_are_placed_as_tightly_as_the_tolerance_asks(slenderness: float, tolerance: float) -> None:
-    angle = np.radians(7)
-    rise = LENGTH * np.sin(angle)
-    thickness = rise / slenderness
-    some, many = (np.linspace(0, 1.9 * rise, count + 1)[1:] for count in (20, 60))
-    path = pressed(angle, thickness, some, tolerance=tolerance)
-    exact = pressed(angle, thickness, many, tolerance=1e-11, largest_turn=0.1)
-    places, truth = ([event.drive / rise for event in one.events] for one in (path, exact))
-    assert len(truth) == 2
-    assert places == pytest.approx(truth, rel=0, abs=tolerance)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 4.65e-5, 1e-5])
@@ -134,14 +99,6 @@ def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float
     assert "buckling mode" in loose.imperfection
     turns = [np.abs(path.motion("t")[path.at_requested, 2]) for path in (loose, tight)]
     np.testing.assert_allclose(turns[0], turns[1], rtol=0, atol=tolerance)
-
-
-@pytest.mark.parametrize("tolerance", [1e-3, 4.9e-6, 1e-6])
-def test_a_mesh_too_coarse_for_the_constant_loads_is_refined(tolerance: float) -> None:
-    held = network(102, True)
-    path = trace(held, Displacement("d", drives(held, 102)[0].direction, np.array([5e-4, 1e-3])), Control(tolerance))
-    assert path.status is PathStatus.COMPLETE
-    assert path.error <= tolerance
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -93,12 +93,3 @@ def test_a_node_that_a_link_moves_has_no_reaction() -> None:
     path = functional_path(net, beam_networks.drives(net, 3)[3], 8)
     with pytest.raises(InputError, match="moved by a link"):
         path.reaction("bb")
-
-
-def arch(points: int, load: bool = False) -> tuple[Network, Displacement | Loading]:
-    """An arch that is pressed flat: its force has a largest and a smallest value on the way."""
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(LENGTH, 0.02, slider_support(np.pi / 2, rotates=False))}
-    net = Network(nodes, {"x": Beam("a", "b", STRIP, Polynomial((0.0, 0.9, -0.4)))})
-    if load:
-        return net, Loading((PointLoad("b", fy=1.0),), np.linspace(0, 1.5, points)[1:])
-    return net, Displacement("b", -np.pi / 2, np.linspace(0, 0.04, points)[1:])

@@ -77,14 +77,6 @@ def test_a_spring_may_be_prestressed_by_a_large_turn(loads: tuple[PointLoad, ...
     assert path.end_force("x", 1)[-1, 2] == pytest.approx(0.05 * (2.0 - turn), rel=1e-6)
 
 
-def test_a_mechanism_that_nothing_holds_says_so() -> None:
-    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "b": Node(0.1, 0.0)}
-    network = Network(nodes, {"x": Beam("a", "b", SECTION)}, springs=(TorsionSpring("a", "b", 1.0, 0.1),))
-    path = trace(network, Displacement("b", 0.0, np.array([1e-3])))
-    assert path.status is PathStatus.NO_START
-    assert "nothing holds the network" in path.message
-
-
 @pytest.mark.parametrize("branch", ["primary", "stable"])
 @pytest.mark.parametrize("off", [1e-7, 1e-6, 1e-5])
 def test_a_point_beside_a_bifurcation_does_not_lead_to_the_path_that_crosses(off: float, branch: str) -> None:

@@ -16,12 +16,9 @@ from cfmkit.elastica import (
     Beam,
     Control,
     Displacement,
-    Loading,
     Network,
     Node,
     PathStatus,
-    PointLoad,
-    Rotation,
     Section,
     slider_support,
 )
@@ -65,38 +62,6 @@ def test_paths_on_the_functional_are_those_of_the_file(name: str, monkeypatch: p
 
 
 STIFF = Section(2e9, 1e-2, 1e-3, axial=False)
-EULER = 4 * np.pi**2 * 2e9 * 1e-2 * 1e-9 / 12 / 0.1**2  # clamped at both ends
-
-
-def test_a_straight_column_that_does_not_stretch_is_pressed_beyond_its_critical_load() -> None:
-    """Its force is that of a column under a load, which may stretch a little or not at all."""
-    net = Network(
-        {"a": Node(0, 0, CLAMPED_SUPPORT), "b": Node(0.1, 0, slider_support(0.0))}, {"x": Beam("a", "b", STIFF)}
-    )
-    path = trace(net, Displacement("b", np.pi, np.array([1e-3, 1e-2, 3e-2])))
-    assert path.status is PathStatus.COMPLETE
-    assert path.stable.all()
-    forces = path.effort[path.at_requested]
-    assert forces[0] == pytest.approx(EULER * 1.005, rel=1e-4)  # 1 + shortening / 2
-    loaded = trace(net, Loading((PointLoad("b", -1.0),), forces))
-    assert -loaded.motion("b")[loaded.at_requested, 0] == pytest.approx([1e-3, 1e-2, 3e-2], rel=1e-4)
-
-
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
-def test_the_error_told_is_that_of_the_path(tolerance: float) -> None:
-    case = CASES["random 4, drive 0"]
-    network, drive = (from_json(case[part]) for part in ("network", "drive"))
-    path = trace(network, drive, Control(tolerance))
-    known = np.array(case["expected"]["effort"])
-    error = np.abs(path.effort[path.at_requested] - known).max() / np.abs(known).max()
-    assert error <= path.error <= tolerance
-
-
-def test_a_network_that_nothing_bears_has_no_start() -> None:
-    net = Network({"a": Node(0, 0), "b": Node(0.1, 0)}, {"x": Beam("a", "b", STIFF)})
-    path = trace(net, Displacement("b", np.pi / 2, np.array([1e-3])))
-    assert path.status is PathStatus.NO_START
-    assert len(path) == 0
 
 
 def test_a_step_along_the_arc_does_not_lead_to_the_mirror_image() -> None:
@@ -164,11 +129,3 @@ def test_a_path_that_is_raised_is_that_of_its_degree() -> None:
         [event.drive for event in anew.events], rel=1e-8
     )
     assert raised.path.branch[-1] == anew.branch[-1]
-
-
-def test_forces_of_a_mechanism_that_bears_nothing_are_no_error() -> None:
-    nodes = {"hinge": Node(0, 0, PINNED_SUPPORT), "end": Node(0.05, 0.0)}
-    net = Network(nodes, {"strip": Beam("end", "hinge", STIFF)})
-    path = trace(net, Rotation("end", np.array([-0.3, -0.9])), Control(1e-9))
-    assert path.status is PathStatus.COMPLETE, path.message
-    assert np.abs(path.effort).max() < 1e-9

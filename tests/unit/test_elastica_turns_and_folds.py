@@ -108,16 +108,6 @@ def test_a_path_that_ends_in_a_stretch_does_not_begin_the_next() -> None:
 
 
 @pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("points", [5, 51])
-def test_without_limit_points_through_folds_changes_nothing(points: int, tolerance: float) -> None:
-    asked = np.linspace(0, 2.05, points)
-    plain, arc = pressed(asked, tolerance), pressed(asked, tolerance, through_folds=True)
-    assert arc.events == plain.events
-    np.testing.assert_array_equal(arc.effort, plain.effort)
-    assert arc.branch.tolist() == plain.branch.tolist()
-
-
-@pytest.mark.parametrize("tolerance", TOLERANCES)
 def test_a_toggle_snaps_and_snaps_back_at_the_limit_points_of_its_force(tolerance: float) -> None:
     """Bars of different length: driven by its travel the toggle has no bifurcation, only a force that falls."""
     travel = Displacement("t", DOWN, np.linspace(0, 0.02, 801)[1:])

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import beam_networks
 import numpy as np
 import pytest
+from functional_paths import functional_path
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -289,3 +291,17 @@ def test_what_would_take_too_many_unknowns_is_refused(monkeypatch: pytest.Monkey
     monkeypatch.setattr("cfmkit.elastica.vibration.MAX_UNKNOWNS", 20)
     with pytest.raises(InputError, match="unknowns, more than 20: the beams have too many windings or too much"):
         frequencies(under(1e-9, beam()), WHOLE, 3)
+
+
+@pytest.mark.parametrize(("seed", "number"), [(4, 0), (4, 1), (4, 2), (8, 3)])
+def test_frequencies_of_networks_with_every_feature_do_not_depend_on_the_degree(seed: int, number: int) -> None:
+    """Loads that follow among them: held, free, and whether they flutter."""
+    net = beam_networks.network(seed)
+    drive = beam_networks.drives(net, seed)[number]
+    masses = NetworkMasses(dict.fromkeys(net.beams, 1000.0), {"b": (1e-3, 1e-7), "bb": (5e-4, 0.0)})
+    old = trace(net, drive, Control(tolerance=1e-9))
+    known = frequencies(old, masses, 4, [len(old) - 1])
+    found = frequencies(functional_path(net, drive, 14), masses, 4, [1])
+    assert found.free[0] == pytest.approx(known.free[0], rel=1e-6, nan_ok=True)
+    assert found.held[0] == pytest.approx(known.held[0], rel=1e-6, nan_ok=True)
+    assert (found.flutters[0], found.diverges[0]) == (known.flutters[0], known.diverges[0])

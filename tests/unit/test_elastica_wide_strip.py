@@ -24,8 +24,12 @@ from cfmkit.elastica import (
     gradient,
     trace,
 )
+from cfmkit.elastica.mechanics import energy as functional
+from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.march import CompiledEquations, equations
 from cfmkit.elastica.mechanics.wide_strip import curling_share
 from cfmkit.elastica.model.section import curl_hindered
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 E, B, T, NU, LENGTH = 2e9, 10e-3, 1e-3, 0.35, 50e-3
 PLATE = NU**2 / (1 - NU**2)
@@ -101,7 +105,7 @@ def test_a_strip_without_poissons_ratio_and_a_narrow_one_are_beams():
         assert wide == pytest.approx(beam, rel=near)
 
 
-def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
+def strips_and_a_narrow_beam() -> tuple[Network, Displacement]:
     narrow, wide = Section(E, 2e-3, T), Section(E, B, T, poisson_ratio=NU, shear=True, wide=True)
     tapered = Section(E, B, TAPER, poisson_ratio=NU, wide=True)
     nodes = {
@@ -111,14 +115,35 @@ def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
         "d": Node(0.05, 0, CLAMPED_SUPPORT),
     }
     beams = {"x": Beam("a", "b", wide, arc(0.9)), "y": Beam("b", "c", tapered), "z": Beam("b", "d", narrow)}
-    drive = Displacement("b", 0.3, np.array([0.002, 0.004]))
-    found = trace(Network(nodes, beams), drive, Control())
+    return Network(nodes, beams), Displacement("b", 0.3, np.array([0.002, 0.004]))
+
+
+def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
+    net, drive = strips_and_a_narrow_beam()
+    found = trace(net, drive, Control())
     assert found.status is PathStatus.COMPLETE
     x, w = np.polynomial.legendre.leggauss(16)
-    places = trace(Network(nodes, beams), Displacement("b", 0.3, 0.003 + 0.001 * x), Control())
+    places = trace(net, Displacement("b", 0.3, 0.003 + 0.001 * x), Control())
     work = 0.001 * w @ places.effort[places.at_requested]
     before, after = found.energy[found.at_requested]
     assert after - before == pytest.approx(work, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.3, 3.0])
+def test_gradient_and_hessian_of_wide_strips_are_derivatives_and_the_same_in_c(size: float):
+    """Bent a little, where the law is a series, and much, where it is not."""
+    mesh = discretise(*strips_and_a_narrow_beam(), 4, 2)
+    z = size * np.random.default_rng(1).standard_normal(mesh.size)
+    tangent = functional.hessian(mesh, z, 0.1, 0.6)
+    steps = [functional.gradient(mesh, z + 1j * COMPLEX_STEP * unit, 0.1, 0.6).imag for unit in np.eye(mesh.size)]
+    largest = float(np.abs(tangent).max())
+    assert tangent == pytest.approx(np.stack(steps, axis=1) / COMPLEX_STEP, rel=1e-11, abs=1e-11 * largest)
+    own = equations(mesh)
+    if isinstance(own, CompiledEquations):
+        gradient_in_c, hessian_in_c = own.evaluate(z, 0.1, 0.6)
+        assert np.abs(hessian_in_c - tangent).max() < 1e-12 * largest
+        known = functional.gradient(mesh, z, 0.1, 0.6)
+        assert np.abs(gradient_in_c - known).max() < 1e-12 * np.abs(known).max()
 
 
 @pytest.mark.parametrize("tapered", [False, True])

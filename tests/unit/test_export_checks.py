@@ -17,24 +17,59 @@ def drawn(*contours):
     return outlines(Drawing("part", contours))
 
 
-def test_edges_that_do_not_meet_are_refused_with_both_places():
-    contour = Contour((Line((0, 0), (0.1, 0)), Line((0.1, 2e-9), (0, 0.1))), "cut")
-    with pytest.raises(GeometryError, match=r"edge 2 begins at \(100, 2e-06\) mm, but edge 1 ends at \(100, 0\) mm"):
-        drawn(contour)
+CROSSED = [(0, 0), (0.1, 0.1), (0.1, 0), (0, 0.1)]
+CROSSED_LINES = tuple(Line(a, b) for a, b in itertools.pairwise(CROSSED))
 
 
-def test_rounding_between_edges_is_no_gap():
+def hole(x, radius=0.01):
+    return circle((x, 0.05), radius, "cut", hole=True)
+
+
+REFUSED = {
+    "edges that do not meet": (
+        (Contour((Line((0, 0), (0.1, 0)), Line((0.1, 2e-9), (0, 0.1))), "cut"),),
+        r"edge 2 begins at \(100, 2e-06\) mm, but edge 1 ends at \(100, 0\) mm",
+    ),
+    "a closed contour that does not close": (
+        (Contour((Line((0, 0), (0.1, 0)), Line((0.1, 0), (0.1, 0.1))), "cut", closed=True),),
+        r"not closed: it begins at \(0, 0\) mm and ends at \(100, 100\) mm",
+    ),
+    "a contour that crosses itself": (
+        (polygon(CROSSED, "cut"),), r"contour 1 on layer 'cut' crosses or touches itself at \(50, 50\) mm",
+    ),
+    "an open cut that crosses itself": ((Contour(CROSSED_LINES, "cut"),), r"at \(50, 50\) mm"),
+    "a hole through the edge": (
+        (SQUARE, hole(0.1)), r"contour 1 on layer 'cut' and contour 2 .* cross or touch at \(\d+",
+    ),
+    "a hole beside the part": ((SQUARE, hole(0.2)), "outside every cut contour"),
+    "a hole in a hole": (
+        (SQUARE, hole(0.05), hole(0.05, 0.02)), r"the holes contour 2 .* and contour 3 .* touch or overlap, at \(",
+    ),
+    "points that are not finite": ((Contour((Line((0, 0), (np.inf, 0)),), "path"),), "not finite"),
+    **{
+        f"an arc that is none, {number}": ((Contour((edge,), "path"),), "an arc needs a radius above zero")
+        for number, edge in enumerate((Arc((0, 0), -1.0, 0, 1), Arc((0, 0), 1.0, 2.0, 2.0), Arc((0, 0), 1.0, 0, 7),
+                                       Arc((0, 0), 0.0, 0, 1)))
+    },
+    **{
+        f"nothing, {number}": (contours, "has no")
+        for number, contours in enumerate(((), (Contour((), "cut"),), (Contour((Line((1, 1), (1, 1)),), "cut"),)))
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("contours", "reported"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_cut_is_refused_as_invalid_input_with_the_place(contours, reported):
+    assert issubclass(GeometryError, InputError)
+    with pytest.raises(GeometryError, match=reported):
+        drawn(*contours)
+
+
+def test_what_can_be_cut_is_not_refused():
+    """Rounding between edges, a path that crosses itself, two parts on one sheet."""
     assert len(drawn(Contour((Line((0, 0), (0.1, 0)), Line((0.1, 5e-10), (0, 0.1))), "cut"))) == 1
-
-
-def test_a_closed_contour_that_does_not_close_is_refused():
-    with pytest.raises(GeometryError, match=r"not closed: it begins at \(0, 0\) mm and ends at \(100, 100\) mm"):
-        drawn(Contour((Line((0, 0), (0.1, 0)), Line((0.1, 0), (0.1, 0.1))), "cut", closed=True))
-
-
-def test_a_contour_that_crosses_itself_is_refused_with_the_place():
-    with pytest.raises(GeometryError, match=r"contour 1 on layer 'cut' crosses or touches itself at \(50, 50\) mm"):
-        drawn(polygon([(0, 0), (0.1, 0.1), (0.1, 0), (0, 0.1)], "cut"))
+    assert len(drawn(Contour(CROSSED_LINES, "path"))) == 1
+    assert len(drawn(SQUARE, polygon([(0.2, 0), (0.3, 0), (0.3, 0.1)], "cut"), hole(0.05))) == 3
 
 
 def test_an_arc_that_reaches_over_a_line_is_a_crossing():
@@ -49,35 +84,6 @@ def test_an_arc_that_reaches_over_a_line_is_a_crossing():
     assert len(drawn(high)) == 1
     with pytest.raises(GeometryError, match="crosses or touches itself"):
         drawn(low)
-
-
-def test_an_open_cut_that_crosses_itself_is_refused_but_a_path_may():
-    points = [(0, 0), (0.1, 0.1), (0.1, 0), (0, 0.1)]
-    lines = tuple(Line(a, b) for a, b in itertools.pairwise(points))
-    assert len(drawn(Contour(lines, "path"))) == 1
-    with pytest.raises(GeometryError, match=r"at \(50, 50\) mm"):
-        drawn(Contour(lines, "cut"))
-
-
-def test_a_hole_through_the_edge_is_refused():
-    with pytest.raises(GeometryError, match=r"contour 1 on layer 'cut' and contour 2 .* cross or touch at \(\d+"):
-        drawn(SQUARE, circle((0.1, 0.05), 0.01, "cut", hole=True))
-
-
-def test_a_hole_beside_the_part_is_refused():
-    with pytest.raises(GeometryError, match="outside every cut contour"):
-        drawn(SQUARE, circle((0.2, 0.05), 0.01, "cut", hole=True))
-
-
-def test_a_hole_in_a_hole_is_refused():
-    holes = (circle((0.05, 0.05), radius, "cut", hole=True) for radius in (0.01, 0.02))
-    with pytest.raises(GeometryError, match=r"the holes contour 2 .* and contour 3 .* touch or overlap, at \("):
-        drawn(SQUARE, *holes)
-
-
-def test_two_parts_on_one_sheet_are_fine():
-    other = polygon([(0.2, 0), (0.3, 0), (0.3, 0.1)], "cut")
-    assert len(drawn(SQUARE, other, circle((0.05, 0.05), 0.01, "cut", hole=True))) == 3
 
 
 def test_points_too_coarse_for_the_tolerance_are_refused_with_contour_and_place():
@@ -97,29 +103,6 @@ def tangents(x, y):
 def test_a_line_without_length_is_left_out():
     contour = Contour((Line((0, 0), (0.1, 0)), Line((0.1, 0), (0.1, 0)), Line((0.1, 0), (0, 0.1))), "cut")
     assert len(drawn(contour)[0].chain.bulges) == 2
-
-
-@pytest.mark.parametrize(
-    "edge", [Arc((0, 0), -1.0, 0, 1), Arc((0, 0), 1.0, 2.0, 2.0), Arc((0, 0), 1.0, 0, 7), Arc((0, 0), 0.0, 0, 1)]
-)
-def test_arcs_that_are_none_are_refused(edge):
-    with pytest.raises(GeometryError, match="an arc needs a radius above zero"):
-        drawn(Contour((edge,), "path"))
-
-
-def test_points_that_are_not_finite_are_refused():
-    with pytest.raises(GeometryError, match="not finite"):
-        drawn(Contour((Line((0, 0), (np.inf, 0)),), "path"))
-
-
-@pytest.mark.parametrize("contours", [(), (Contour((), "cut"),), (Contour((Line((1, 1), (1, 1)),), "cut"),)])
-def test_a_drawing_of_nothing_is_refused(contours):
-    with pytest.raises(GeometryError, match="has no"):
-        drawn(*contours)
-
-
-def test_the_refusal_counts_as_invalid_input():
-    assert issubclass(GeometryError, InputError)
 
 
 # ---- the values themselves

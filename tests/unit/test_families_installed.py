@@ -24,14 +24,8 @@ OLD = "\n".join(["cfmkit: 1", "family: {}", "mechanism: {{stiffness: 2 N/mm}}", 
 @pytest.fixture
 def site(tmp_path, monkeypatch):
     """An empty folder on the path of modules."""
-    folder = tmp_path / "site"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(str(folder))
-    entry_point_plugins._import_record.cache_clear()
-    entry_point_plugins._offers_on.cache_clear()
-    yield folder
-    packages.forget(folder)
-    entry_point_plugins._import_record.cache_clear()
+    with packages.empty_site(tmp_path / "site", monkeypatch) as folder:
+        yield folder
 
 
 def reason(name):

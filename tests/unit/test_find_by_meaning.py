@@ -31,6 +31,7 @@ REFERENCE = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(enco
         ("Factor of Safety", "safety_factor", "vcfm"),
         ("natural frequencies", "frequency_held_min", "beam"),
         ("living hinges", "", "slider_crank_beams"),
+        ("cite", "", "reports"),
         ("notch", "stress_concentration_max", "solid"),
         ("parts lists", "design.catalogue", "springs"),
     ],
@@ -43,10 +44,17 @@ def test_a_common_word_leads_to_the_name_and_the_page(word, name, page):
     assert page in [section.page for section in guide.search(word)][:8]
 
 
+@pytest.mark.parametrize(
+    ("words", "page"), [("own metric", "python"), ("own material", "howto"), ("compare with measurement", "measuring")]
+)
+def test_several_words_that_are_no_phrase_lead_to_the_sections_that_name_all_of_them(words, page):
+    assert page in [section.page for section in guide.search(words)][:3]
+
+
 def test_every_target_of_a_synonym_is_explained():
     """It is a term, a name that `show` knows, a verb, a word of a verb's options, or a file of the reference."""
     targets = {target for _, cell in guide.read_glossary("synonym") for target in cell.split(", ")}
-    known = {*guide.read_terms(), *show_topics.names(), *verbs(), "contact_force", "tare", "solid"}
+    known = {*guide.read_terms(), *show_topics.names(), *verbs(), "contact_force", "tare", "solid", "references"}
     assert len(targets) > 60
     assert {target for target in targets - known if f"`{target}`" not in REFERENCE} == set()
 

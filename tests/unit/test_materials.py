@@ -133,10 +133,9 @@ def test_a_near_miss_is_named(typed: str, meant: str):
     assert meant in str(caught.value)
 
 
-def test_a_name_that_resembles_nothing_gets_the_whole_list():
-    with pytest.raises(UnknownMaterial) as caught:
+def test_a_name_that_resembles_nothing_gets_the_command_that_lists_the_names():
+    with pytest.raises(UnknownMaterial, match="`cfmkit show materials` lists them"):
         material("wool")
-    assert all(name in str(caught.value) for name in MATERIALS_BY_NAME)
 
 
 def test_an_unknown_material_is_an_invalid_value_for_the_command_line_and_a_value_error_for_validators():
@@ -207,6 +206,7 @@ def test_a_material_is_written_in_one_form_and_reads_back(stem: str, complete: b
     [
         ("pon", "did you mean 'pom'"),
         ("{name: pon}", "did you mean 'pom'"),
+        ("{name: wool, youngs_modulus: 3 GPa}", "one of your own has 'youngs_modulus' in place of 'name'"),
         ("5", "5 is no material: give a name from `show materials`, or values such as"),
         ("{poisson_ratio: 0.3}", "needs 'name' or 'youngs_modulus'"),
         ("{youngs_modulos: 3 GPa}", "did you mean 'youngs_modulus'?"),

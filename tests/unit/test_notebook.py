@@ -230,3 +230,12 @@ def test_proposals_are_shown_with_their_numbers_and_drawn_to_one_scale():
     assert shown.count("<svg") == 1
     assert f"<td>1 {found.proposals[0].family}</td>" in shown
     assert len(repr(found)) < 2000
+
+
+def test_a_measurement_and_a_fit_show_their_values_and_warnings():
+    recording = CONFIGS / "synthetic" / "cam_loop.csv"
+    measured = repr(cfmkit.measure(recording, window="40 mm:120 mm"))
+    assert "cam_loop.csv, 1 cycle; force_mean 49.17 N" in measured
+    fitted = repr(cfmkit.calibrate(CONFIGS / "cam.yaml", recording, fit=["mechanism.rolling_friction"]))
+    assert "mechanism.rolling_friction = 0.00223" in fitted
+    assert fitted.endswith("warnings: weakly_identified, lack_of_fit>")

@@ -16,15 +16,6 @@ def config(name, *settings):
     return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml", list(settings))
 
 
-@pytest.mark.parametrize("name", ["bought", "bilancia2019_optimum", "li2019_bistable", "friction"])
-def test_the_largest_and_the_smallest_effort_are_found_between_few_points(name):
-    few, many = (cfmkit.analyze(config(name, f"analysis.points={count}")).metrics for count in (11, 301))
-    kind = "torque" if "torque_max" in few else "force"
-    size = abs(many[f"{kind}_max"].value)
-    for metric in (f"{kind}_max", f"{kind}_min"):
-        assert few[metric].value == pytest.approx(many[metric].value, abs=1e-7 * size), metric
-
-
 @pytest.mark.parametrize("name", ["bought", "bilancia2019_optimum"])
 def test_derivatives_of_extremes_are_those_at_their_places(name):
     gradient = cfmkit.api.family("slider-crank").gradient

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from given_points import GivenPoints
 from slider_crank import config
+from study_rows import compare_rows_with_runs, study_of
 
 import cfmkit
 from cfmkit import api
@@ -16,7 +17,7 @@ from cfmkit.plots.style import png
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import zip_axes
 from cfmkit.studies.point_evaluation import Study
-from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
+from cfmkit.studies.variants_in_rows import are_solved_together
 from cfmkit.studies.varied_axes import axes, collect_variations
 
 PATHS = tuple(f"mechanism.springs.{name}" for name in ("pivot", "crank_pin", "slider_pin", "slider"))
@@ -28,63 +29,6 @@ SPRUNG = (
     "li2019_from_singularity", "li2019_full_turn", "li2019_prototype", "li2019_widest", "paper_ranges", "rising",
 )  # fmt: skip
 """Configurations with springs at joints."""
-
-
-def varied(spec, draw, count):
-    """Return some numbers of a specification at random, up to three of them: path -> values around its own."""
-    own = {
-        path: value
-        for path, value in spec.leaves()
-        if path.startswith(("mechanism.", "analysis.")) and isinstance(value, float) and value
-    }
-    chosen = draw.choice(sorted(own), draw.integers(1, 4), replace=False)
-    return {path: own[path] * draw.uniform(0.9, 1.1, count) for path in chosen.tolist()}
-
-
-def check_rows_against_single_runs(spec, values):
-    """Compare the rows of a study with a run of each of its points; return its metrics and what is wrong where."""
-    plan = GivenPoints(values)
-    study = Study(spec, plan.paths, metrics_of(spec, (), cfmkit.analyze(spec).curves[0]))
-    together = evaluate_rows(study, plan, 0, len(plan))
-    sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
-    kinds = [metric.dimension for metric in study.metrics]
-    # a column may vanish: it is the difference of others
-    for group in (("force",), ("torque", "rotational_stiffness"), ("length",), ("angle",)):
-        same = [k for k, dimension in enumerate(kinds) if dimension in group]
-        sizes[same] = sizes[same].max(initial=0.0)
-    sizes = np.where(np.equal(kinds, "ratio"), sizes * np.maximum(sizes, 1.0), sizes)  # large: of a mean that vanishes
-    for k in range(len(plan)):
-        alone = study.evaluate(plan.point(k))
-        assert not alone.bug
-        assert together.status(k) == (alone.status, alone.message)
-        assert {name for name, mask in together.warned.items() if mask[k]} == set(alone.warnings), plan.point(k)
-        if not alone.values:
-            continue
-        own = np.array([np.nan if value is None else value for value in alone.values])
-        wrong = ~((np.abs(together.values[k] - own) <= 1e-12 * sizes) | (np.isnan(own) & np.isnan(together.values[k])))
-        found = [(study.names[m], together.values[k, m], own[m], values) for m in np.flatnonzero(wrong)]
-        assert not found
-        assert tuple(together.met[k].tolist()) == alone.met
-    return together.warned, len(study.metrics)
-
-
-@pytest.mark.parametrize("stem", ["bilancia2019", "bought", "friction", "li2019_prototype"])
-def test_a_row_of_a_study_is_a_run_of_its_own(stem):
-    """Whatever is varied, with every metric that a sweep notes."""
-    spec = config(stem)
-    _, count = check_rows_against_single_runs(spec, varied(spec, np.random.default_rng(7), 4))
-    assert count > 50
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", range(6))
-@pytest.mark.parametrize("stem", SPRUNG)
-def test_every_row_of_a_study_is_a_run_of_its_own(stem, number):
-    spec = config(stem)
-    if number % 2:
-        spec = spec.replace({"analysis.window": ("11 %", "78.3 %"), "design": None})
-    draw = np.random.default_rng(100 + number + 10 * SPRUNG.index(stem))
-    check_rows_against_single_runs(spec, varied(spec, draw, 4))
 
 
 def test_the_drop_of_a_swept_stiffness_is_that_of_a_run():
@@ -147,7 +91,7 @@ def test_rows_of_springs_and_legs_are_runs_of_their_own(name, design):
     kind = RATES["bilancia2019" if name.startswith("bilancia") else "li2019"]
     values = {PATHS[row]: draw.choice([0.0, 0.5, 1.2, 3.0], 6) * kind[row] for row in range(4)}
     values[PATHS[3]] += 0.1 * kind[3]
-    check_rows_against_single_runs(spec, values)
+    compare_rows_with_runs(*study_of(spec, values))
 
 
 def test_a_sweep_of_a_mechanism_with_a_screwed_anchor_has_the_force_per_travel_of_it():
@@ -191,8 +135,7 @@ def test_rows_have_the_warnings_of_single_runs(name, changes, expected):
     spread[3] += 0.1
     spread[:3, 0] = 0.0
     values = {path: rate * row for path, rate, row in zip(PATHS, RATES[kind], spread, strict=True)}
-    warned, _ = check_rows_against_single_runs(spec, values)
-    assert expected <= set(warned)
+    assert expected <= set(compare_rows_with_runs(*study_of(spec, values)).warned)
 
 
 def test_what_cannot_be_solved_in_rows_is_left_out():

@@ -104,6 +104,7 @@ def test_a_large_grid_holds_its_axes_only():
     ("option", "message"),
     [
         ("mechanism.roler_radius=1mm:2mm:3", "did you mean 'mechanism.roller_radius'?"),
+        ("mechanism.nothing=1mm:2mm:3", "below 'mechanism' there are brace_length"),
         ("roller_radius=1mm:2mm:3", "did you mean 'mechanism.roller_radius'?"),
         ("foo=[1]", "a path starts with mechanism, design, analysis"),
         ("mechanism.springs=[1]", "is a block; vary one of its values: stiffness"),

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from suggest_support import POM, propose, request
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, seconds
@@ -44,19 +45,6 @@ from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, order
 
 REQUESTS = Path(__file__).parents[1] / "requests"
 
-POM = {
-    "safety": "1",
-    "force": "10 N",
-    "travel": "3 mm",
-    "ripple": "3 %",
-    "envelope": "[80 mm, 60 mm, 12 mm]",
-    "material": "pom",
-}
-
-
-def request(**keys):
-    return read_request(None, POM | keys).request()
-
 
 @pytest.mark.parametrize("path", sorted(REQUESTS.glob("contradiction-*.yaml")), ids=lambda path: path.stem)
 def test_a_request_that_contradicts_itself_is_refused_in_one_line(path):
@@ -70,7 +58,7 @@ def test_a_request_that_contradicts_itself_is_refused_in_one_line(path):
 def test_a_feasible_request_is_in_reach_of_its_own_family(path):
     spec = cfmkit.load(path)
     asked = read_request(str(REQUESTS / path.name), {}).request()
-    offer = function_named(family(spec.family).propose)(asked, Run())
+    offer = propose(spec.family, asked)
     assert offer.candidates, offer.reason
 
 
@@ -172,7 +160,7 @@ def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
 
 def test_a_proposal_keeps_the_request_when_its_file_is_analysed():
     asked = request()
-    offer = function_named(family("cam").propose)(asked, Run())
+    offer = propose("cam", asked)
     found = [make_proposal(ProposalJob("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
     good = [one for one in found if one.good]
     assert good
@@ -187,7 +175,7 @@ def test_a_proposal_keeps_the_request_when_its_file_is_analysed():
 
 def test_what_misses_a_request_says_which():
     asked = request()
-    offer = function_named(family("cam").propose)(asked, Run())
+    offer = propose("cam", asked)
     narrow = replace(asked, envelope=(0.010, 0.060, 0.012))
     one = make_proposal(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
     assert not one.good
@@ -205,7 +193,7 @@ def few_parts(monkeypatch):
 
 def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts):
     asked = request(**PRINTED_CAM, **{"yield": "30 %"})
-    offer = function_named(family("cam").propose)(asked, Run())
+    offer = propose("cam", asked)
     one = make_proposal(ProposalJob("cam", offer.candidates[0], asked, 3))
     assert one.good, one.missed
     assert 0.3 <= one.numbers["yield"] < 0.95
@@ -217,7 +205,7 @@ def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts)
 
 def test_a_request_for_more_good_parts_than_there_are_is_missed(few_parts):
     asked = request(**PRINTED_CAM, **{"yield": "95 %"})
-    offer = function_named(family("cam").propose)(asked, Run())
+    offer = propose("cam", asked)
     one = make_proposal(ProposalJob("cam", offer.candidates[0], asked, 3))
     assert one.near
     assert one.missed[0].startswith("yield")
@@ -227,14 +215,14 @@ def test_a_request_for_more_good_parts_than_there_are_is_missed(few_parts):
 
 def test_a_part_of_which_nobody_knows_the_errors_misses_a_request_for_good_parts():
     asked = read_request(str(REQUESTS / "crank-lumped.yaml"), {"yield": "50 %"}).request()
-    offer = function_named(family("slider-crank").propose)(asked, Run())
+    offer = propose("slider-crank", asked)
     flexures = next(one for one in offer.candidates if one.variant == "flexures")
     assert "its yield is not known" in " ".join(make_proposal(ProposalJob("slider-crank", flexures, asked, 0)).missed)
 
 
 def offered(name, **keys):
     asked = request(**keys)
-    return asked, function_named(family(name).propose)(asked, Run()).candidates
+    return asked, propose(name, asked).candidates
 
 
 @pytest.mark.parametrize("variant", ["2 Vs, folded spring", "2 cosine arches"])
@@ -387,7 +375,7 @@ def test_one_proposal_is_told_of_in_the_singular(count, reported):
 
 def test_a_candidate_whose_time_is_up_is_not_made():
     asked = request()
-    offer = function_named(family("cam").propose)(asked, Run())
+    offer = propose("cam", asked)
     one = make_proposal(ProposalJob("cam", offer.candidates[0], asked, 0, deadline=1.0))
     assert (one.text, one.message) == ("", OUT_OF_TIME)
 
@@ -395,7 +383,7 @@ def test_a_candidate_whose_time_is_up_is_not_made():
 def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next_run(monkeypatch):
     monkeypatch.setattr("cfmkit.studies.suggest.proposal_making_and_judging.MAX_SEARCH_SECONDS", 0.0)
     asked = request()
-    offer = function_named(family("slider-crank").propose)(asked, Run())
+    offer = propose("slider-crank", asked)
     designed = next(one for one in offer.candidates if one.variant == "tapered strip")
     assert make_proposal(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
     kept = []
@@ -435,7 +423,7 @@ def test_kept_shapes_scale_as_beams_that_only_bend():
 )
 def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(envelope, force, shape):
     asked = request(force=force, travel="4 mm", ripple="4 %", envelope=envelope)
-    first = function_named(family("beam").propose)(asked, Run()).candidates[0]
+    first = propose("beam", asked).candidates[0]
     assert first.variant == shape
     found = make_proposal(ProposalJob("beam", first, asked, 0))
     assert found.passes, found.missed
@@ -456,7 +444,7 @@ def test_two_layers_are_proposed_where_one_does_not_travel_so_far():
 
 def test_the_reason_is_that_of_a_shape_that_travels_so_far():
     asked = request(force="60 N", travel="4 mm", ripple="4 %", envelope="[46 mm, 50 mm, 25 mm]")
-    offer = function_named(family("beam").propose)(asked, Run())
+    offer = propose("beam", asked)
     assert not offer.candidates
     assert offer.reason.startswith("the beams would be ")
     assert offer.reason.endswith(" mm wide")
@@ -471,7 +459,7 @@ def test_a_request_beyond_energy_gets_nothing_and_ends_with_4():
 
 def test_the_order_follows_what_is_preferred():
     asked = request()
-    offer = function_named(family("cam").propose)(asked, Run())
+    offer = propose("cam", asked)
     found = [
         one
         for one in (make_proposal(ProposalJob("cam", each, asked, 0, None)) for each in offer.candidates[:5])
@@ -551,6 +539,19 @@ def test_two_relaxed_keys_are_named_after_one_analysis_each(monkeypatch):
     assert (answer.made, len(answer.nearest), len(made)) == (0, 2, 2)
 
 
+def test_the_laws_of_a_family_out_of_reach_are_asked_once_for_each_key_and_factor(monkeypatch):
+    asked = []
+    monkeypatch.setattr(relaxed_requests, "_offer", lambda relaxed, *_: asked.append(relaxed))
+    assert list(edges(request(), ("beam",), 0, UNLIMITED_CLOCK)) == []
+    relaxed_keys = {"force", "travel", "ripple", "envelope"}
+    assert len(relaxed_keys) < len(asked) <= 1 + len(relaxed_keys) * len(relaxed_requests.RELAXATION_FACTORS)
+
+
+def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeypatch):
+    monkeypatch.setattr(relaxed_requests, "_offer", lambda *_: ("a candidate",))
+    assert {edge.factor for edge in edges(request(), ("beam",), 0, UNLIMITED_CLOCK)} == {1.0}
+
+
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
 def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
     keys = {"force": "1.8 N", "travel": "12.8 mm", "envelope": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
@@ -572,7 +573,7 @@ def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():
 
 def pinned(force_or_torque, room):
     asked = read_request(None, force_or_torque | {"ripple": "2 %", "envelope": room}).request()
-    offer = function_named(family("slider-crank").propose)(asked, Run())
+    offer = propose("slider-crank", asked)
     assert offer.candidates, offer.reason
     return [make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in offer.candidates[5:8]]
 
@@ -600,7 +601,7 @@ def test_springs_at_pins_stay_within_the_depth_required():
     """
     keys = {"torque": "100 N*mm", "angle": "60 deg", "ripple": "5 %", "envelope": "[150 mm, 150 mm, 12 mm]"}
     asked = read_request(None, keys).request()
-    offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
+    offered = propose("slider-crank", asked).candidates
     tried = (make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in offered[10:])
     one = next(one for one in tried if one.good)
     springs, turned = one.spec.mechanism.springs, cfmkit.analyze(one.spec).values
@@ -616,7 +617,7 @@ def test_springs_at_pins_stay_within_the_depth_required():
 
 def torque_offer(torque, angle, room):
     asked = read_request(None, {"torque": torque, "angle": angle, "ripple": "5 %", "envelope": room}).request()
-    return asked, function_named(family("slider-crank").propose)(asked, Run())
+    return asked, propose("slider-crank", asked)
 
 
 def test_a_torque_whose_springs_are_wider_than_the_linkage_is_refused():
@@ -653,7 +654,7 @@ def test_more_torque_than_the_bound_is_held_by_no_springs():
 def pinned_for_force(force, room):
     keys = {"force": force, "travel": "20 mm", "ripple": "5 %", "envelope": room, "material": "steel-s235"}
     asked = read_request(None, keys).request()
-    offer = function_named(family("slider-crank").propose)(asked, Run())
+    offer = propose("slider-crank", asked)
     return asked, offer, [one for one in offer.candidates if one.variant == "springs at pins"]
 
 
@@ -703,7 +704,7 @@ def test_a_torque_over_a_quarter_of_a_turn_is_held_by_springs_that_are_wound_up_
     asked = read_request(
         None, {"torque": "5 N*m", "angle": "90 deg", "ripple": "3 %", "envelope": "[150 mm, 700 mm]"}
     ).request()
-    offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
+    offered = propose("slider-crank", asked).candidates
     assert any(make_proposal(ProposalJob("slider-crank", one, asked, 0)).good for one in offered[5:])
 
 
@@ -714,9 +715,15 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
     """
     keys = {"force": "0.4384 N", "travel": "2.55 mm", "ripple": "1.44 %", "envelope": "[39.6 mm, 12.2 mm, 9.2 mm]"}
     asked = read_request(None, keys | {"process": "laser"}).request()
-    offered = function_named(family("beam").propose)(asked, Run()).candidates
+    offered = propose("beam", asked).candidates
     missed = [make_proposal(ProposalJob("beam", one, asked, 0)).missed for one in offered]
     assert any(all("needs" not in miss for miss in misses) for misses in missed)
+
+
+def test_a_missing_option_is_named_as_an_option():
+    with pytest.raises(SpecError) as caught:
+        read_request(None, {key: value for key, value in POM.items() if key != "envelope"})
+    assert str(caught.value) == "--envelope is missing"
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from suggest_support import POM, propose, request
 
 import cfmkit
 from cfmkit import api
@@ -33,26 +34,14 @@ from cfmkit.studies.suggest.requirements_of_request import list_requirements
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-POM = {
-    "safety": "1",
-    "force": "10 N",
-    "travel": "3 mm",
-    "ripple": "3 %",
-    "envelope": "[80 mm, 60 mm, 12 mm]",
-    "material": "pom",
-}
 
 
 def block(**keys):
     return read_request(None, POM | keys)
 
 
-def request(**keys):
-    return block(**keys).request()
-
-
 def first(name, asked, variant=""):
-    offer = function_named(family(name).propose)(asked, Run())
+    offer = propose(name, asked)
     return next(one for one in offer.candidates if one.variant.startswith(variant))
 
 

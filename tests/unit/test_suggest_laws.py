@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import pytest
+from suggest_support import propose
 
 import cfmkit
-from cfmkit.families import family
-from cfmkit.families.base import function_named
-from cfmkit.families.run_control import Run
+from cfmkit.families.beam.proposals import kept_shapes
 from cfmkit.runs.read_suggest_file import read_request
-from cfmkit.studies.suggest.proposal_making_and_judging import judge_proposal
+from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, judge_proposal, make_proposal
 
 ABS = "{youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}"
 
 
 def offered(name, **keys):
     asked = read_request(None, {"safety": "1", **keys}).request()
-    return asked, function_named(family(name).propose)(asked, Run()).candidates
+    return asked, propose(name, asked).candidates
 
 
 def test_a_diamond_shorter_than_the_leaves_stands_close_below_them():
@@ -58,3 +57,21 @@ def test_a_cam_whose_shafts_are_too_thick_for_its_rollers_is_no_proposal():
     proposal = judge_proposal("cam", "small rollers", spec, asked)
     assert "stress" in proposal.fails
     assert any(text.startswith("shafts of the rollers: ") for text in proposal.missed)
+
+
+def test_a_shape_is_offered_with_its_own_thickness_too():
+    """The shipped arch and 1 % more room: of 1.15 times its thickness it has larger pads, and does not fit."""
+    material = "[{youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 60 MPa}]"
+    keys = {"force": "0.4 N", "travel": "5.94 mm", "ripple": "1.8 %", "envelope": "[67.7 mm, 19.95 mm, 10.1 mm]"}
+    asked, candidates = offered("beam", **keys, material=material)
+    arches = [one for one in candidates if one.variant == "shape arch"]
+    missed = [make_proposal(ProposalJob("beam", one, asked, 0)).missed for one in arches]
+    assert () in missed
+    thickest = max(arches, key=lambda one: one.spec.mechanism.thickness)
+    assert any("needs" in text for text in missed[arches.index(thickest)])
+
+
+def test_no_stored_shape_touches_itself():
+    for kept in kept_shapes():
+        result = cfmkit.analyze(kept.spec.replace({"analysis.fidelity": "reissner", "analysis.points": 11}))
+        assert "beams_touch" not in {one.name for one in result.warnings}, kept.name

@@ -65,6 +65,9 @@ def test_a_bare_design_block_leads_to_an_analysis_of_what_was_requested(tmp_path
     low, high = spec.analysis.window
     assert stroke * MM * (1 - 1e-3) <= high - low <= stroke * MM
     assert spec.analysis.travel == high
+    # leaves buckle and straighten at 2h/3 (1 -/+ sqrt(1 - (pi t/h)^2)): between these lies the stroke
+    height, thickness = rise * MM, spec.mechanism.bistable.thickness
+    assert 4 / 3 * height * np.sqrt(1 - (np.pi * thickness / height) ** 2) == pytest.approx(stroke * MM, rel=1e-3)
     assert spec.analysis.preloads == pytest.approx((0.0, rise * MM * adjustment / force))
     for model in ("analytic", "exact"):
         found = api.analyze(spec.replace({"analysis.fidelity": model}))

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from suggest_support import propose, request
 
 import cfmkit
 from cfmkit.documents.document import Written
 from cfmkit.documents.suggestion_document import document_of
 from cfmkit.documents.terminal import page, print_blocks
 from cfmkit.errors import ExitCode
-from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import Candidate
-from cfmkit.runs.read_suggest_file import read_request
 from cfmkit.studies.parts.near_parts import expected_shares
 from cfmkit.studies.parts.parts import Parts
 from cfmkit.studies.suggest import proposal_making_and_judging
@@ -21,23 +19,11 @@ from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, Proposa
 from cfmkit.studies.suggest.search import _key, _Making, _Times
 from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, moved_for_yield
 
-POM = {
-    "safety": "1",
-    "force": "10 N",
-    "travel": "3 mm",
-    "ripple": "3 %",
-    "envelope": "[80 mm, 60 mm, 12 mm]",
-    "material": "pom",
-}
 MEASURED = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
 
 
-def request(**keys):
-    return read_request(None, POM | keys).request()
-
-
 def offered(name, asked):
-    return function_named(family(name).propose)(asked, Run()).candidates
+    return propose(name, asked).candidates
 
 
 @pytest.mark.slow

@@ -60,7 +60,7 @@ def _search(word: str) -> Document:
         If there is none.
     """
     if not (sections := search(word) if word.strip() else []):
-        raise UsageError(f"no page names {visible(word)!r}; `cfmkit docs` lists all pages")
+        raise UsageError(f"no section names {visible(word)!r}; `cfmkit docs` lists all pages")
     records = [{"page": section.page, "section": section.heading, "line": section.line} for section in sections]
 
     def blocks() -> Iterator[Block]:

@@ -18,7 +18,7 @@ from cfmkit.elastica.contact.side_gaps import LoadStage, carry
 from cfmkit.elastica.contact.terms import gaps, measure, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.model.contact import NodeOnObstacle, Stop
+from cfmkit.elastica.model.contact import NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import LOCKED_FORCE, LOCKED_STEP
 from cfmkit.numerics.continuation.problem import arc_weights, largest_motion
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import Contact, FrictionState
+    from cfmkit.elastica.model.contact import FrictionState
     from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathEvent, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
@@ -300,9 +300,12 @@ class PieceOfPath:
 
     @cached_property
     def smallest_radius(self) -> float:
-        """Smallest radius of a pad and the obstacle that it may pass [m]."""
-        items = [contact.item for contact in self.whole.mesh.contacts]
+        """Smallest radius of a pad and the obstacle that it may pass, or half the beam [m]."""
+        beams, items = self.whole.mesh.fits.network.beams, self.whole.mesh.fits.network.contacts
         radii = [item.outline.smallest_bulge + item.radius for item in items if isinstance(item, NodeOnObstacle)]
+        radii += [
+            item.radius + 0.5 * beams[item.beam].section.thinnest for item in items if isinstance(item, NodeOnBeam)
+        ]
         return min(radii, default=np.inf)
 
     def grows_along(self, at: PathEquilibrium, number: int) -> float:
@@ -486,11 +489,3 @@ def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z
     if isinstance(contact.item, NodeOnObstacle):
         round_length = contact.item.outline.round_length(contact.item.radius) / mesh.scales.length
     return state.sense * (np.array(ways) if np.isinf(round_length) else np.unwrap(ways, period=round_length))
-
-
-def describe(item: Contact) -> str:
-    """Return what a contact is called: a stop by its name, a pad by its node, a side by its beam, and the obstacle."""
-    if isinstance(item, Stop):
-        return f"stop {item.name!r}"
-    side = f"node {item.node!r}" if isinstance(item, NodeOnObstacle) else f"beam {item.beam!r}"
-    return f"{item.node!r} on {item.name!r}" if isinstance(item, NodeOnObstacle) else f"{side} on {item.name!r}"

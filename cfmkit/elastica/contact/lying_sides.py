@@ -8,6 +8,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.side_conditions import ROUNDING_OF_KIND
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP
+from cfmkit.elastica.model.contact import NodeOnBeam
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial
 
@@ -15,19 +16,20 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.changes import PieceOfPath
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.contact import BeamOnObstacle
+    from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 NO_TENSION = 1e-9  # share of a force along an obstacle that is none
 STRAIGHT_TURN = 1e-9  # turn of an unloaded beam that is none [rad]
 
 
-def may_lie(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> bool:
+def may_lie(piece: PieceOfPath, item: BeamSide, parameter: float) -> bool:
     """Return True if a side takes on another curvature where it lies on an obstacle."""
-    return bool(len(item.outline.radius)) or abs(_measure_unloaded_bend(piece, item, parameter)) > STRAIGHT_TURN
+    is_round = isinstance(item, NodeOnBeam) or len(item.outline.radius) > 0
+    return is_round or abs(_measure_unloaded_bend(piece, item, parameter)) > STRAIGHT_TURN
 
 
-def _measure_unloaded_bend(piece: PieceOfPath, item: BeamOnObstacle, parameter: float) -> float:
+def _measure_unloaded_bend(piece: PieceOfPath, item: BeamSide, parameter: float) -> float:
     """Return the curvature of an unloaded beam by its parameter [rad]."""
     fitted = piece.whole.mesh.fits[item.beam]
     sides = [float(np.real(fitted.angle(parameter + step, parameter))) for step in (PLACE_STEP, -PLACE_STEP)]
@@ -47,8 +49,10 @@ def presses_where_it_spreads(piece: PieceOfPath, item: BeamOnObstacle, place: An
     return True
 
 
-def why_not_laid(piece: PieceOfPath, item: BeamOnObstacle) -> str:
+def why_not_laid(piece: PieceOfPath, item: BeamSide) -> str:
     """Return why a beam cannot lie on an obstacle along a length; empty if it can."""
+    if isinstance(item, NodeOnBeam):
+        return "between parts of the mechanism that is not modelled"
     beam = piece.whole.mesh.fits.network.beams[item.beam]
     shape, section = beam.shape, beam.section
     if section.shear:

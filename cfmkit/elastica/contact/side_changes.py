@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween, describe
+from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
 from cfmkit.elastica.contact.side_conditions import NEW_PLACE
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import NodeOnObstacle
+from cfmkit.elastica.model.contact import NodeOnBeam, NodeOnObstacle, describe
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ BEGINS_TO_LIE = "{names} begins to lie on it along a length at {{place}}: {why}"
 MEETS_WHOLE = "{names} is met along the whole length at {{place}}: no place touches first"
 REACHES_MARK = "the contact of {names} reaches {mark} at {{place}}, which it cannot pass"
 CONTACTS_MEET = "two contacts of beam {beam!r} meet at {{place}}"
+MEETS_END = "{names} meets an end of the beam at {{place}}: pads touch sides only"
 NO_WAY = "no equilibrium was found behind the change of the contact of {names} at {{place}}"
 
 
@@ -127,6 +128,8 @@ def _locate_touch(
         if closer is None:
             return None
         guess = closer
+    if isinstance(condition.item, NodeOnBeam) and not 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
+        return PathStop(WhyStopped.LOST, guess.drive, MEETS_END.format(names=describe(condition.item)))
     return None
 
 
@@ -295,8 +298,8 @@ def enter_side_change(
         why = why_not_laid(piece, condition.item)
         curved = condition.kind == "wraps" or may_lie(piece, condition.item, 0.5)
         if why and curved:
-            names = f"beam {condition.item.beam!r} on {condition.item.name!r}"
-            return PathStop(WhyStopped.LOST, change.at.drive, BEGINS_TO_LIE.format(names=names, why=why))
+            text = BEGINS_TO_LIE.format(names=describe(condition.item), why=why)
+            return PathStop(WhyStopped.LOST, change.at.drive, text)
     lost = PathStop(WhyStopped.LOST, change.at.drive, NO_WAY.format(names=piece.say(change.number)
                     if change.piece is None else change.piece.say(min(change.number, 0))))  # fmt: skip
     if condition is None:  # a contact of a side ends

@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from cfmkit.elastica.contact.edges import measure_distance
 from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.beam_fits import beam_end_at
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle
+from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide, NodeOnObstacle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +45,7 @@ class SideCondition(NamedTuple):
 
     kind: Literal["touch", "tangent", "end", "closes", "spreads", "pinch", "wraps", "pulls", "lies"]
     number: int  # touch: in `Network.contacts`; else that of the contact in the arrays, of two the first
-    item: BeamOnObstacle
+    item: BeamSide
     last: bool = False  # tangent, end: the last end of the beam
     mark: float = 0.0  # end: parameter of it
 
@@ -65,7 +66,7 @@ class SideConditions:
         mesh = self.mesh
         sides = [(k, contact) for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
         for number, item in enumerate(mesh.fits.network.contacts):
-            if not isinstance(item, BeamOnObstacle):
+            if not isinstance(item, BeamSide):
                 continue
             yield SideCondition("touch", number, item)
             beam = mesh.fits.network.beams[item.beam]
@@ -100,14 +101,15 @@ class SideConditions:
                 kind: Literal["closes", "pinch"] = "closes" if contact.item is neighbour.item else "pinch"
                 yield SideCondition(kind, k, contact.item)  # type: ignore[arg-type]
 
-    def roots(self, item: BeamOnObstacle) -> tuple[bool, ...]:
+    def roots(self, item: BeamSide) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
         if item not in self._roots:
-            self._roots[item] = tuple(last for last in (False, True) if self._lies_at(item, last))
+            ends = (last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at(item, last))
+            self._roots[item] = tuple(ends)
         return self._roots[item]
 
     @cached_property
-    def _roots(self) -> dict[BeamOnObstacle, tuple[bool, ...]]:
+    def _roots(self) -> dict[BeamSide, tuple[bool, ...]]:
         return {}
 
     def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
@@ -129,7 +131,7 @@ class SideConditions:
         slope = float(edge.normal[0] * np.cos(angle) + edge.normal[1] * np.sin(angle))
         return abs(float(edge.value) - half) < ON_OBSTACLE * mesh.scales.length and abs(slope) < ON_OBSTACLE
 
-    def gaps_of(self, item: BeamOnObstacle) -> SideGaps:
+    def gaps_of(self, item: BeamSide) -> SideGaps:
         """Return the gaps of a side, with what touches already."""
         if item not in self._gaps:
             mesh, touched = self.mesh, list[int]()
@@ -154,7 +156,7 @@ class SideConditions:
         return self._gaps[item]
 
     @cached_property
-    def _gaps(self) -> dict[BeamOnObstacle, SideGaps]:
+    def _gaps(self) -> dict[BeamSide, SideGaps]:
         return {}
 
     @cached_property
@@ -208,10 +210,10 @@ class SideConditions:
         sides = [float(np.real(fitted.angle(at + step, inside) + np.zeros(1))[0]) for step in (PLACE_STEP, -PLACE_STEP)]
         bend = bend + (sides[0] - sides[1]) / (2 * PLACE_STEP) / speed
         place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, side])]).place[:, 0]
-        edge = item.outline.distance(place * mesh.scales.length)
+        edge = measure_distance(mesh, item, place, z)
         angle = 0.5 * sum(sides) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
         rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
-        return np.asarray(bend * rises + edge.curvature * mesh.scales.length * rises**2)
+        return np.asarray(bend * rises + edge.curvature * rises**2)
 
     def _run_away(self, pad: ContactAt, condition: SideCondition, z: FloatArray) -> FloatArray:
         """Return how much the side of a beam runs away from the obstacle from a pad at its end."""
@@ -222,7 +224,7 @@ class SideConditions:
         inside = float(mesh.elements.cuts[element].mean())
         angle = float(np.real(fitted.angle(float(side), inside))) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
         place = poses(mesh.attachments, z, [pad.place]).place[:, 0]
-        normal = condition.item.outline.distance(place * mesh.scales.length).normal
+        normal = measure_distance(mesh, condition.item, place, z).normal
         along = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
         return np.asarray(-along if condition.last else along)
 
@@ -245,7 +247,7 @@ class SideConditions:
         angles = [np.real(fitted.angle(parameter + step, inside)) for step in (PLACE_STEP, 0.0, -PLACE_STEP)]
         bend = 0.5 * total + (angles[0] - angles[2]) / (2 * PLACE_STEP) / speed
         x, y, turn, _ = mesh.attachments.unknowns[contact.place]
-        edge = item.outline.distance((mesh.attachments.origin[contact.place] + z[:, [x, y]]) * length)  # type: ignore[union-attr]
+        edge = measure_distance(mesh, item, mesh.attachments.origin[contact.place] + z[:, [x, y]], z)  # type: ignore[arg-type]
         angle = angles[1] + z[:, turn]
         rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
-        return np.asarray(bend * rises + edge.curvature * length * rises**2)
+        return np.asarray(bend * rises + edge.curvature * rises**2)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.contact.edges import measure_distance
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
-    from cfmkit.elastica.model.contact import BeamOnObstacle
+    from cfmkit.elastica.model.contact import BeamSide
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
 NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
@@ -122,10 +123,10 @@ class LeastGap(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SideGaps:
-    """Gaps of the side of one beam to one obstacle, away from where it touches already."""
+    """Gaps of the side of one beam to one obstacle or pad, away from where it touches already."""
 
     mesh: Discretisation
-    item: BeamOnObstacle
+    item: BeamSide
     touched: tuple[int, ...]  # elements that end where a node or the side touches this obstacle
     laid: tuple[int, ...] = ()  # elements that lie on it
 
@@ -167,14 +168,14 @@ class SideGaps:
     ) -> tuple[Any, Any, SideStates]:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
-        values = self.item.outline.distance(seen.place * self.mesh.scales.length)
+        values = measure_distance(self.mesh, self.item, seen.place, z)
         half = np.stack(
             [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
         )
         slope = values.normal[..., 0] * np.cos(seen.angle) + values.normal[..., 1] * np.sin(seen.angle)
         taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
         slope = slope - np.stack(taper, axis=1)
-        return values.value / self.mesh.scales.length - half, slope, seen
+        return values.value - half, slope, seen
 
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
@@ -254,6 +255,7 @@ class SideGaps:
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
         return _ElementStates(
             element,
+            z,
             poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
             fields.slope_x[:, element] * speed,
             fields.slope_y[:, element] * speed,
@@ -269,17 +271,17 @@ class SideGaps:
         y = states.start[:, 1] + (states.y * upto).sum(axis=1)
         angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
         parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
-        length = self.mesh.scales.length
-        edge = self.item.outline.distance(np.stack([x, y], axis=-1) * length)
+        edge = measure_distance(self.mesh, self.item, np.stack([x, y], axis=-1), states.z)
         slope = edge.normal[:, 0] * np.cos(angle) + edge.normal[:, 1] * np.sin(angle)
         slope = slope - self._taper(parameter, states.element)
-        return _Beside(edge.value / length - self.half_thickness(parameter, states.element), slope, parameter)
+        return _Beside(edge.value - self.half_thickness(parameter, states.element), slope, parameter)
 
 
 class _ElementStates(NamedTuple):
     """One element in n states: its start, slopes of its line and angle at Gauss points, rotation, cuts."""
 
     element: int
+    z: FloatArray  # (n, size)
     start: FloatArray  # (n, 2)
     x: FloatArray  # (n, q)
     y: FloatArray
@@ -306,7 +308,7 @@ class _Beside(NamedTuple):
     parameter: FloatArray
 
 
-def least_side_gaps(mesh: Discretisation, item: BeamOnObstacle, z: FloatArray, drive: FloatArray) -> FloatArray:
+def least_side_gaps(mesh: Discretisation, item: BeamSide, z: FloatArray, drive: FloatArray) -> FloatArray:
     """Return the least gap of the side of a beam in each of n states, (n,) [mean beam lengths]."""
     return SideGaps(mesh, item, ()).least(z, LoadStage(drive))
 

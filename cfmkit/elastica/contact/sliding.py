@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.elastica.contact.edges import find_motion, measure_distance
 from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
 from cfmkit.elastica.contact.terms import press
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
@@ -59,11 +60,11 @@ class SideAt(NamedTuple):
 
     gap: float
     tangency: float
-    gap_row: FloatArray  # (3,) by x, y of the body and the rotation
-    tangency_row: FloatArray  # (3,)
-    hessian: FloatArray  # (3, 3) of the gap
+    gap_row: FloatArray  # (m,) by x, y of the body and the rotation, and by what moves the edge that it touches
+    tangency_row: FloatArray  # (m,)
+    hessian: FloatArray  # (m, m) of the gap
     by_place: tuple[float, float]  # of gap and tangency at held x, y and rotation
-    unknowns: Any  # (3,)
+    unknowns: Any  # (m,)
     curvature: float  # of the gap along the beam
     rises: float  # normal . across, 1 or -1 where it is tangent
     bulge: float  # curvature of the obstacle there
@@ -205,25 +206,28 @@ class SlidingEquations(NumpyEquations):
     def side_at(self, contact: ContactAt, z: FloatArray) -> SideAt:
         """Return the side of a beam at a contact; the elements stand at their places."""
         mesh, item = self.mesh, contact.item
-        length, parameter = mesh.scales.length, float(z[contact.slide])
+        parameter = float(z[contact.slide])
         x, y, turn, _ = mesh.attachments.unknowns[contact.place]
         place = mesh.attachments.origin[contact.place] + z[[x, y]]
         slope, bend, radius, taper = self._beam_at(contact, parameter)
         angle = slope[0] + float(z[turn])
         along = np.array([np.cos(angle), np.sin(angle)])
         across = np.array([-along[1], along[0]])
-        edge = item.outline.distance(place * length)  # type: ignore[union-attr]
+        edge, motion = measure_distance(mesh, item, place, z), find_motion(mesh, item, z)  # type: ignore[arg-type]
         normal = np.asarray(edge.normal, float)
         sideways = np.array([normal[1], -normal[0]])
-        bulge = float(edge.curvature) * length * np.outer(sideways, sideways)
+        bulge = float(edge.curvature) * np.outer(sideways, sideways)
         rises = float(normal @ across)
-        hessian = np.zeros((3, 3))
-        hessian[:2, :2] = bulge
+        apart = np.hstack([np.eye(2), np.zeros((2, 1)), -motion.jacobian])  # of the place, as seen from the edge
+        turning, hessian = (bulge @ along) @ apart, apart.T @ bulge @ apart
+        turning[2] = rises
+        if len(motion.unknowns):
+            hessian[-1, -1] += normal @ motion.arm
         curvature = self._curvature(contact, z, bend) * rises + float(along @ bulge @ along)
         return SideAt(
-            float(edge.value) / length - radius, float(normal @ along) - taper, np.append(normal, 0.0),
-            np.append(bulge @ along, rises), hessian, (-taper * slope[2], rises * slope[1]), [x, y, turn], curvature,
-            rises, float(edge.curvature) * length,
+            float(edge.value) - radius, float(normal @ along) - taper, normal @ apart, turning, hessian,
+            (-taper * slope[2], rises * slope[1]), np.append([x, y, turn], motion.unknowns), curvature, rises,
+            float(edge.curvature),
         )  # fmt: skip
 
     def _beam_at(self, contact: ContactAt, parameter: float) -> tuple[tuple[float, float, float], float, float, float]:
@@ -280,19 +284,22 @@ class SlidingEquations(NumpyEquations):
                 residual[force], tangent[force, force], tangent[place, place] = -free[force], -1.0, 1.0
                 continue
             side, value = self.side_at(contact, z), float(z[contact.unknown])
-            indices = slots[side.unknowns]
-            residual[indices] -= value * side.gap_row
-            tangent[np.ix_(indices, indices)] -= value * side.hessian
-            tangent[indices, force] -= side.gap_row
+            inside, rate = slots[side.unknowns] >= 0, moved[side.unknowns]
+            indices, press_row, turn_row = slots[side.unknowns][inside], side.gap_row[inside], side.tangency_row[inside]
+            residual[indices] -= value * press_row
+            change[indices] -= value * (side.hessian @ rate)[inside]
+            tangent[np.ix_(indices, indices)] -= value * side.hessian[np.ix_(inside, inside)]
+            tangent[indices, force] -= press_row
             residual[force], residual[place] = -side.gap, side.tangency
-            tangent[force, indices] -= side.gap_row
-            tangent[place, indices] += side.tangency_row
+            change[force], change[place] = -side.gap_row @ rate, side.tangency_row @ rate
+            tangent[force, indices] -= press_row
+            tangent[place, indices] += turn_row
             tangent[force, place], tangent[place, place] = -side.by_place[0], side.by_place[1]
             tangent[:count, place] += self._differentiate_by_place(bare, way, z, number, laid)
-            rows.append((indices, -side.gap_row, 0.0))
+            rows.append((indices, -press_row, 0.0))
             bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
-            rows.append((indices, side.tangency_row, stiffness))
+            rows.append((indices, turn_row, stiffness))
         self.move_to(places)
         at = LinearisedSides(residual, tangent, change)
         at.frozen, at.n_laid = self._frozen(tangent, rows, laid, z), len(laid)

@@ -149,8 +149,7 @@ def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | N
     """
     mesh, motions = at.mesh, effort_motions(at, rates)
     stepped = at.z + 1j * COMPLEX_STEP * motions
-    known = {name: value.imag / COMPLEX_STEP for name, value in partials(mesh, stepped, at.drive).items()}
-    total = _contract(known, designs)
+    total = _contract(partials(mesh, stepped, at.drive), designs)
     for k, pair in enumerate(_changed_terms(designs)):
         for own in pair:
             total[:, k] += _term_slopes(own, at, motions)
@@ -163,8 +162,8 @@ def _contract(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
     total = 0.0
     for name, table in (designs.tables | designs.places).items():
         if np.iscomplexobj(table):
-            change = np.ascontiguousarray(table.imag).reshape(designs.count, -1) / COMPLEX_STEP
-            total = total + known[name].reshape(len(known[name]), -1) @ change.T
+            change = table.imag.reshape(designs.count, -1) / COMPLEX_STEP
+            total = total + known[name].imag.reshape(len(known[name]), -1) / COMPLEX_STEP @ change.T
     return np.asarray(total + np.zeros((len(known["length"]), designs.count)))
 
 

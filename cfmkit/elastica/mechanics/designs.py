@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.element_tables import plain_tables
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.network import PointLoad, SlideSpring
 from cfmkit.elastica.model.plain_beams_at_once import (
     check_fits,
@@ -140,7 +140,9 @@ def _plain(
 
     def tables_at(mesh: Discretisation) -> dict[str, Any]:
         tables = plain_tables(turned, length * scales.length, rigidities, scales, mesh.degree, row, e.cuts)
-        return tables | {"axial": tables["axial"] + template.floor[:, None]}
+        if np.any(template.floored):
+            tables["axial"] = tables["axial"] + template.floor[:, None]
+        return tables
 
     tables = tables_at(template)
     if inside.size:  # bodies between the elements of a beam
@@ -183,7 +185,7 @@ def _whose(origin: tuple[Network, Drive], names: list[str], inside: Any, ends: A
         at += [spring.node] if isinstance(spring, SlideSpring) else [n for n in (spring.start, spring.end) if n]
     at += [load.node for load in (*network.loads, *drive.loads) if isinstance(load, PointLoad)]
     at += names
-    at += [contact.node for contact in network.contacts if not isinstance(contact, BeamOnObstacle)]
+    at += [contact.node for contact in network.contacts if not isinstance(contact, BeamSide)]
     number = {name: k for k, name in enumerate(names)}
     node = np.array([number[name] for name in at])
     return node, np.array([number[network.master_of(name)] for name in at])

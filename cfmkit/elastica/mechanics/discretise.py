@@ -29,7 +29,7 @@ from cfmkit.elastica.mechanics.element_cuts import (
 from cfmkit.elastica.mechanics.element_tables import element_tables
 from cfmkit.elastica.mechanics.units import MechanicsUnits
 from cfmkit.elastica.model.beam_fits import BeamFits
-from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamSide, Stop
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import find_driven_node
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
@@ -140,8 +140,7 @@ class Discretisation:
     @property
     def floor(self) -> FloatArray:
         """1/EA of the elements of beams that do not stretch, (e,): what is left of their floors."""
-        stretches = {name: beam.section.axial for name, beam in self.fits.network.beams.items()}
-        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, self.axial[:, 0]))
+        return np.asarray(np.where(self.floored, self.axial[:, 0], 0.0))
 
     @property
     def cuts(self) -> dict[str, list[float]]:
@@ -241,7 +240,7 @@ class _ArrayBuilder:
         touching = [
             (number, self._attach(contact.node))
             for number, contact in enumerate(self.network.contacts)
-            if not isinstance(contact, BeamOnObstacle)
+            if not isinstance(contact, BeamSide)
         ]
         dofs, arms, origins, frames = zip(*self.places, strict=True)
         frame = np.array([(1.0, 0.0)] * len(frames)) if not any(frames) else _direction(np.array(frames))

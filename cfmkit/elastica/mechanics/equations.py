@@ -299,8 +299,9 @@ def force_units(mesh: Discretisation) -> FloatArray:
     bending = rigidity.sum(axis=1) * length
     unit = np.full(mesh.size, np.inf)
     unit[e.unknowns[:, -2:]] = (bending / length**2)[:, None]
-    unit[[contact.unknown for contact in mesh.contacts]] = 1.0
-    unit[[contact.rub for contact in mesh.contacts if contact.rub >= 0]] = 1.0
+    if mesh.contacts:
+        unit[[contact.unknown for contact in mesh.contacts]] = 1.0
+        unit[[contact.rub for contact in mesh.contacts if contact.rub >= 0]] = 1.0
     return np.asarray(unit[mesh.free])
 
 

@@ -86,7 +86,7 @@ static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
                 if (slots[i] >= 0) w->change[slots[i]] += t->hessian[i * t->count + j] * moves;
         }
         if (!factors_add(&w->factors, slots, t->count, t->hessian)) return 0;
-        const Int element = k - m->springs - m->loads;
+        const Int element = k + m->elements - terms(m);
         if (!m->follows) {
             if (element >= 0 && !factors_eliminate(&w->factors, m->leaves, element)) return 0;
             continue;
@@ -106,7 +106,7 @@ static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
 
 /* Unstable directions. Under loads that follow: their parity, all that a march compares. */
 static Int unstable_of(const Model *m, const Work *w) {
-    if (!m->follows) return w->factors.negative - 2 * m->elements;
+    if (!m->follows) return w->factors.negative - 2 * m->elements - m->presses;
     return w->definite ? 0 : w->factors.negative;
 }
 

@@ -24,6 +24,7 @@ typedef struct {
     Int elements, points, degree, size, free, springs, loads;
     Int ramp;    /* the drive is the share of what is constant; the drive proper rests */
     Int follows; /* some load turns with its node: the tangent is unsymmetric */
+    Int contacts, presses; /* of nodes; how many of their forces are free */
     const double *angle, *weight, *rigidity, *axial, *shear, *ahead; /* (e, q) */
     const double *length, *line, *gap, *bend; /* (e), (e, 2, 2), (e, 2), (e, triangle): int EI N_i' N_j' */
     const Int *unknowns, *ends;               /* (e, degree + 9), (e, 2) */
@@ -41,6 +42,9 @@ typedef struct {
     const Int *load_at;                       /* (loads, 3): place, grows, follows */
     const double *load;                       /* (loads, 3): force x, y, moment */
     const double *rest, *curl, *hindrance;    /* (e, q): of wide strips; NULL without any */
+    const Int *contact_at; /* (contacts, 8): kind, place, force, closed or -1, first part, segments, arcs, whether closed */
+    const double *contact; /* (contacts, 6): gap or radius of a pad [m], sense, direction, compliance, unit of length [m] */
+    const double *edge;    /* (parts, 6): segments, start, along, length; arcs, centre, radius, first, sweep, bulge [m] */
 } Model;
 
 /* Where on the way: both factors and their change with what is followed. */
@@ -52,6 +56,12 @@ typedef struct {
     Int at[MAX_LOCAL];
     double gradient[MAX_LOCAL], change[MAX_LOCAL], hessian[MAX_LOCAL * MAX_LOCAL];
 } Term;
+
+typedef struct { double place[2], arm[2], by[2][3]; const Int *at; } Pose;
+
+/* A line of segments and arcs with the free side to its left, and how far a place is from it [m]. */
+typedef struct { const double *parts; Int segments, arcs, closed; } Outline;
+typedef struct { double value, normal[2], curvature; } Distance;
 
 /* L D L^T in the order of elimination, or L U. */
 typedef struct {
@@ -68,6 +78,10 @@ typedef struct {
 Stage stage(const Model *m, double way);
 Int terms(const Model *m);
 void term(const Model *m, Int number, const double *z, Stage at, int with_hessian, Term *out);
+
+Pose pose(const Model *m, const double *z, Int k);
+Distance outline_distance(const Outline *o, double x, double y);
+void contact_term(const Model *m, Int number, const double *z, Term *t);
 
 int factors_open(Factors *f, Int n, int unsymmetric);
 void factors_close(Factors *f);

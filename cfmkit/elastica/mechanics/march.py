@@ -11,7 +11,7 @@ import os
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.equations import ContactEquations, open_all_contacts
 from cfmkit.elastica.contact.sliding import SlidingEquations
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.contact_arrays import are_compiled, contact_arrays, last_elements
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
@@ -49,15 +50,18 @@ WITHOUT_C_VARIABLE = "CFMKIT_WITHOUT_C"
 COMPILED_TERMS = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
 """Springs and loads that march.c has; networks with others run on numpy."""
 
-COUNT_FIELDS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
+COUNT_FIELDS = (
+    "elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows", "contacts", "presses",
+)  # fmt: skip
 ADDRESS_FIELDS = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
     "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
     "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
+    "contact_at", "contact", "edge",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
 OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESS_FIELDS)
-WHOLE_NUMBERS = frozenset(("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at"))
+WHOLE_NUMBERS = frozenset(("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at", "contact_at"))
 
 
 @cache
@@ -95,10 +99,12 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
         plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
+        elif plain and key[2] and are_compiled(mesh):
+            mesh.known[key] = CompiledEquations(mesh, ramp)
         elif mesh.contacts:
             mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
         else:
-            mesh.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(mesh, ramp)
+            mesh.known[key] = NumpyEquations(mesh, ramp)
     return mesh.known[key]  # type: ignore[no-any-return]
 
 
@@ -293,7 +299,7 @@ def march_many(
     plan = MarchPlan(first_step * span, span, largest_turn=largest_turn, tolerance=tolerance)
     efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
     states = np.full((designs.count, len(chosen), template_equations.n), np.nan)
-    if isinstance(template_equations, CompiledEquations) and not template_equations.follows:
+    if _are_rows_of_one(template_equations):
         kept, plan_row, some = (
             design_arrays(template_equations, designs),
             _plan_row(plan, 0, True),
@@ -341,7 +347,7 @@ def solve_designs(designs: NetworkDesigns, free: FloatArray, drives: FloatArray,
     template_equations = equations(designs.template)
     ways = np.ascontiguousarray(drives, float) / designs.template.scales.drive
     outcomes = np.zeros((*free.shape[:2], 3))
-    if isinstance(template_equations, CompiledEquations) and not template_equations.follows:
+    if _are_rows_of_one(template_equations):
         kept = design_arrays(template_equations, designs)
         rows = _rows(template_equations, kept, designs.count)
         if load_compiled().solve_many(
@@ -354,6 +360,12 @@ def solve_designs(designs: NetworkDesigns, free: FloatArray, drives: FloatArray,
             outcomes[number] = np.stack([~solved.converged, solved.unstable, solved.effort], axis=1)
     stable = (outcomes[..., 0] == 0) & (outcomes[..., 1] == 0)
     return np.where(stable, outcomes[..., 2] * template_equations.effort_unit, np.nan)
+
+
+def _are_rows_of_one(template_equations: NumpyEquations) -> TypeGuard[CompiledEquations]:
+    """Return True if compiled code has the equations of many designs as rows: without contacts, which have arrays."""
+    compiled = isinstance(template_equations, CompiledEquations) and not template_equations.mesh.contacts
+    return compiled and not template_equations.follows
 
 
 def design_arrays(template_equations: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
@@ -393,8 +405,10 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     """Return the counts of a `Model`."""
     elements, points = mesh.elements.weight.shape
     follows = any(load.item.follows for load in mesh.loads)
+    presses = int(np.isin([contact.unknown for contact in mesh.contacts], mesh.free).sum())
     values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
-    return dict(zip(COUNT_FIELDS, (*values, len(mesh.loads), int(ramp), int(follows)), strict=True))
+    more = (len(mesh.loads), int(ramp), int(follows), len(mesh.contacts), presses)
+    return dict(zip(COUNT_FIELDS, (*values, *more), strict=True))
 
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
@@ -411,6 +425,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     arrays |= {"bend": bend, "slot": slot, "leaves": _leaves(mesh), "unit": of.unit}
     arrays |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     arrays |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
+    arrays |= contact_arrays(mesh) if mesh.contacts else {}
     return {
         name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
         for name, values in arrays.items()
@@ -437,7 +452,7 @@ def _leaves(mesh: Discretisation) -> Any:
     """Return the last element that holds each free unknown, -1 if none does."""
     last, unknowns = np.full(mesh.size, -1, np.int64), mesh.elements.unknowns
     last[unknowns.ravel()] = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])  # of several values the last stays
-    return last[mesh.free]
+    return (last_elements(mesh, last) if mesh.contacts else last)[mesh.free]
 
 
 def _spring(mesh: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

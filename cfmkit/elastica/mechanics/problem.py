@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState
-from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.mechanics.march import CompiledEquations, equations
+from cfmkit.elastica.mechanics.polynomials import slopes_at_end
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.numerics.continuation.path import MarchedSteps
 from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
 N_SPARE_STATES = 50  # states of a march besides two for each requested value, until it is looked at again
-ROOM_IN_CONTACT = 8  # of a march with closed contacts, behind which it is seen whether one begins or ends
+ROOM_IN_CONTACT, ROOM_IN_NUMPY = 40, 8
+"""States of a march with closed contacts, behind which it is seen whether one begins or ends; fewer where they cost."""
 FIRST_POWERS, N_POWERS, STIFF_SHARE = 8, 3, 1e-2
 """Powers by which the softest mode is estimated, and its flexibility as a share of a critical one's that is none."""
 MODE_MIX_SHARE = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
@@ -96,11 +98,15 @@ class NetworkProblem:
         plan = MarchPlan(
             walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
             self.next_correction, on_branch=walk.branch is not None,
-            room=ROOM_IN_CONTACT if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES,
+            room=self._room_in_contact if self.mesh.contacts else 2 * len(left) + N_SPARE_STATES,
         )  # fmt: skip
         marched = self.equations.march(here, left, plan)
         states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
         return MarchedSteps(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
+
+    @property
+    def _room_in_contact(self) -> int:
+        return ROOM_IN_CONTACT if isinstance(self.equations, CompiledEquations) else ROOM_IN_NUMPY
 
     # -- modes -----------------------------------------------------------------------------------------------------
     def modes(self, at: PathEquilibrium, count: int) -> tuple[FloatArray, FloatArray]:
@@ -142,12 +148,10 @@ class NetworkProblem:
         flexibility, mode = self.equations.soften(at.x, at.drive, vector, rounds)
         return (1 / abs(flexibility) if flexibility else 0.0), mode
 
-    @cached_property
+    @property
     def _any_vector(self) -> FloatArray:
         """Unit vector that has a share of every mode."""
-        count = len(self.mesh.free)
-        vector = np.cos(np.arange(count) * np.arange(1, count + 1))
-        return np.asarray(vector / np.linalg.norm(vector))
+        return _any_vector(len(self.mesh.free))
 
     @cached_property
     def follows(self) -> bool:
@@ -190,8 +194,13 @@ class NetworkProblem:
         e = self.mesh.elements
         last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
         unknowns = e.unknowns[last][:, energy.rotation_columns(self.mesh.degree)]
-        _, slopes = shape_functions(self.mesh.degree, np.ones(1))
-        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes_at_end(self.mesh.degree), z[unknowns]))
+
+
+@lru_cache(maxsize=64)
+def _any_vector(count: int) -> FloatArray:
+    vector = np.cos(np.arange(count) * np.arange(1, count + 1))
+    return read_only(vector / np.linalg.norm(vector))
 
 
 def _state(at: PathEquilibrium) -> MarchState:

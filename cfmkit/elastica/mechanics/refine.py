@@ -21,9 +21,9 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
         return mesh
     e = mesh.elements
     tables = element_tables(mesh.fits, mesh.scales, degree, mesh.cuts)
-    if mesh.floor.any():
+    if np.any(mesh.floored):
         tables["axial"] = tables["axial"] + mesh.floor[:, None]
-    count, ends = len(e.beam), _n_end_motions(mesh)
+    count, ends = len(e.beam), n_end_motions(mesh)
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)
     unknowns = np.hstack([e.unknowns[:, :8], bubbles, forces])
@@ -49,7 +49,7 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
 
 def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
     """Return a state (..., size) of a network in the unknowns of one of a higher degree: shapes are hierarchical."""
-    ends, old, new = _n_end_motions(mesh), mesh.elements.unknowns, fine.elements.unknowns
+    ends, old, new = n_end_motions(mesh), mesh.elements.unknowns, fine.elements.unknowns
     found = np.zeros((*z.shape[:-1], fine.size), z.dtype)
     found[..., :ends] = z[..., :ends]
     found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
@@ -65,6 +65,6 @@ def _first_behind_forces(mesh: Discretisation) -> int:
     return int(mesh.elements.unknowns[:, -2:].max()) + 1
 
 
-def _n_end_motions(mesh: Discretisation) -> int:
+def n_end_motions(mesh: Discretisation) -> int:
     """Return the number of unknowns that move ends of elements; bubbles and forces come behind them."""
     return int(mesh.elements.unknowns[:, 8].min())

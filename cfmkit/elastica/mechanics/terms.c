@@ -8,9 +8,7 @@
 
 enum { LINE_SPRING, SLIDE_SPRING, TORSION_SPRING };
 
-typedef struct { double place[2], arm[2], by[2][3]; const Int *at; } Pose;
-
-static Pose pose(const Model *m, const double *z, Int k) {
+Pose pose(const Model *m, const double *z, Int k) {
     Pose p;
     p.at = m->places + 4 * k;
     const double c = m->frame[2 * k], s = m->frame[2 * k + 1], x = z[p.at[0]], y = z[p.at[1]];
@@ -296,11 +294,12 @@ Stage stage(const Model *m, double way) {
     return at;
 }
 
-Int terms(const Model *m) { return m->springs + m->loads + m->elements; }
+Int terms(const Model *m) { return m->springs + m->loads + m->contacts + m->elements; }
 
-/* Springs and loads come first: their unknowns leave the front with the last element that holds them. */
+/* Springs, loads and contacts come first: their unknowns leave the front with the last element that holds them. */
 void term(const Model *m, Int number, const double *z, Stage at, int with_hessian, Term *out) {
     if (number < m->springs) spring(m, number, z, at, out);
     else if (number < m->springs + m->loads) point_load(m, number - m->springs, z, at, out);
-    else element(m, number - m->springs - m->loads, z, at, with_hessian, out);
+    else if (number < terms(m) - m->elements) contact_term(m, number - m->springs - m->loads, z, out);
+    else element(m, number - m->springs - m->loads - m->contacts, z, at, with_hessian, out);
 }

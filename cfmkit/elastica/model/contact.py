@@ -1,4 +1,4 @@
-"""One-sided contacts of nodes: stops that limit a motion, and rigid obstacles that the pad of a node may touch.
+"""One-sided contacts: stops, rigid obstacles that pads of nodes and sides of beams may touch, pads on sides of beams.
 
 A contact has a gap g >= 0 and presses with a force f >= 0, of which one is zero. A gap is positive on the free side.
 An elastic contact yields by f / stiffness along the normal. Pads of nodes and stops of motions may have Coulomb
@@ -315,4 +315,33 @@ class BeamOnObstacle:
         return False
 
 
-Contact = Stop | NodeOnObstacle | BeamOnObstacle
+@dataclass(frozen=True)
+class NodeOnBeam:
+    """The round pad of a node and the side of a beam, which touch at a place along the beam that is an unknown."""
+
+    name: str
+    node: str
+    beam: str
+    radius: float = 0.0  # of the pad [m]
+    stiffness: float = field(default=math.inf, init=False)
+    friction: float = field(default=0.0, init=False)
+
+    @property
+    def turns(self) -> bool:
+        """False: the force is no moment."""
+        return False
+
+
+BeamSide = BeamOnObstacle | NodeOnBeam
+"""A contact of the side of a beam, whose place along the beam is an unknown."""
+Contact = Stop | NodeOnObstacle | BeamSide
+
+
+def describe(item: Contact) -> str:
+    """Return the names of a contact: of a stop, or of a pad or a side and what it touches."""
+    if isinstance(item, Stop):
+        return f"stop {item.name!r}"
+    if isinstance(item, NodeOnBeam):
+        return f"{item.node!r} on beam {item.beam!r}"
+    side = f"{item.node!r}" if isinstance(item, NodeOnObstacle) else f"beam {item.beam!r}"
+    return f"{side} on {item.name!r}"

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ class Network(ShortRepr):
     links: tuple[Link, ...] = ()
     springs: tuple[Spring, ...] = ()
     loads: tuple[LoadOn, ...] = field(default=())
-    contacts: tuple[Contact, ...] = ()  # stops and obstacles of nodes
+    contacts: tuple[Contact, ...] = ()  # stops, obstacles, pads on beams
 
     def __post_init__(self) -> None:
         """Freeze the mappings and check that names match."""
@@ -191,11 +191,10 @@ class Network(ShortRepr):
         for load in self.loads:
             self.check_load(load)
         for contact in self.contacts:
-            if isinstance(contact, BeamOnObstacle):
-                if contact.beam not in beams:
-                    raise InputError(f"contact {contact.name!r} is of the beam {contact.beam!r}, which is not there")
-                continue
-            self._require_node(contact.node, f"contact {contact.name!r}")
+            if isinstance(contact, BeamSide) and contact.beam not in beams:
+                raise InputError(f"contact {contact.name!r} is of the beam {contact.beam!r}, which is not there")
+            if not isinstance(contact, BeamOnObstacle):
+                self._require_node(contact.node, f"contact {contact.name!r}")
         if self.links:
             self._check_links()
 

@@ -15,7 +15,6 @@ from cfmkit.elastica.model.beam import BEAM_QUADRATURE, Fit
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
-from cfmkit.numerics.dual_array import cos_sin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -139,9 +138,19 @@ def coefficients_of(beams: Sequence[Beam]) -> Any:
 
 
 def chords(coefficients: Any) -> tuple[Any, Any]:
-    """Return the chords of shapes of length 1 with coefficients (..., b, m), x and y (..., b) each."""
-    cos, sin = cos_sin(coefficients @ powers(coefficients.shape[-1]))
-    return cos @ BEAM_QUADRATURE[1], sin @ BEAM_QUADRATURE[1]
+    """Return the chords of shapes of length 1 with coefficients (..., b, m), x and y (..., b) each.
+
+    Networks with complex steps, (d, b, m), are one but for these.
+    """
+    power, weights = powers(coefficients.shape[-1]), BEAM_QUADRATURE[1]
+    if not np.iscomplexobj(coefficients):
+        angle = coefficients @ power
+        return np.cos(angle) @ weights, np.sin(angle) @ weights
+    angle = (coefficients if coefficients.ndim == 2 else coefficients[0]).real @ power
+    cos, sin = weights * np.cos(angle), weights * np.sin(angle)
+    steps = 1j * coefficients.imag
+    x, y = ((steps * (moment @ power.T)).sum(axis=-1) for moment in (sin, cos))
+    return cos.sum(axis=-1) - x, sin.sum(axis=-1) + y
 
 
 def fit_to_ends(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:

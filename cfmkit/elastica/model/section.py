@@ -106,6 +106,12 @@ class Section:
             return read_only(np.unique(self.thickness.stations.real))
         return read_only([0.0, 1.0])
 
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness along the beam [m]."""
+        thickness: Any = self.thickness
+        return float(np.min(thickness.values.real) if isinstance(thickness, Taper) else thickness.real)
+
     def thickness_at(self, place: Any, inside: float) -> Any:
         """Return the thickness [m] at places on the piece that holds `inside` (fractions of the arc length)."""
         if isinstance(self.thickness, Taper):

@@ -18,7 +18,7 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.results import beam_states, stress_extremes
@@ -234,7 +234,7 @@ class EquilibriumPath(ShortRepr):
         Of the side of a beam it is the least, wherever along the beam that is.
         """
         item = self.network.contacts[number]
-        if isinstance(item, BeamOnObstacle):
+        if isinstance(item, BeamSide):
             return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
         mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length
@@ -291,10 +291,7 @@ class EquilibriumPath(ShortRepr):
     @cached_property
     def effort(self) -> FloatArray:
         """Work-conjugate of the drive: the force along it [N], the moment [N m], or for loads the displacement [J]."""
-        scales = self.mesh.scales
-        if isinstance(self.load_case, Loading):
-            return read_only(load_displacement(self.at, self.load_case))
-        return read_only(self.residual @ self.mesh.rate * scales.moment / scales.drive)
+        return read_only(work_with_drive(self.at, self.load_case))
 
     # -- along beams -------------------------------------------------------------------------------------------------
     @property
@@ -409,6 +406,14 @@ def node_reaction(at: Equilibria, node: str, residual: Any) -> Any:
     along, across, moment = (residual[:, unknown] for unknown in mesh.bodies[node])
     force = np.stack([cos * along - sin * across, sin * along + cos * across], axis=-1) * scales.force
     return np.concatenate([force, moment[:, None] * scales.moment], axis=1)
+
+
+def work_with_drive(at: Equilibria, drive: Drive) -> FloatArray:
+    """Return the work-conjugate of a drive at equilibria, (p,): see `EquilibriumPath.effort`."""
+    scales = at.mesh.scales
+    if isinstance(drive, Loading):
+        return np.asarray(load_displacement(at, drive))
+    return np.asarray(at.residual @ at.mesh.rate * scales.moment / scales.drive)
 
 
 def load_displacement(at: Equilibria, drive: Loading) -> Any:

@@ -10,8 +10,8 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.mechanics.refine import embed
-from cfmkit.elastica.results.path import largest_force
+from cfmkit.elastica.mechanics.refine import embed, n_end_motions
+from cfmkit.elastica.results.path import largest_force, work_with_drive
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 ERROR_SAFETY = 1.5
 ROUNDING_ERROR = 1e-13
+ROUNDING = float(np.finfo(float).eps)
 ROUNDED_PLACES = 4.0  # roundings of a place by which a nearly rigid network's effort is uncertain
 CRITICAL_STIFFNESS = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
@@ -43,10 +44,9 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     """
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
-    chosen, own = list(indices), path.at
-    problem, scales, some = NetworkProblem(finer), path.mesh.scales, path.take(chosen)
-    n_bodies = int(path.mesh.elements.unknowns[:, 8].min())
-    guesses, drives = embed(path.mesh, finer, own.z[chosen]), own.drive[chosen]
+    chosen, own, mesh = list(indices), path.at, path.mesh
+    problem, z, drives = NetworkProblem(finer), own.z[chosen], own.drive[chosen]
+    n_bodies, guesses = n_end_motions(mesh), embed(mesh, finer, z)
     solved = problem.equations.solve_each(guesses[:, finer.free], drives, NEXT_CORRECTION, quick=True)
     states = guesses.copy()
     states[:, finer.free] = np.where(solved.converged[:, None], solved.free, guesses[:, finer.free])
@@ -55,13 +55,13 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     for row in np.flatnonzero(known & (solved.unstable != path.unstable[chosen])):
         at = PathEquilibrium(solved.free[row], float(drives[row]), solved.rate[row], int(solved.unstable[row]))
         known[row] = abs(float(problem.modes(at, 1)[0][0])) < CRITICAL_STIFFNESS
-    fine = replace(path, at=Equilibria(finer, states, drives))
-    efforts: Any = np.abs(fine.effort - path.effort[chosen])
-    forces: Any = np.abs(fine.residual[:, :n_bodies] - some.residual[:, :n_bodies]).max(axis=1)
-    moves: Any = np.abs(states[:, :n_bodies] - own.z[chosen, :n_bodies]).max(axis=1)
+    fine, coarse = Equilibria(finer, states, drives), Equilibria(mesh, z, drives)
+    efforts: Any = np.abs(work_with_drive(fine, path.load_case) - path.effort[chosen])
+    forces: Any = np.abs(fine.residual[:, :n_bodies] - coarse.residual[:, :n_bodies]).max(axis=1)
+    moves: Any = np.abs(states[:, :n_bodies] - z[:, :n_bodies]).max(axis=1)
     reach = float(np.abs(own.z[:, :n_bodies]).max())
-    load = max(largest_force(fine.at), NO_FORCE * reach, ROUNDING_ERROR)
-    size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * scales.moment / scales.drive)
+    load = max(largest_force(fine), NO_FORCE * reach, ROUNDING_ERROR)
+    size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * mesh.scales.moment / mesh.scales.drive)
     reach = max(reach, SMALL_MOTION)
     bearing = np.maximum(efforts / size, forces / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
     relative = np.maximum(bearing, moves / reach)
@@ -70,11 +70,10 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
 
 def _rises(path: Path) -> FloatArray:
     """Return by how much the effort changes at every point while the drive does by one rounding of a length of one."""
-    if len(path) < 2:
-        return np.zeros(len(path))
-    change = np.diff(path.at.drive)
-    slope = np.abs(np.diff(path.effort)) / np.where(change == 0, np.inf, np.abs(change))
-    return np.asarray(np.maximum(np.append(slope, 0.0), np.append(0.0, slope)) * np.finfo(float).eps)
+    drive, effort, slope = path.at.drive, path.effort, np.zeros(len(path) + 1)
+    change = np.abs(drive[1:] - drive[:-1])
+    np.divide(np.abs(effort[1:] - effort[:-1]), change, out=slope[1:-1], where=change > 0)
+    return np.maximum(slope[1:], slope[:-1]) * ROUNDING
 
 
 def polish(path: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +17,7 @@ from cfmkit.elastica.contact.joined_pieces import StatesOfPiece, join_pieces
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamSide
 from cfmkit.elastica.model.drive import Control, Loading
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
@@ -275,11 +276,10 @@ def _finer(path: Path) -> Discretisation:
 
 
 def _with_error(attempt: TraceAttempt, finer: Discretisation) -> TraceAttempt:
-    path = attempt.path
+    path = copy(attempt.path)  # with all that is known of it
     errors = point_errors(path, finer, pick_points(path, _event_places(attempt)))
-    told = replace(path, error=float(errors.max(initial=0.0)))
-    vars(told)["effort"] = path.effort  # is known
-    return attempt._replace(path=told)
+    object.__setattr__(path, "error", float(errors.max(initial=0.0)))
+    return attempt._replace(path=path)
 
 
 def _event_places(attempt: TraceAttempt) -> list[float]:
@@ -313,7 +313,7 @@ def trace_on(
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
     arrays = resolution.arrays(network, drive, fits)
-    sides = any(isinstance(contact, BeamOnObstacle) for contact in network.contacts)
+    sides = any(isinstance(contact, BeamSide) for contact in network.contacts)
 
     def remesh(flanks: tuple[FlankPlace, ...]) -> Discretisation:
         return resolution.arrays(network, drive, arrays.fits, flanks)
@@ -347,7 +347,8 @@ def trace_on(
         points.pop()
     status, message = _explain(start, ending, unit)
     if events:
-        points = [_settle_event(point, events, drive, unit) for point in points]
+        near = SAME_PLACE * _range(drive) / unit
+        points = [_settle_event(point, events, near) for point in points]
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, _states(start, meshes, points), points, told, status, message)
     if changes:
@@ -394,8 +395,8 @@ def _path(
 ) -> Path:  # fmt: skip
     path = Path(
         network, drive, states,
-        unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
-        requested=read_only(np.array([point.target for point in points]), np.int64),
+        unstable=read_only([point.at.unstable for point in points], np.int64),
+        requested=read_only([point.target for point in points], np.int64),
         branch=_name_branches([point.branch for point in points], states.mesh.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points)), np.bool_),
@@ -410,12 +411,11 @@ def _tell(event: PathEvent, unit: float) -> Event:
     return Event(event.kind, event.drive * unit, event.before, event.after)
 
 
-def _settle_event(point: Point, events: list[PathEvent], drive: Drive, unit: float) -> Point:
+def _settle_event(point: Point, events: list[PathEvent], near: float) -> Point:
     """Return a point, which if it lies at a bifurcation is as stable as the path is on the better side of it.
 
-    There the number of unstable directions is rounding.
+    There, as `near` as that in the drive, the number of unstable directions is rounding.
     """
-    near = SAME_PLACE * _range(drive) / unit
     for event in events:
         if event.kind == "bifurcation" and abs(point.at.drive - event.drive) <= near:
             return point._replace(at=point.at._replace(unstable=min(event.before, event.after)))
@@ -423,8 +423,8 @@ def _settle_event(point: Point, events: list[PathEvent], drive: Drive, unit: flo
 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
-    names = {id(branch): _name_branch(branch, unit) for branch in branches}
-    return read_only(np.array([names[id(branch)] for branch in branches], np.str_), np.str_)
+    names = {branch: _name_branch(branch, unit) for branch in set(branches)}
+    return read_only([names[branch] for branch in branches], np.str_)
 
 
 def _name_branch(branch: PathBranch | None, unit: float) -> str:

@@ -127,7 +127,7 @@ def _solutions(specs: Sequence[BeamSpec], indices: range) -> dict[int, Solution]
 def _may_go_straight_on(spec: BeamSpec) -> bool:
     """Return False for what is no curve over an increasing motion, or more than that; with contacts it has corners."""
     analysis, by_motion = spec.analysis, spec.mechanism.drive.by_motion
-    if spec.mechanism.stops or spec.mechanism.obstacles:
+    if spec.mechanism.has_contacts:
         return False
     plain = analysis.surface is None and getattr(spec, "target_curve", None) is None and not analysis.through_folds
     return plain and by_motion and spec.fidelity != "solid" and spec.extent > 0 and not analysis.imperfection

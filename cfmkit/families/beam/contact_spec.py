@@ -1,10 +1,10 @@
-"""Specification of contact: stops of nodes, and rigid obstacles that the pads of nodes may touch."""
+"""Specification of contact: stops of nodes, rigid obstacles that pads and beams may touch, pads that touch beams."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
@@ -12,6 +12,7 @@ from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from cfmkit.elastica.model.contact import (
     BeamOnObstacle,
     Contact,
+    NodeOnBeam,
     NodeOnObstacle,
     ObstacleEdge,
     Stop,
@@ -218,8 +219,53 @@ ObstacleSpec = Annotated[
 ]
 
 
+class PartContact(Model):
+    """A contact between two parts of the mechanism: the round pad of a node, and the side of a beam."""
+
+    between: tuple[str, str] = Field(description="a node, whose round pad touches, and the beam that it may touch")
+    radius: Annotated[Length, Field(ge=0)] | None = Field(
+        None, description="of the pad; default: half the thickness of the beam that ends freely at the node"
+    )
+
+    def find_parts(self, mechanism: Mechanism) -> tuple[str, str] | None:
+        """Return the node and the beam, in whichever order they are stated; None if it is not one of each."""
+        pairs = (self.between, self.between[::-1])
+        return next(((a, b) for a, b in pairs if a in mechanism.nodes and b in mechanism.beams), None)
+
+    def find_fault(self, mechanism: Mechanism) -> tuple[str, str] | None:
+        """Return the key and what is wrong with it; None if nothing is."""
+        for name in self.between:
+            if name not in mechanism.nodes and name not in mechanism.beams:
+                names = f"nodes are {list_names(mechanism.nodes)}; beams are {list_names(mechanism.beams)}"
+                return "between", f"there is no node or beam {name!r}; {names}"
+        parts = self.find_parts(mechanism)
+        if parts is None:
+            kind = "beams" if self.between[0] in mechanism.beams else "nodes"
+            return "between", f"these are two {kind}: give a node and a beam, such as [tip, lower]"
+        node, beam = parts
+        if node in (mechanism.beams[beam].start, mechanism.beams[beam].end):
+            return "between", f"node {node!r} is an end of beam {beam!r}: its pad always touches that beam"
+        if self.radius is None and node not in free_ends(mechanism):
+            return "radius", f"no beam ends freely at node {node!r}: state the radius of its round pad"
+        return None
+
+    def contact(self, mechanism: Mechanism) -> NodeOnBeam:
+        """Return the contact, named by its node and its beam."""
+        parts = self.find_parts(mechanism)
+        assert parts is not None
+        node, beam = parts
+        radius = free_ends(mechanism)[node] if self.radius is None else self.radius
+        return NodeOnBeam(f"{node}_{beam}", node, beam, radius)
+
+
+def list_names(names: Iterable[str]) -> str:
+    """Return the first of some names in a row."""
+    listed = list(names)
+    return ", ".join(listed[:12]) + (", ..." if len(listed) > 12 else "")
+
+
 def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
-    """Return all one-sided contacts of a mechanism: of stops first, then of obstacles."""
+    """Return all one-sided contacts of a mechanism: of stops first, then of obstacles, then between parts."""
     found = [contact for name, stop in mechanism.stops.items() for contact in stop.contacts(name)]
     for name, obstacle in mechanism.obstacles.items():
         outline = obstacle.outline()
@@ -227,7 +273,7 @@ def contacts_of(mechanism: Mechanism) -> tuple[Contact, ...]:
             stiffness = obstacle.stiffness or math.inf
             found.append(NodeOnObstacle(name, node, outline, radius, stiffness, obstacle.friction))
         found.extend(BeamOnObstacle(name, beam, outline) for beam in sides_of(mechanism, obstacle))
-    return tuple(found)
+    return tuple(found + [pair.contact(mechanism) for pair in mechanism.contacts])
 
 
 def rubs(mechanism: Mechanism) -> bool:
@@ -307,20 +353,27 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
             inside = radius - float(outline.distance(mechanism.nodes[node].at).value)
             if inside > MAX_OVERLAP_SHARE * size and mechanism.closure != "chain":
                 yield place, f"the pad of node {node!r} lies {format_short(inside, 'length')} inside it before any load"
-    if not (mechanism.stops or mechanism.obstacles):
+    if not mechanism.has_contacts:
         return
     yield from _column_faults(mechanism)
-    smooth = [name for name, obstacle in mechanism.obstacles.items() if sides_of(mechanism, obstacle)]
+    smooth: list[tuple[str | int, ...]] = [
+        ("obstacles", name) for name, obstacle in mechanism.obstacles.items() if sides_of(mechanism, obstacle)
+    ]
+    smooth += [("contacts", number) for number in range(len(mechanism.contacts))]
     if smooth and rubs(mechanism):
         yield (
-            ("obstacles", smooth[0]),
+            smooth[0],
             "flanks of beams beside contacts with friction are not modelled: state the 'nodes' that may touch it, "
             "or leave out 'friction'",
         )
     for name in mechanism.obstacles:
         if name in mechanism.stops:
             yield ("obstacles", name), "a stop has the same name: rename one of them"
-    key = "stops" if mechanism.stops else "obstacles"
+    for number, pair in enumerate(mechanism.contacts):
+        name = pair.contact(mechanism).name
+        if name in mechanism.stops or name in mechanism.obstacles:
+            yield ("contacts", number), f"a stop or an obstacle has its name, {name!r}: rename that"
+    key = next(key for key in ("stops", "obstacles", "contacts") if getattr(mechanism, key))
     copies = mechanism.copies
     if copies is not None and copies.layers > 1:
         yield (key,), "contact is not supported with stages in series: leave out 'copies.layers'"
@@ -364,9 +417,11 @@ def friction_columns(column: str) -> tuple[str, ...]:
 
 
 def column_names(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Yield the place in the specification and the column of the force of each stop, and of each pad."""
+    """Yield the place in the specification and the column of the force of each stop, of each pad, of each pair."""
     for name in mechanism.stops:
         yield ("stops", name), f"stop_{name}_force"
     for name, obstacle in mechanism.obstacles.items():
         for toucher in (*pads_of(mechanism, obstacle), *sides_of(mechanism, obstacle)):
             yield ("obstacles", name, obstacle.kind), f"{name}_{toucher}_force"
+    for number, pair in enumerate(mechanism.contacts):
+        yield ("contacts", number), f"{pair.contact(mechanism).name}_force"

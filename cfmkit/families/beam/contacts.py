@@ -1,4 +1,4 @@
-"""Forces of stops and obstacles along the curve of a beam mechanism: columns, scalar results and findings."""
+"""Forces of contacts along the curve of a beam mechanism: columns, scalar results and findings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cfmkit.arrays import LazyMapping
 from cfmkit.curves import Column
 from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide, NodeOnBeam, NodeOnObstacle, Stop
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.errors import InputError
 from cfmkit.families.beam.constant_force_range_and_extremes import window_of
@@ -46,16 +46,16 @@ OUT_OF_REACH = 10.0  # largest motions of a pad from an obstacle, from which on 
 MOST_NAMED = 6
 
 
-def refuse_sides_in_obstacles(assembly: Assembly) -> None:
-    """Refuse beams that lie in an obstacle before any load.
+def refuse_overlap_at_rest(assembly: Assembly) -> None:
+    """Refuse beams that lie in an obstacle, or in the pad of a node, before any load.
 
     Raises
     ------
     cfmkit.errors.InputError
-        With the beam, the obstacle, the depth and the place.
+        With the beam, what it lies in, the depth and the place.
     """
     network = assembly.network
-    sides = [contact for contact in network.contacts if isinstance(contact, BeamOnObstacle)]
+    sides = [contact for contact in network.contacts if isinstance(contact, BeamSide)]
     if not sides:
         return
     mesh = discretise(network, assembly.drive())
@@ -65,10 +65,11 @@ def refuse_sides_in_obstacles(assembly: Assembly) -> None:
         depth = -least.gap * mesh.scales.length
         if depth > MAX_OVERLAP_SHARE * mesh.scales.length:
             place = float(np.ravel(mesh.fits[contact.beam].arc(least.parameter))[0])
-            raise InputError(
-                f"mechanism.obstacles.{contact.name}: beam {contact.beam!r} lies {format_short(depth, 'length')} in"
-                f"side it at {place:.0%} of its length before any load"
-            )
+            by, where = format_short(depth, "length"), f"at {place:.0%} of its length before any load"
+            if isinstance(contact, NodeOnBeam):
+                names = f"the pad of node {contact.node!r} overlaps beam {contact.beam!r}"
+                raise InputError(f"mechanism.contacts: {names} by {by} {where}")
+            raise InputError(f"mechanism.obstacles.{contact.name}: beam {contact.beam!r} lies {by} inside it {where}")
 
 
 # -- forces ------------------------------------------------------------------------------------------------------------
@@ -83,6 +84,11 @@ def groups(contacts: tuple[Contact, ...]) -> dict[tuple[str, str], list[int]]:
 def toucher(contact: Contact) -> str:
     """Return the node or the beam that touches."""
     return contact.beam if isinstance(contact, BeamOnObstacle) else contact.node
+
+
+def counterpart(contact: Contact) -> str:
+    """Return the stop, the obstacle or the beam that is touched."""
+    return contact.beam if isinstance(contact, NodeOnBeam) else contact.name
 
 
 def signed_force(path: Path, numbers: list[int]) -> FloatArray:
@@ -121,11 +127,16 @@ def _column_names(solution: Solution) -> list[str]:
     contacts, names = solution.path.network.contacts, list[str]()
     for column, numbers in zip(forces, groups(contacts).values(), strict=True):
         names.append(column)
-        if isinstance(contacts[numbers[0]], BeamOnObstacle):
-            names += [f"{column.removesuffix('force')}{end}" for end in ("from", "to")]
+        names += _place_columns(contacts[numbers[0]], column)
         if any(contacts[number].friction for number in numbers):
             names += friction_columns(column)
     return names
+
+
+def _place_columns(contact: Contact, column: str) -> list[str]:
+    """Return the columns of where the side of a beam touches, by the column of the force."""
+    ends = {BeamOnObstacle: ("from", "to"), NodeOnBeam: ("at",)}.get(type(contact), ())
+    return [f"{column.removesuffix('force')}{end}" for end in ends]
 
 
 def _columns(solution: Solution) -> dict[str, Column]:
@@ -143,10 +154,9 @@ def _columns(solution: Solution) -> dict[str, Column]:
             columns[tangential] = Column(total[keep], "force")
             said = [np.asarray(states)[keep] for _, states in rubbing]
             columns[state] = Column(np.array(["".join(each) for each in zip(*said, strict=True)], np.str_), "text")
-        if isinstance(contact, BeamOnObstacle):
-            places = path.contact_places(numbers[0])[keep]
-            for end, values in zip(("from", "to"), places.T, strict=True):
-                columns[f"{column.removesuffix('force')}{end}"] = Column(values, "ratio")
+        place_columns = _place_columns(contact, column)
+        for number, name in enumerate(place_columns):
+            columns[name] = Column(path.contact_places(numbers[0])[keep, number], "ratio")
     marks = np.full(len(path), "", dtype=object)
     for event in path.contact_events:
         point = int(np.abs(np.where(path.changes_contact, path.drive, np.inf) - event.drive).argmin())
@@ -156,6 +166,8 @@ def _columns(solution: Solution) -> dict[str, Column]:
 
 def _mark(path: Path, event: ContactEvent) -> str:
     contact = path.network.contacts[event.number]
+    if isinstance(contact, NodeOnBeam):
+        return f"{contact.node} {contact.beam} {event.kind}"
     name = contact.name if isinstance(contact, Stop) else f"{contact.name} {toucher(contact)}"
     return f"{name} {event.kind}"
 
@@ -234,6 +246,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 
 # -- findings ----------------------------------------------------------------------------------------------------------
 CONTACT_FINDINGS = OF_STOPS | {
+    "contact_spreads_between_beams": "two parts begin to lie on each other along a length: the curve ends there",
     "friction_not_unique": "friction leaves several states at a change of contact: the first of them was taken",
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
@@ -271,6 +284,13 @@ def change_sentences(
                 f"where {who} changes at {say(event.drive)}, friction leaves {event.states} states that can go on: "
                 f"{_state_taken(path, event)}",
             )
+        if event.kind == "spreads" and isinstance(path.network.contacts[event.number], NodeOnBeam):
+            who = describe(path.network.contacts[event.number])
+            yield (
+                "contact_spreads_between_beams",
+                f"contact of {who} spreads at {say(event.drive)}: the beam would wrap around the pad, which is not "
+                "modelled, and the curve ends there",
+            )
         if event.kind == "blocks":
             who = describe(path.network.contacts[event.number])
             yield "blocked", f"the drive is blocked by {who} at {say(event.drive)}"
@@ -285,23 +305,25 @@ def _state_taken(path: Path, event: ContactEvent) -> str:
 
 def describe(contact: Contact) -> str:
     """Return what a contact is called."""
-    return f"stop {contact.name!r}" if isinstance(contact, Stop) else f"{toucher(contact)!r} on {contact.name!r}"
+    return (
+        f"stop {contact.name!r}" if isinstance(contact, Stop) else f"{toucher(contact)!r} on {counterpart(contact)!r}"
+    )
 
 
 def _sentence(solution: Solution, event: ContactEvent, place: str) -> str:
     contact, path = solution.path.network.contacts[event.number], solution.path
-    if event.kind == "blocks":
+    if event.kind == "blocks" or (event.kind == "spreads" and isinstance(contact, NodeOnBeam)):
         return ""
     if not isinstance(contact, Stop):
-        what = toucher(contact)
+        what, partner = toucher(contact), counterpart(contact)
         sentences = {
-            "begins": f"contact begins at {place} between {what!r} and {contact.name!r}",
-            "ends": f"{what!r} leaves {contact.name!r} at {place}",
-            "moves": f"the contact on {contact.name!r} moves between an end and the side of {what!r} at {place}",
-            "spreads": f"contact spreads at {place}: {what!r} lies along {contact.name!r} from there on",
-            "closes": f"{what!r} no longer lies along {contact.name!r} at {place}",
-            "slips": f"{what!r} slides on {contact.name!r} from {place} on",
-            "sticks": f"{what!r} sticks to {contact.name!r} from {place} on",
+            "begins": f"contact begins at {place} between {what!r} and {partner!r}",
+            "ends": f"{what!r} leaves {partner!r} at {place}",
+            "moves": f"the contact on {partner!r} moves between an end and the side of {what!r} at {place}",
+            "spreads": f"contact spreads at {place}: {what!r} lies along {partner!r} from there on",
+            "closes": f"{what!r} no longer lies along {partner!r} at {place}",
+            "slips": f"{what!r} slides on {partner!r} from {place} on",
+            "sticks": f"{what!r} sticks to {partner!r} from {place} on",
         }
         return sentences[event.kind]
     if event.kind in ("slips", "sticks"):
@@ -323,10 +345,11 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
         if number in touched or contact.turns or path.contact_force(number).any():
             continue
         gap = path.contact_gap(number)
-        if isinstance(contact, BeamOnObstacle):
+        moved = 0.0
+        if isinstance(contact, BeamSide):
             moved = float(np.hypot(*np.moveaxis(path.line_motion(contact.beam), -1, 0)).max())
-        else:
-            moved = float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
+        if not isinstance(contact, BeamOnObstacle):
+            moved += float(np.hypot(*path.motion(contact.node)[:, :2].T).max())
         least = float(gap.min())
         if ROUNDING_OF_GAP * path.mesh.scales.length < least < NEAR_GAP * thin:
             where = f"the gap of {describe(contact)} closes to {format_short(least, 'length')} and stays open"
@@ -334,8 +357,8 @@ def _gap_sentences(solution: Solution) -> Iterator[tuple[str, str]]:
         elif not isinstance(contact, Stop) and least > OUT_OF_REACH * moved:
             yield (
                 "obstacle_out_of_reach",
-                f"{toucher(contact)!r} comes no nearer to {contact.name!r} than {format_short(least, 'length')}, and "
-                f"moves by {format_short(moved, 'length')} only",
+                f"{toucher(contact)!r} comes no nearer to {counterpart(contact)!r} than "
+                f"{format_short(least, 'length')}, and moves by {format_short(moved, 'length')} only",
             )
 
 

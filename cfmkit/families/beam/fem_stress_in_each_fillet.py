@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.beam.drawn_pieces import both_halves
-from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
+from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.part import POINT_TOLERANCE_FACTOR, strips_of
 from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.families.fem_results import FilletRow, with_nominal
@@ -54,7 +54,7 @@ def _described_half(assembly: Assembly, points: FloatArray) -> FloatArray:
 def _name_polygons(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
     """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
     network, axis = assembly.network, mirror_axis(assembly)
-    exact = EDGE_TOLERANCE * min(thinnest_of(beam.section) for beam in network.beams.values())
+    exact = EDGE_TOLERANCE * min(beam.section.thinnest for beam in network.beams.values())
     halves = both_halves(assembly, strips_of(assembly, exact / POINT_TOLERANCE_FACTOR))
     beams = {name: [polygon for strip in found for polygon in strip.polygons] for name, found in halves.items()}
     nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}

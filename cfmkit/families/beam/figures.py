@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.contact import BeamOnObstacle, Stop
+from cfmkit.elastica.model.contact import BeamOnObstacle, BeamSide, NodeOnBeam, Stop
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.results.beam_states import states
 from cfmkit.export.posed_part import PosedBody
@@ -228,13 +228,15 @@ def _supports(solution: Solution, ax: Axes) -> None:
 def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, float], poses: list[int]) -> None:
     """Draw obstacles, bars of stops at the ends of their gaps, and node and rim of each pad that touches in a pose."""
     path, size = solution.path, max(box[2] - box[0], box[3] - box[1])
-    outlines = {contact.name: contact.outline for contact in path.network.contacts if not isinstance(contact, Stop)}
+    outlines = {contact.name: contact.outline for contact in path.network.contacts
+                if not isinstance(contact, Stop | NodeOnBeam)}  # fmt: skip
     for name, outline in outlines.items():
         for number, line in enumerate(_both(solution, outline.lines(2 * size))):
             parts.edge(ax, line, f"obstacle-{name}-{number}", color=TEXT_INK, linewidth=1.8, zorder=1.6)
     for number, contact in enumerate(path.network.contacts):
-        if isinstance(contact, BeamOnObstacle):
+        if isinstance(contact, BeamSide):
             _touching_side(solution, ax, number, poses)
+        if isinstance(contact, BeamOnObstacle):
             continue
         node = path.network.nodes[contact.node]
         if isinstance(contact, Stop) and contact.direction is not None:
@@ -249,7 +251,7 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
                 continue
             x, y, _ = path.motion(contact.node)[point]
             place = np.array([[float(np.real(node.x)) + x, float(np.real(node.y)) + y]])
-            for at_pad in _both(solution, [place]):
+            for at_pad in () if isinstance(contact, NodeOnBeam) else _both(solution, [place]):
                 ax.plot(*parts.mm(at_pad[0]), marker="o", markersize=4.0, color=color, zorder=4.5, linestyle="",
                         gid=f"touch-{number}-{pose}")  # fmt: skip
             if isinstance(contact, Stop):
@@ -261,7 +263,7 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
 
 
 def _touching_side(solution: Solution, ax: Axes, number: int, poses: list[int]) -> None:
-    """Mark where the side of a beam touches: a dot, or a thick line along what lies on the obstacle."""
+    """Mark where the side of a beam touches: a dot, or a thick line along what lies on an obstacle."""
     path = solution.path
     contact: Any = path.network.contacts[number]
     touching = path.contact_places(number)

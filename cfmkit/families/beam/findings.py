@@ -15,9 +15,10 @@ from cfmkit.families.beam.constant_force_range_and_extremes import window_of
 from cfmkit.families.beam.contacts import CONTACT_FINDINGS as ON_CONTACTS
 from cfmkit.families.beam.contacts import change_sentences, contact_sentences
 from cfmkit.families.beam.largest_in_window import largest
-from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
+from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of
 from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units
 from cfmkit.families.beam.scalar_results import find_in_window
+from cfmkit.families.beam.solution import pairs_in_contact
 from cfmkit.families.findings import finder, stiffer, too_soft
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
@@ -353,7 +354,10 @@ def _touching_beams(solution: Solution) -> Sentence:
     still, moving = solution.gaps
     assert moving is not None
     when = "before any load" if still is not None and still.size <= 0 else "during the travel"
-    return (f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled",)
+    if frozenset((moving.one, moving.other)) in pairs_in_contact(solution.path.network):
+        return (f"beams {moving.one} and {moving.other} overlap {when}, beside their contact that is stated",)
+    remedy = "" if moving.other.endswith("'") else "; state it in 'mechanism.contacts'"
+    return (f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled{remedy}",)
 
 
 def _least_gap(solution: Solution) -> float:
@@ -384,7 +388,7 @@ def _thin_beam(name: str) -> FindingRule[Solution]:
         return max((part.process and part.process.thinnest) or 0.0, part.min_feature)
 
     def thickness(solution: Solution) -> float:
-        return thinnest_of(solution.path.network.beams[name].section)
+        return solution.path.network.beams[name].section.thinnest
 
     def sentence(solution: Solution) -> Sentence:
         thin, made = (format_short(size, "length") for size in (thickness(solution), least(solution)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.beam.contact_spec import ObstacleSpec, StopSpec, contact_faults
+from cfmkit.families.beam.contact_spec import ObstacleSpec, PartContact, StopSpec, contact_faults, list_names
 from cfmkit.families.beam.network_elements_spec import (
     HELD_MOTIONS,
     Copies,
@@ -30,7 +30,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import CutPart, RoundedCorners, SafetyFactor
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
 
 Fault = tuple[tuple[str | int, ...], str]
@@ -72,7 +72,10 @@ def _unknown(mechanism: Mechanism) -> Iterator[Fault]:
     for place, kind, name in references(mechanism):
         known: Mapping[str, object] = getattr(mechanism, f"{kind}s")
         if name not in known:
-            yield place, f"there is no {kind} {name!r}; {kind}s are {_list_names(known)}"
+            yield place, f"there is no {kind} {name!r}; {kind}s are {list_names(known)}"
+    for number, contact in enumerate(mechanism.contacts):
+        if (fault := contact.find_fault(mechanism)) is not None:
+            yield ("contacts", number, fault[0]), fault[1]
 
 
 def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str, str]]:
@@ -99,11 +102,6 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
         for index, load in enumerate(loads):
             yield (*place, index, load.kind, load.acts_on), load.acts_on, getattr(load, load.acts_on)
     yield ("drive", mechanism.drive.kind, "node"), "node", mechanism.drive.node
-
-
-def _list_names(names: Iterable[str]) -> str:
-    every = list(names)
-    return ", ".join(every[:12]) + (", ..." if len(every) > 12 else "")
 
 
 def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
@@ -235,6 +233,9 @@ class Mechanism(RoundedCorners, Model):
     obstacles: dict[str, ObstacleSpec] = Field(
         {}, description="rigid bodies that nodes may touch, by name; of `kind` line, disc, hole, polyline or arc"
     )
+    contacts: tuple[PartContact, ...] = Field(
+        (), description="contacts between parts of the mechanism: [{between: [tip, lower], radius: 1 mm}]"
+    )
     drive: DriveSpec = Field(description="the drive; of `kind` displacement, rotation, force, moment or loads")
     copies: Copies | None = Field(None, description="copies of the part described here")
     part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
@@ -248,6 +249,11 @@ class Mechanism(RoundedCorners, Model):
         """Return a value of each beam by name: its own, or that of the mechanism where it has none."""
         usual = getattr(self, key)
         return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
+
+    @property
+    def has_contacts(self) -> bool:
+        """True if any contact is stated."""
+        return bool(self.stops or self.obstacles or self.contacts)
 
     @property
     def thinnest(self) -> float:

@@ -26,7 +26,7 @@ from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
 from cfmkit.families.beam.constant_force_range_and_extremes import travel_of
 from cfmkit.families.beam.contact_spec import rubs
-from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_sides_in_obstacles
+from cfmkit.families.beam.contacts import contact_columns, contact_values, refuse_overlap_at_rest
 from cfmkit.families.beam.findings import findings_of
 from cfmkit.families.beam.network_elements_spec import LoadsDrive
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
@@ -111,7 +111,7 @@ def solve(spec: BeamSpec) -> Solution:
     assembly = assemble(spec)
     _refuse_tight_coils(assembly)
     _refuse_torn_beams(assembly)
-    refuse_sides_in_obstacles(assembly)
+    refuse_overlap_at_rest(assembly)
     if not rubs(spec.mechanism):
         path = trace(assembly.network, assembly.drive(), assembly.control())
         return Solution(assembly, path, *_keep_points(assembly, path))

@@ -243,12 +243,6 @@ def thickest_of(section: engine.Section) -> float:
     return float(thickness if isinstance(thickness, float | int) else np.max(thickness.values))
 
 
-def thinnest_of(section: engine.Section) -> float:
-    """Return the smallest thickness of a section as the engine has it [m]."""
-    thickness = section.thickness
-    return float(thickness if isinstance(thickness, float | int) else np.min(thickness.values))
-
-
 def _node(node: NodeSpec) -> engine.Node:
     moved = (0.0, 0.0, 0.0)
     if node.moved is not None:

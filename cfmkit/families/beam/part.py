@@ -36,7 +36,6 @@ from cfmkit.families.beam.network_from_spec import (
     mirror_axis,
     moving_nodes,
     thickest_of,
-    thinnest_of,
 )
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirror_points, strips
 from cfmkit.families.run_control import Run
@@ -164,7 +163,7 @@ def drawn_fillet(spec: BeamSpec) -> float:
 
 def fine_tolerance(assembly: Assembly) -> float:
     """Return how far an outline may be from the exact one where nobody states it [m]."""
-    return OUTLINE_TOLERANCE * min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+    return OUTLINE_TOLERANCE * min(beam.section.thinnest for beam in assembly.network.beams.values())
 
 
 def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:

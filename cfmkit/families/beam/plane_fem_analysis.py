@@ -25,7 +25,6 @@ from cfmkit.families.beam.network_from_spec import (
     is_on_axis,
     mirror_axis,
     resolve,
-    thinnest_of,
 )
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing
@@ -322,7 +321,7 @@ def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
 
 
 def _thinnest(assembly: Assembly) -> float:
-    return min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+    return min(beam.section.thinnest for beam in assembly.network.beams.values())
 
 
 def _stops(spec: BeamSpec) -> list[float]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.families.suggestion_request import Request
     from cfmkit.results import Result
 
-SHAPE_FILES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector", "end-effector-leg")
+SHAPE_FILES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
 
 RELATIVE_SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
@@ -56,13 +57,14 @@ RIPPLE_SHARES = (0.95, 1.02)
 DEPTH_SHARE = 0.99
 """Width over the depth that may seem to be needed: stretch and shear make beams softer or stiffer by a per cent."""
 
-MAX_THICKNESS_RATIO = 1.15
-"""Largest thickness over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do."""
+MAX_THICKNESS_RATIOS = (1.15, 1.0)
+"""Largest thicknesses over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do;
+of its own thickness a shape keeps its curve to the last digit, and its pads their share of the envelope."""
 
 MIN_WIDTH_RATIO = 1.0
 """Least width of a beam over its thickness: narrower ones leave the plane."""
 
-MAX_PROPOSALS = 18
+MAX_PROPOSALS = 24
 
 WIDE_LAST = 100.0
 """Promise of shapes whose beams are too wide to curl: they come after all others."""
@@ -127,12 +129,12 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     for kept in kept_shapes():
         largest = min(request.envelope[0] / kept.envelope.across, request.envelope[1] / kept.envelope.along)
         for share in RELATIVE_SIZES:
-            for block in request.materials or ({"name": "pom"},):
-                one = _rescale_shape(request, kept, share * largest, dict(block))
-                if isinstance(one, Candidate):
-                    found.append(one)
-                else:
-                    missed.append(one)
+            for block, ratio in product(request.materials or ({"name": "pom"},), MAX_THICKNESS_RATIOS):
+                candidate = _rescale_shape(request, kept, share * largest, dict(block), ratio)
+                if not isinstance(candidate, Candidate):
+                    missed.append(candidate)
+                elif not found or candidate.spec != found[-1].spec:
+                    found.append(candidate)
     if found:
         return FamilyOffer(tuple(_vary_by_turns(found)[:MAX_PROPOSALS]))
     return FamilyOffer(reason=min(missed, key=lambda one: one[0])[1])
@@ -147,8 +149,10 @@ def _vary_by_turns(found: list[Candidate]) -> list[Candidate]:
     return [row[k] for k in range(longest) for row in rows if k < len(row)]
 
 
-def _rescale_shape(request: Request, kept: Kept, size: float, block: dict[str, Any]) -> Candidate | tuple[float, str]:
-    """Return a shape at a size, or how far it misses what is required, and why."""
+def _rescale_shape(
+    request: Request, kept: Kept, size: float, block: dict[str, Any], thickest: float
+) -> Candidate | tuple[float, str]:
+    """Return a shape at a size, up to a thickness over its own, or how far it misses what is required, and why."""
     length = request.travel / size
     low, high = float(kept.motion[0]), float(kept.motion[-1])
     if length > 0.98 * (high - low):
@@ -170,7 +174,8 @@ def _rescale_shape(request: Request, kept: Kept, size: float, block: dict[str, A
         return 1.0 + least / request.ripple, reason
     best = int(flat[np.argmin(stress[flat] / 1e3 ** (1 - ripple[flat]))])
     window = float(starts[best]) * size, float(starts[best] + length) * size
-    return _size_section(request, kept, size, block, window, (float(stress[best]), _mean(kept, starts[best], length)))
+    curve = float(stress[best]), _mean(kept, starts[best], length)
+    return _size_section(request, kept, size, block, window, curve, thickest * size)
 
 
 def _mean(kept: Kept, start: float, length: float) -> float:
@@ -185,6 +190,7 @@ def _size_section(
     block: dict[str, Any],
     window: tuple[float, float],
     curve: tuple[float, float],
+    thickest: float,
 ) -> Candidate | tuple[float, str]:
     """Return the shape with its thickness from the stress and its width from the force."""
     material, own = MaterialSpec.model_validate(block), kept.spec.mechanism
@@ -194,9 +200,7 @@ def _size_section(
     strength = material.allowable(1.0)
     if strength is None or not force > 0.0:
         return 1e9, "no strength of the material is known"
-    thicker = min(
-        BENDING_STRESS_SHARE * request.strength_used * strength * size / (stress * stiffer), MAX_THICKNESS_RATIO * size
-    )
+    thicker = min(BENDING_STRESS_SHARE * request.strength_used * strength * size / (stress * stiffer), thickest)
     wide = _width(request, kept, size, stiffer, thicker, force)
     if wide < MIN_WIDTH_RATIO * thicker * thin:
         # thinner, so that the same force wants as much width as the beam is thick

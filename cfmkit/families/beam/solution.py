@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
+from cfmkit.elastica.model.contact import NodeOnBeam
 from cfmkit.elastica.results.between_loads import interpolate_loads
 from cfmkit.elastica.results.between_points import interpolate_path
 from cfmkit.elastica.results.folding_path_between_points import interpolate_folding_path
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica import Path
+    from cfmkit.elastica import Network, Path
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
     from cfmkit.elastica.vibration import Frequencies
@@ -240,8 +241,19 @@ class Solution(ShortRepr):
         axis = mirror_axis(self.assembly)
         if axis is not None:
             lines |= {f"{name}'": mirror_points(line, *axis) for name, line in lines.items()}
-        return smallest_gap(lines, halves)
+        return smallest_gap(lines, halves, pairs_in_contact(network))
 
     def beam_force(self, beam: str) -> FloatArray:
         """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
         return read_only(-self.path.end_force(beam, 1)[self.keep])
+
+
+def pairs_in_contact(network: Network) -> set[frozenset[str]]:
+    """Return the pairs of beams whose contact is solved for: one ends at the node of a pad that may touch the other."""
+    return {
+        frozenset((name, contact.beam))
+        for contact in network.contacts
+        if isinstance(contact, NodeOnBeam)
+        for name, beam in network.beams.items()
+        if contact.node in (beam.start, beam.end)
+    }

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from cfmkit.families.beam.contact_spec import contacts_of
 from cfmkit.families.beam.mechanism_spec import Mechanism
 from cfmkit.families.beam.network_elements_spec import BeamMaterial, Drive, LoadsDrive, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
@@ -371,13 +372,11 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
 
 
 def _contact_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Yield what cannot be done with stops and obstacles, and requirements on those that are not there."""
-    contacts = (*spec.mechanism.stops, *spec.mechanism.obstacles)
-    yield from contact_requirement_faults(contacts, "a stop or an obstacle", spec.requirements)
-    if not (spec.mechanism.stops or spec.mechanism.obstacles):
-        return
-    if spec.analysis.modes:
-        yield ("analysis", "modes"), "natural frequencies are not known with stops or obstacles: leave it out"
+    """Yield what cannot be done with contacts, and requirements on those that are not there."""
+    contacts = dict.fromkeys(contact.name for contact in contacts_of(spec.mechanism))
+    yield from contact_requirement_faults(contacts, "a stop, an obstacle or a contact", spec.requirements)
+    if spec.mechanism.has_contacts and spec.analysis.modes:
+        yield ("analysis", "modes"), "natural frequencies are not known with contacts: leave it out"
 
 
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:
@@ -412,6 +411,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         ("analysis.loads_first", mechanism.loads and not analysis.loads_first, "constant loads act from the start"),
         ("mechanism.stops", mechanism.stops, "contact is not modelled"),
         ("mechanism.obstacles", mechanism.obstacles, "contact is not modelled"),
+        ("mechanism.contacts", mechanism.contacts, "contact is not modelled"),
         ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and springs are not part of it"),
         (", ".join(moved), moved, "the part is solved as drawn, and supports stay where they are"),
         (", ".join(pins), pins, "the outline is one piece at every node"),
@@ -467,11 +467,10 @@ def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
     if not mechanism.drive.is_displacement:
         yield "needs a drive of kind 'displacement': the force at the end of its window is scaled"
     moved = any(node.moved is not None for node in mechanism.nodes.values())
-    contacts = mechanism.stops or mechanism.obstacles
-    if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection or contacts:
+    if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection or mechanism.has_contacts:
         yield (
-            "Eq. 6 is about beams alone: springs, loads, stops, obstacles, moved supports and imperfections do not "
-            "scale with them"
+            "Eq. 6 is about beams alone: springs, loads, contacts, moved supports and imperfections do not scale with "
+            "them"
         )
     if _several(spec, "material"):
         yield "Eq. 6 is about beams of one material"

@@ -16,7 +16,7 @@ from cfmkit.export.union import OutlinePiece
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam, Fit
@@ -28,6 +28,7 @@ _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 LINE_RTOL = 1e-9  # of the thickness: edges that bulge less are lines
 COMPLEX_STEP = 1e-30  # of a complex step
 COMMON_END_THICKNESSES = 3.0  # thicknesses beside a common end that are no gap
+MAX_OVERLAP_SHARE = 0.02  # of half the thickness, by which beams in contact may overlap as drawn by straight pieces
 END_DISTANCE_RATIO = 0.25  # of the thickness: ends closer than this are one
 
 
@@ -187,7 +188,11 @@ class BeamGap:
     other: str
 
 
-def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> BeamGap | None:
+def smallest_gap(
+    lines: Mapping[str, FloatArray],
+    halves: Mapping[str, float],
+    may_touch: Collection[frozenset[str]] = (),
+) -> BeamGap | None:
     """Return the smallest gap of two beams; near an end that they have in common there is none.
 
     Pairs whose boxes are farther apart than that are not looked at.
@@ -198,6 +203,8 @@ def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -
         Centre lines (n, 2) [m] by beam; those of a mirrored half have the same name with a prime.
     halves : mapping
         Half thickness by beam [m].
+    may_touch : collection of frozenset, optional
+        Pairs of beams whose contact is solved for: they count only where they overlap all the same.
     """
     pairs = list(_pairs(lines))
     best: BeamGap | None = None
@@ -206,6 +213,9 @@ def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -
         if best is not None and bounds[k] > best.size:
             break
         found = _gap(lines, halves, *pairs[k])
+        may_close = frozenset(pairs[k]) in may_touch
+        if found is not None and may_close and found.size > -MAX_OVERLAP_SHARE * min(halves[name] for name in pairs[k]):
+            continue
         best = found if best is None or (found is not None and found < best) else best
     return best
 

@@ -11,7 +11,6 @@ does not reach the end of the travel, and what cannot be built.
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,23 +19,27 @@ import numpy as np
 from cfmkit.arrays import LazySequence
 from cfmkit.errors import CfmError
 from cfmkit.families.cam.findings import rules_of
-from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, profiles_in_rows
-from cfmkit.families.cam.mechanism_from_spec import (
-    assemble,
-    check_first_pose,
-    loads_of,
-)
+from cfmkit.families.cam.mechanism_from_spec import assemble, check_first_pose
 from cfmkit.families.cam.model import reachable_travel, shortfalls, solve
 from cfmkit.families.cam.scalar_results import ROW_COLUMNS
-from cfmkit.families.no_mechanism import CannotBuild
-from cfmkit.families.rows import SolvedRows, drop_numbers, stack, with_values
+from cfmkit.families.rows import (
+    RowsDiffer,
+    SolvedRows,
+    agree,
+    drop_numbers,
+    fails,
+    row_of,
+    rows_of,
+    stack,
+    valid,
+    with_values,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from cfmkit.families.cam.assembly import Assembly
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.rows import Variants
@@ -64,22 +67,26 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
     plain, rows = _plain_numbers(variants.spec), np.arange(len(variants))
     checks = [plain[path](values) for path, values in variants.values.items() if path in plain]
     rows = rows[np.logical_and.reduce([np.ones(len(rows), dtype=bool), *checks])]
-    beside = [path for path in variants.values if path in plain and BESIDE_THE_CAM.fullmatch(path)]
-    moving = [path for path in variants.values if path not in beside]
-    alone: dict[Hashable, list[tuple[int, Assembly]]] = {}
+    moving = [path for path in variants.values if path not in plain or not BESIDE_THE_CAM.fullmatch(path)]
+    beside = [path for path in variants.values if path not in moving]
+    mixed: list[int] = []
     for members in _alike([variants.values[path] for path in moving], rows):
-        assembly = _assemble_first(variants, members, moving, plain)
-        if assembly is None:
-            continue
-        kind = None if len(members) >= MIN_SHARED_CAMS else _kind(assembly, plain.keys() >= set(moving))
-        if kind is None:
-            yield from _group_around_one_cam(assembly, members, {path: variants.values[path] for path in beside})
-            continue
-        for row in members.tolist():
-            own = _with_others(assembly, {path: variants.values[path][row].item() for path in beside})
-            alone.setdefault((kind, *_flags(own)), []).append((row, own))
-    for group in alone.values():
-        yield from _side_by_side(group, variants)
+        if len(members) < MIN_SHARED_CAMS:
+            mixed += members.tolist()
+        elif plain.keys() >= set(moving):
+            yield from _in_parcels(members, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+        elif (first := dict(valid(variants, members[:1].tolist()))) and not _is_left_out(first[members[0]]):
+            yield from _in_parcels(members, partial(_with_columns, variants, beside, first[members[0]]))
+    rest = np.array(sorted(mixed), dtype=np.intp)
+    if plain.keys() >= set(moving):
+        yield from _in_parcels(rest, partial(_with_columns, variants, [*moving, *beside], variants.spec))
+        return
+    kinds: dict[str, list[int]] = {}
+    for row, spec in valid(variants, rest.tolist()):
+        if not _is_left_out(spec):
+            kinds.setdefault(_kind(spec), []).append(row)
+    for alike in kinds.values():
+        yield from _in_parcels(np.array(alike), partial(_stack_specs, variants))
 
 
 def _is_left_out(spec: CamSpec) -> bool:
@@ -148,96 +155,61 @@ def _alike(columns: list[NDArray[Any]], rows: Rows) -> list[Rows]:
     return sorted(groups, key=lambda members: int(members[0]))
 
 
-def _assemble_first(variants: Variants, members: Rows, moving: list[str], plain: Mapping[str, Any]) -> Assembly | None:
-    """Return the first of some mechanisms around one cam put together; None where that is left to the run of each."""
+def _with_columns(variants: Variants, paths: Sequence[str], spec: CamSpec, rows: Rows) -> CamSpec:
+    """Return a specification with the values of some variants at paths, as columns where they differ."""
+    values = {path: variants.values[path][rows].astype(np.float64) for path in paths}
+    return with_values(spec, {path: stack(column.tolist()) for path, column in values.items()})
+
+
+def _stack_specs(variants: Variants, rows: Rows) -> CamSpec:
+    """Return variants of one kind as one specification, with columns where numbers differ."""
+    specs: list[CamSpec] = [variants[row] for row in rows.tolist()]
+    names = ("mechanism", "analysis", "design")
+    return specs[0].model_copy(update={name: stack([getattr(spec, name) for spec in specs]) for name in names})
+
+
+def _kind(spec: CamSpec) -> str:
+    """Return what mechanisms side by side have in common beside the way that their computation takes."""
+    analysis = spec.analysis
+    settings = analysis.points, analysis.band, analysis.window, analysis.origin
+    return repr((settings, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
+
+
+def _in_parcels(members: Rows, spec_of: Callable[[Rows], CamSpec]) -> Iterator[Group]:
+    """Yield mechanisms that are solved together, few at a time."""
+    start = 0
+    while start < len(members):
+        points = spec_of(members[start : start + 1]).analysis.points
+        rows = members[start : start + max(1, MAX_SAMPLES_AT_ONCE // points)]
+        yield from _solve_alike(spec_of(rows), rows)
+        start += len(rows)
+
+
+def _solve_alike(spec: CamSpec, rows: Rows) -> Iterator[Group]:
+    """Yield mechanisms of one specification with columns; those whose computation takes another way apart."""
     try:
-        if plain.keys() >= set(moving):
-            first = int(members[0])
-            spec = with_values(variants.spec, {path: float(variants.values[path][first]) for path in moving})
-        else:
-            spec = variants[int(members[0])]
-        if _is_left_out(spec):
-            return None
         assembly = assemble(spec)
         check_first_pose(assembly)
-    except (CannotBuild, CfmError):
-        return None
-    low, end = reachable_travel(assembly)
-    return None if end <= low or shortfalls(assembly, end) else assembly
-
-
-def _with_others(assembly: Assembly, values: Mapping[str, Any]) -> Assembly:
-    """Return a mechanism with other springs, friction and weights, of which there may be columns."""
-    if not values:
-        return assembly
-    spec = with_values(assembly.spec, values)
-    mechanism = spec.mechanism
-    return replace(assembly, spec=spec, loads=loads_of(spec, mechanism.springs.total, mechanism.springs_rest))
-
-
-def _flags(assembly: Assembly) -> tuple[Hashable, ...]:
-    """Return what of the loads decides which formulas hold."""
-    loads = assembly.loads
-    weights = bool(loads.roller_weight), bool(loads.sideways[0]), loads.plain, loads.losses is None
-    return bool(assembly.spec.mechanism.rolling_friction), *weights
-
-
-def _kind(assembly: Assembly, are_plain: bool) -> Hashable | None:
-    """Return what mechanisms side by side have in common; None if they are not."""
-    kind, spec = assembly.track.kind, assembly.spec
-    if kind is None:
-        return None
-    analysis = spec.analysis
-    corner = assembly.track.corner_end - assembly.track.start > reachable_travel(assembly)[0]
-    settings = analysis.points, analysis.band, repr(analysis.window), analysis.origin, corner
-    blocks = () if are_plain else (repr([drop_numbers(one) for one in (spec.mechanism, analysis, spec.design)]),)
-    return kind, assembly.shortfall is None, settings, blocks
-
-
-def _group_around_one_cam(assembly: Assembly, members: Rows, beside: Mapping[str, NDArray[Any]]) -> Iterator[Group]:
-    """Yield mechanisms around one cam, few at a time."""
-    size = max(1, MAX_SAMPLES_AT_ONCE // assembly.spec.analysis.points)
-    which_act = [values > 0 for path, values in beside.items() if "friction" in path or "masses" in path]
-    for some in _alike(which_act, members):
-        for start in range(0, len(some), size):
-            chosen = some[start : start + size]
-            columns: dict[str, Any] = {
-                path: values[chosen].astype(np.float64)[:, None] for path, values in beside.items()
-            }
-            if len(chosen) == 1:
-                columns = {path: float(values[0, 0]) for path, values in columns.items()}
-            yield chosen, _solve_group(solve(_with_others(assembly, columns), len(chosen)), chosen)
-
-
-def _side_by_side(group: list[tuple[int, Assembly]], variants: Variants) -> Iterator[Group]:
-    """Yield mechanisms of one kind, each with a track of its own, few at a time."""
-    size = max(1, MAX_SAMPLES_AT_ONCE // group[0][1].spec.analysis.points)
-    for start in range(0, len(group), size):
-        rows, cams = zip(*group[start : start + size], strict=True)
-        chosen = np.array(rows)
-        if len(cams) == 1:
-            yield chosen, _solve_group(solve(cams[0]), chosen)
-            continue
-        yield chosen, _solve_group(solve(_columns(cams, variants, chosen), len(cams), cams), chosen)
-
-
-_WRITTEN_OUT = tuple(
-    f"mechanism.profile.{name}" for name in ("brace_length", "rest_half_width", "roller_radius", "preload", "stroke")
-)
-"""What `resolve` adds to a specification."""
-
-
-def _columns(cams: tuple[Assembly, ...], variants: Variants, chosen: Rows) -> Assembly:
-    """Return mechanisms side by side as one, whose numbers are columns."""
-    first = cams[0]
-    # what all have in common stays a plain number: among it are those that are no columns, as numbers of points
-    varied = {path: values[chosen] for path, values in variants.values.items() if values.dtype != object}
-    numbers = [path for path, values in varied.items() if (values != values[0]).any()]
-    columns = {path: variants.values[path][chosen].astype(np.float64)[:, None] for path in numbers}
-    columns |= {path: stack([one.spec.get_value(path) for one in cams]) for path in _WRITTEN_OUT}
-    track, profile = TrackRows([one.track for one in cams]), profiles_in_rows([one.profile for one in cams])
-    loads = stack([one.loads for one in cams])
-    return replace(first, spec=with_values(first.spec, columns), profile=profile, track=track, loads=loads)
+        low, end = reachable_travel(assembly)
+        if fails(end <= low) or shortfalls(assembly, end):
+            return
+        loads, track = assembly.loads, assembly.track
+        for value in (assembly.spec.mechanism.rolling_friction, loads.roller_weight, loads.sideways[0]):
+            agree(np.not_equal(value, 0.0))
+        agree(track.corner_end - track.start > low)
+        solution = solve(assembly, len(rows))
+    except RowsDiffer as kinds:
+        if kinds.mask.all():
+            for row, index in enumerate(rows.tolist()):
+                yield from _solve_alike(row_of(spec, row), np.array([index]))
+        else:
+            for some in (np.flatnonzero(kinds.mask), np.flatnonzero(~kinds.mask)):
+                part = row_of(spec, int(some[0])) if len(some) == 1 else rows_of(spec, some)
+                yield from _solve_alike(part, rows[some])
+        return
+    except CfmError:  # whoever analyses it alone says why
+        return
+    yield rows, _solve_group(solution, rows)
 
 
 def _solve_group(solution: Solution, chosen: Rows) -> SolvedRows[Solution]:

@@ -185,7 +185,7 @@ def _undercut(solution: Solution) -> tuple[str, ...]:
 def _undercut_in_short(solution: Solution) -> str:
     law = solution.assembly.track.profile.path.law
     what = "force not constant" if law.constant else "force not as cut"
-    return f"{what} over the first {mm(solution.corner_travel)}"
+    return f"{what} up to {mm(solution.corner_travel)}"
 
 
 def _corner_pressure(solution: Solution) -> tuple[str, ...]:

@@ -8,9 +8,7 @@ slack at the start and tighten later can be built: the force is zero until they 
 
 from __future__ import annotations
 
-from functools import lru_cache
-from math import cos, sin
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +16,7 @@ from cfmkit.families.cam.assembly import TRAVEL_RTOL, Assembly
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut_cam
 from cfmkit.families.cam.geometry.path import CAMS_KEPT, RollerPath, reached_path
-from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track, track_of
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.statics import STANDARD_GRAVITY, Loads, Losses
@@ -26,6 +24,7 @@ from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm
 from cfmkit.families.guide_friction import GuideFriction
 from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.families.rows import agree, fails, refuse_columns, remember_plain
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -38,16 +37,14 @@ def resolve(spec: CamSpec) -> CamSpec:
     """Return the spec with the cut profile written out: what was left to follow the mechanism is now fixed."""
     mechanism = spec.mechanism
     profile = mechanism.profile
-    stroke = profile.stroke or spec.analysis.travel or (spec.design.stroke if spec.design else None)
-    if stroke is None:
-        stroke = 0.5 * mechanism.brace_length
+    strokes = profile.stroke, spec.analysis.travel, spec.design.stroke if spec.design else None
+    stroke = next((value for value in strokes if value is not None), 0.5 * mechanism.brace_length)
+    preload = mechanism.effective_preload if profile.preload is None else profile.preload
     written = {
-        "brace_length": profile.brace_length or mechanism.brace_length,
-        "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
-        "roller_radius": profile.roller_radius or mechanism.roller_radius,
-        "preload": (mechanism.effective_preload if profile.preload is None else profile.preload) or None,
-        "stroke": stroke,
+        name: getattr(mechanism if getattr(profile, name) is None else profile, name)
+        for name in ("brace_length", "rest_half_width", "roller_radius")
     }
+    written |= {"preload": preload if np.any(preload) else None, "stroke": stroke}
     changes: dict[str, object] = {"profile": profile.model_copy(update=written)}
     if mechanism.left and mechanism.left.profile:
         changes["left"] = _resolved_left(mechanism, mechanism.left, stroke)
@@ -85,14 +82,11 @@ def left_side(spec: CamSpec) -> CamSpec:
 def slope_law(spec: CamSpec) -> SlopeLaw:
     """Return the slope law of a resolved spec's profile."""
     profile = spec.mechanism.profile
-    plain = SlopeLaw(
-        force_constant=profile.force_constant,
-        rest_half_width=float(profile.rest_half_width or 0.0),
-        brace_length=float(profile.brace_length or 0.0),
-        friction=profile.friction,
-        slope_factor=profile.slope_factor,
-        preload=0.5 * (profile.preload or 0.0),
-    )
+    x0, brace, preload = profile.rest_half_width, profile.brace_length, profile.preload
+    assert x0 is not None  # of a resolved spec
+    assert brace is not None
+    springs = 0.0 if preload is None else 0.5 * preload
+    plain = SlopeLaw(profile.force_constant, x0, brace, profile.friction, profile.slope_factor, springs)
     if profile.curve is None:
         return plain
     return with_curve(plain, profile.curve.shape, float(profile.stroke or 0.0))
@@ -125,13 +119,14 @@ def directions(mounting: Mounting | None) -> tuple[float, float, float]:
     """Return the shares of gravity against the slider's way out, to the right of it and out of the cam's plane."""
     if mounting is None:
         return 1.0, 0.0, 0.0
-    across = _exact(cos(mounting.elevation))
-    return _exact(sin(mounting.elevation)), across * _exact(cos(mounting.roll)), across * _exact(sin(mounting.roll))
+    elevation, roll = mounting.elevation, mounting.roll
+    across = _exact(np.cos(elevation))
+    return _exact(np.sin(elevation)), across * _exact(np.cos(roll)), across * _exact(np.sin(roll))
 
 
-def _exact(share: float) -> float:
+def _exact(share: Any) -> Any:
     """Return a share without the rounding that is left of a right angle."""
-    return 0.0 if abs(share) < 1e-15 else share
+    return np.where(np.abs(share) < 1e-15, 0.0, share)[()]
 
 
 def weights_of(mechanism: Mechanism) -> Weights:
@@ -146,7 +141,7 @@ def losses_of(mechanism: Mechanism) -> Losses | None:
     bearings, pins, guide = mechanism.bearings, mechanism.pins, GuideFriction.from_guide(mechanism.guide)
     bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
     pin = 0.5 * pins.diameter * pins.friction if pins else 0.0
-    if not bearing and not pin and not guide.there:
+    if not agree(np.not_equal(bearing, 0.0)) and not agree(np.not_equal(pin, 0.0)) and not guide.there:
         return None
     return Losses(
         rolling=mechanism.rolling_friction,
@@ -173,15 +168,20 @@ def assemble(spec: CamSpec) -> Assembly:
         If it cannot exist; the finding says why.
     """
     spec = resolve(spec)
-    mechanism, law = spec.mechanism, slope_law(spec)
-    stroke, radius = float(mechanism.profile.stroke or 0.0), float(mechanism.profile.roller_radius or 0.0)
-    missing = max(-mechanism.profile.offset, 0.0)
+    mechanism, law, method = spec.mechanism, slope_law(spec), spec.analysis.path_method
+    stroke, radius, offset = mechanism.profile.stroke, mechanism.profile.roller_radius, mechanism.profile.offset
+    assert stroke is not None  # of a resolved spec
+    assert radius is not None
+    lengths = stroke, radius, offset, mechanism.roller_radius, mechanism.brace_length, *law.numbers
+    if type(law) is not SlopeLaw or agree(law.friction != 0.0) or method == "ode":
+        refuse_columns(*lengths)  # the height of such a path is no formula
+    missing = np.maximum(-offset, 0.0)
     check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
-    path, end, reached = reached_path(law, stroke, spec.analysis.path_method)
+    path, end, reached = reached_path(law, stroke, method)
     shortfall = _shortfall(law, stroke, end, reached)
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
-    track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
+    track = _track(cut_profile(path, radius + missing, end) if agree(missing > 0.0) else profile, mechanism)
     loads = loads_of(spec, mechanism.springs.total, mechanism.springs_rest)
     return Assembly(spec, profile, track, loads, reached, shortfall)
 
@@ -222,8 +222,8 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
     CannotBuild
         If the braces do not reach, the rollers have no room, or the path does not rise.
     """
-    x0, shortest = law.rest_half_width, min(brace for _, brace in rollers)
-    if x0 >= shortest * (1 - 1e-6):
+    x0, shortest = law.rest_half_width, np.minimum(rollers[0][1], rollers[-1][1])
+    if fails(x0 >= shortest * (1 - 1e-6)):
         raise CannotBuild(
             finding(
                 "brace_too_short",
@@ -232,7 +232,7 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
             )
         )
     for radius, brace in rollers:
-        if radius >= brace:
+        if fails(radius >= brace):
             raise CannotBuild(
                 finding(
                     "rollers_collide",
@@ -240,8 +240,8 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
                     "use smaller rollers ('mechanism.roller_radius')",
                 )
             )
-    p = float(law.frictionless(x0))
-    if p + law.friction <= 0 or law.friction * p >= 1:
+    p = law.frictionless(x0)
+    if fails(np.logical_or(p + law.friction <= 0, law.friction * p >= 1)):
         raise CannotBuild(
             finding(
                 "design_singular",
@@ -253,7 +253,7 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
 
 def _shortfall(law: SlopeLaw, stroke: float, end: float, reached: float) -> Finding | None:
     """Return why the profile ends at x = `end` after `reached`, and not at `stroke` [m]; None if it does not."""
-    if reached >= stroke * (1 - TRAVEL_RTOL):
+    if not fails(reached < stroke * (1 - TRAVEL_RTOL)):
         return None
     ends = f"the stroke ends at {mm(reached)} of {mm(stroke)}"
     if turns_vertical(law, end):
@@ -287,7 +287,7 @@ def turns_vertical(law: SlopeLaw, end: float) -> bool:
     return law.vertical_at < law.brace_length and end >= law.vertical_at * (1 - TRAVEL_RTOL)
 
 
-@lru_cache(maxsize=CAMS_KEPT)
+@remember_plain(CAMS_KEPT)
 def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     """Return the flank for a roller along a path up to x = `end` [m].
 
@@ -320,7 +320,7 @@ def _check_bend(profile: CamProfile) -> None:
     if isinstance(law, CurveSlopeLaw):
         check_bends(law, profile)
         return
-    if law.slope_factor >= 1.0:
+    if not fails(law.slope_factor < 1.0):
         return
     place, radius = law.tightest(profile.end, profile.start)
     if radius < profile.roller_radius and place > profile.start:
@@ -336,7 +336,8 @@ def _check_bend(profile: CamProfile) -> None:
 
 def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
     try:
-        return Track(profile, mechanism.roller_radius, mechanism.brace_length, max(mechanism.profile.offset, 0.0))
+        offset = np.maximum(mechanism.profile.offset, 0.0)
+        return track_of(profile, mechanism.roller_radius, mechanism.brace_length, offset)
     except NoTrack as problem:
         brace = mechanism.brace_length
         if problem.reason == "brace":
@@ -370,7 +371,7 @@ def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
 
 def cam_start_height(profile: CamProfile) -> float:
     """Return the height of the flank's first point, before trimming, above the path's start [m]."""
-    return float(profile.flank(profile.path.law.rest_half_width)[1])
+    return profile.flank(profile.path.law.rest_half_width)[1]
 
 
 def room_between(x: tuple[FloatArray, FloatArray], y: tuple[FloatArray, FloatArray], radii: float) -> FloatArray:
@@ -414,8 +415,8 @@ def flanks_crossing(profile: CamProfile, offset: float = 0.0) -> Finding | None:
     offset : float
         Material left on it beyond the profile [m].
     """
-    x = float(profile.offset_points(profile.start, offset - profile.roller_radius)[0])
-    return None if x > 0 else flanks_cross(x)
+    x = profile.offset_points(profile.start, offset - profile.roller_radius)[0]
+    return flanks_cross(x) if fails(x <= 0) else None
 
 
 def check_first_pose(assembly: Assembly) -> None:
@@ -429,9 +430,10 @@ def check_first_pose(assembly: Assembly) -> None:
         The finding says what is in the way.
     """
     track, mechanism = assembly.track, assembly.spec.mechanism
-    if crossing := flanks_crossing(track.profile, max(mechanism.profile.offset, 0.0)):
+    if crossing := flanks_crossing(track.profile, np.maximum(mechanism.profile.offset, 0.0)):
         raise CannotBuild(crossing)
-    if (gap := 2.0 * (track.first_x - mechanism.roller_radius)) < -1e-12 * mechanism.brace_length:
+    gap = 2.0 * (track.first_x - mechanism.roller_radius)
+    if fails(gap < -1e-12 * mechanism.brace_length):
         raise CannotBuild(rollers_overlap(gap))
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from cfmkit.families.cam.solution import DenseLoop, Solution
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import findings_of_one, stack, values_of_one
+from cfmkit.families.rows import fails, findings_of_one, values_of_one
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import parts_tables
 
@@ -162,7 +162,7 @@ def _hardware_parts(solution: Solution) -> tuple[ListedPart, ...]:
     return tuple(hardware(solution).parts)
 
 
-def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -> Solution:
+def solve(assembly: Assembly, count: int = 1) -> Solution:
     """Return states and forces over the travel that the analysis asks for, as far as the track goes.
 
     Parameters
@@ -171,8 +171,6 @@ def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -
         One mechanism; or several whose numbers are columns.
     count : int
         Number of mechanisms.
-    cams : tuple of Assembly
-        Of mechanisms that have a track each, which go through all of their travel.
 
     Raises
     ------
@@ -180,38 +178,39 @@ def solve(assembly: Assembly, count: int = 1, cams: tuple[Assembly, ...] = ()) -
         If a stop leaves no travel.
     """
     spec, track, loads = assembly.spec, assembly.track, assembly.loads
-    low, end = np.array([reachable_travel(one) for one in cams]).T if cams else reachable_travel(assembly)
-    if not cams and end <= low:
+    low, end = reachable_travel(assembly)
+    if fails(end <= low):
         raise CannotBuild(
             finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
         )
     travel = np.linspace(low, end, spec.analysis.points, axis=-1)
+    travel = travel if travel.ndim == 1 else travel[:, 0]
     states, friction = track.states(track.start + travel), spec.mechanism.rolling_friction
     up = forces(states, loads, friction)
     down = forces(states, loads, -friction, -1.0) if np.any(friction) or loads.losses else up
-    origin = stack([displacement_origin(one) for one in cams or (assembly,)])
-    return Solution(assembly, travel, states, up, down, origin, count=count, cams=cams)
+    return Solution(assembly, travel, states, up, down, displacement_origin(assembly), count=count)
 
 
-def reachable_travel(assembly: Assembly) -> tuple[float, float]:
+def reachable_travel(assembly: Assembly) -> tuple[Any, Any]:
     """Return where the travel begins, and as far as it goes: to what is asked, the end of the track, or a stop [m]."""
     spec, track = assembly.spec, assembly.track
     available = track.end - track.start
     low, high = travel_between_stops(spec)
-    return low, min(spec.analysis.travel or available, available, high)
+    asked = available if spec.analysis.travel is None else spec.analysis.travel
+    return low, np.minimum(np.minimum(asked, available), high)
 
 
-def travel_between_stops(spec: CamSpec) -> tuple[float, float]:
+def travel_between_stops(spec: CamSpec) -> tuple[Any, Any]:
     """Return between which travels the stops let the slider move [m]."""
     stops = spec.mechanism.stops
     return (0.0, np.inf) if stops is None else (stops.lower, np.inf if stops.upper is None else stops.upper)
 
 
-def shortfalls(assembly: Assembly, reached: float) -> tuple[Finding, ...]:
+def shortfalls(assembly: Assembly, reached: Any) -> tuple[Finding, ...]:
     """Return why the curve ends, at a travel [m], before what was requested, or before the flank does."""
     found = [assembly.shortfall] if assembly.shortfall else []
     asked = assembly.spec.analysis.travel
-    short = asked is not None and reached < asked * (1 - TRAVEL_RTOL)
+    short = asked is not None and fails(reached < asked * (1 - TRAVEL_RTOL))
     if asked is not None and short and travel_between_stops(assembly.spec)[1] <= reached * (1 + TRAVEL_RTOL):
         found.append(
             finding(

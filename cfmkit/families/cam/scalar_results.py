@@ -15,7 +15,7 @@ from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.statics import Losses, normal_turn
 from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
-from cfmkit.families.rows import ScalarQuantity
+from cfmkit.families.rows import ScalarQuantity, row_of
 from cfmkit.results import Quantity
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import window_places
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.assembly import Assembly
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.solution import Solution
     from cfmkit.families.cam.solution_of_measured_cam import Built
     from cfmkit.families.cam.springs_spec import Springs
@@ -170,15 +171,15 @@ SCALAR_DEFINITIONS = {
 } | BUILT_DEFINITIONS
 
 
-def largest_roller(assembly: Assembly) -> float:
+def largest_roller(cam: CamProfile) -> float:
     """Return the smallest radius of curvature of the roller path [m]; infinite if no roller is too large for it."""
-    return assembly.profile.path.law.tightest(assembly.profile.end)[1]
+    return cam.path.law.tightest(cam.end)[1]
 
 
-def smallest_constant(assembly: Assembly) -> float:
+def smallest_constant(cam: CamProfile) -> float:
     """Return the smallest force constant whose path the roller can follow [m]; NaN without one, and of curves."""
-    law = assembly.profile.path.law
-    found = law.smallest_force_constant(assembly.profile.roller_radius) if law.constant else None
+    law = cam.path.law
+    found = law.smallest_force_constant(cam.roller_radius) if law.constant else None
     return np.nan if found is None else found
 
 
@@ -292,7 +293,7 @@ def _springs_in_use(solution: Solution) -> list[SpringInUse]:
         np.ravel(springs.initial_tension * (end >= 0.0) + springs.stiffest * np.maximum(end, 0.0)).tolist()
         for end in (ends.min(axis=-1, keepdims=True), ends.max(axis=-1, keepdims=True))
     )
-    stated = [one.spec.mechanism.springs for one in solution.cams] or [springs] * len(least)
+    stated = [row_of(springs, row) for row in range(len(solution))]
     least, most = (np.broadcast_to(one, len(stated)).tolist() for one in (least, most))
     return [_in_use(*each) for each in zip(stated, least, most, strict=True)]
 

@@ -14,11 +14,13 @@ import numpy as np
 from cfmkit.arrays import Several, ShortRepr
 from cfmkit.families.cam.assembly import TRAVEL_RTOL, constant_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
+from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
+from cfmkit.families.cam.geometry.path import RollerPath
 from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackRows, TrackStates
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.largest_next_to_samples import extreme_next_to, largest_of_each
 from cfmkit.families.cam.statics import Forces, forces, jams
-from cfmkit.families.rows import rows_of
+from cfmkit.families.rows import is_column, row_of, rows_of
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.results import ROUND_OFF
 from cfmkit.specs.units import window_places
@@ -85,7 +87,6 @@ class Solution(ShortRepr):
     origin: float  # what is added to the travel to give the displacement [m]
     band: ForceBand | None = None  # forces of cams that are cut with errors
     count: int = 1  # number of mechanisms
-    cams: tuple[Assembly, ...] = ()  # of m mechanisms each with a cam, or a track on it, of its own; else none
 
     def __len__(self) -> int:
         """Return the number of mechanisms."""
@@ -96,9 +97,13 @@ class Solution(ShortRepr):
         """Block `mechanism` of the specification."""
         return self.assembly.spec.mechanism
 
-    def of_each_cam(self, read: Callable[[Assembly], float]) -> FloatArray:
+    def of_each_cam(self, read: Callable[[CamProfile], float]) -> FloatArray:
         """Return a number of each different cam, (m, 1), or (1, 1) where all are alike."""
-        return np.array([[read(cam)] for cam in self.cams or (self.assembly,)])
+        cam = self.assembly.profile
+        if not isinstance(self.assembly.track, TrackRows):
+            return np.array([[read(cam)]])
+        parts = [row_of((cam.path.law, cam.roller_radius, cam.end), row) for row in range(self.count)]
+        return np.array([[read(CamProfile(RollerPath(law, end), radius, end))] for law, radius, end in parts])
 
     def column(self, value: Any) -> FloatArray:
         """Return a number of each mechanism, (m,)."""
@@ -197,7 +202,7 @@ class Solution(ShortRepr):
             rows, track, parts = np.flatnonzero(some), self.assembly.track, (friction, states, losses)
             if not len(rows):
                 continue
-            if losses is None and not np.ndim(friction) and not isinstance(track, TrackRows):
+            if losses is None and not is_column(friction, self.travel[..., 0]) and not isinstance(track, TrackRows):
                 # springs and weights do not change leverage
                 (jam,) = jams(track, friction, states)
                 clipped = [_clip_intervals(jam, float(total[0]))] * len(rows)

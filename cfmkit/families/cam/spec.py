@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
@@ -254,8 +255,9 @@ class Mechanism(Model):
     def preload(self) -> float:
         """Elongation of the springs at the start [m]."""
         if self.springs.rest_length is not None:
-            return max(2.0 * self.rest_half_width - self.springs.rest_length, 0.0)
-        return self.springs.preload or 0.0
+            stretched: float = np.maximum(2.0 * self.rest_half_width - self.springs.rest_length, 0.0)
+            return stretched
+        return 0.0 if self.springs.preload is None else self.springs.preload
 
     @property
     def effective_preload(self) -> float:

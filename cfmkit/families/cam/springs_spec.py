@@ -95,7 +95,7 @@ class Springs(Model):
         """Elongation at which springs without initial tension would pull as hard as these when they open [m]."""
         if not np.any(self.initial_tension):
             return 0.0
-        count = len(self.each) if isinstance(self.each, tuple) else self.count or 1
+        count = len(self.each) if isinstance(self.each, tuple) else 1 if self.count is None else self.count
         return count * self.initial_tension / self.total
 
     def scaled_to(self, total: float) -> Springs:

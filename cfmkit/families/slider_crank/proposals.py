@@ -76,8 +76,9 @@ PROBABLY_TOO_WIDE = 1.3
 FLEXURES_WIDER = 8.0
 """About how much wider than a strip flexures of a tenth of its free length have to be."""
 
-N_STRIP_NODES = 5
-"""Thicknesses of a tapered strip: more of them take longer and are hardly flatter."""
+N_STRIP_NODES = 9
+"""Thicknesses of a tapered strip: over nearly all of the reach five vary by 2.4 %, nine by 1.7 % in a third more time,
+13 by 1.0 % in four times as much."""
 
 SLOW_PROMISE = 10.0
 """Promise of what takes seconds to design, where everything else takes a part of one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -127,9 +128,7 @@ def _interpolate(
 
 def _interpolate_at_root(near: list[_Sample], values: Any) -> Any:
     """Return Lagrange's interpolation of values at samples to where their function vanishes."""
-    weights = [
-        float(np.prod([other.value / (other.value - own.value) for other in near if other is not own])) for own in near
-    ]
+    weights = [math.prod(other.value / (other.value - own.value) for other in near if other is not own) for own in near]
     return np.array(weights) @ np.asarray(values)
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Relaxed = tuple[Request, str]
     Relaxation = Callable[[Request, float], Relaxed | None]
 
-RELAXATION_FACTORS = (1.0, 1.15, 1.5, 2.5, 6.0, 20.0)
+RELAXATION_FACTORS = (1.15, 2.2, 6.0, 20.0)
 """Factors at which a request is relaxed for a family; one that is farther off is not near."""
 
 N_HALVINGS = 3
@@ -52,9 +52,14 @@ class Edge:
 
 
 def edges(request: Request, names: Sequence[str], seed: int, clock: Clock) -> Iterator[Edge]:
-    """Yield for which keys of a request families have candidates, roughly those first that are relaxed least."""
+    """Yield for which keys of a request families have candidates, roughly those first that are relaxed least.
+
+    Families that have candidates already, of which none is good, come first: a little more of any key may be enough.
+    """
     relaxations = _relaxations(request)
-    left = [(name, key) for name in names for key in relaxations]
+    near = [name for name in names if not clock.late() and _offer(request, name, seed)]
+    yield from (Edge(name, key, 1.0) for name in near for key in relaxations)
+    left = [(name, key) for name in names if name not in near for key in relaxations]
     below = 1.0
     for factor in RELAXATION_FACTORS:
         for name, key in tuple(left):
@@ -75,7 +80,7 @@ def _offers(request: Request, name: str, relaxation: Relaxation, factor: float, 
 def _bisect(request: Request, name: str, relaxation: Relaxation, ends: tuple[float, float], seed: int) -> float:
     """Return nearly the smallest factor between two with which a family has candidates; with the second it has some."""
     below, factor = ends
-    for _ in range(N_HALVINGS if factor > below else 0):
+    for _ in range(N_HALVINGS):
         middle = (below * factor) ** 0.5
         has_some = _offers(request, name, relaxation, middle, seed)
         below, factor = (below, middle) if has_some else (middle, factor)

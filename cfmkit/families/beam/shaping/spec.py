@@ -165,3 +165,5 @@ def _contact_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tu
     for name, obstacle in mechanism.obstacles.items():
         if sides_of(mechanism, obstacle):
             yield (), f"shapes are searched with pads on obstacles only: state 'nodes' alone of 'obstacles.{name}'"
+    if mechanism.contacts:
+        yield (), "shapes are searched with pads on obstacles only: leave out 'mechanism.contacts'"

@@ -15,14 +15,16 @@ or whose force follows a curve may be curved more elsewhere: `mechanism_from_spe
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.numerics.roots import bracketed_root
+import numpy as np
+
+from cfmkit.families.rows import root_between
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
     from cfmkit.families.cam.geometry.path import RollerPath
     from cfmkit.families.cam.geometry.slope_law import Real
@@ -99,15 +101,15 @@ def cut_cam(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
 
     def clear_of_start(x: float) -> float:
         cx, cy = profile.flank(x)
-        return math.hypot(cx - x0, cy) - roller_radius
+        return np.hypot(cx - x0, cy) - roller_radius
 
     contact = _crossing(clear_of_start, cusp, end)
     cx, cy = profile.flank(contact)
-    return CamProfile(path, roller_radius, end, CamCorner((float(cx), float(cy)), contact, cusp))
+    return CamProfile(path, roller_radius, end, CamCorner((cx, cy), contact, cusp))
 
 
-def _crossing(function: Callable[[float], float], low: float, high: float) -> float:
+def _crossing(function: Callable[[Any], Any], low: Any, high: Any) -> Any:
     try:
-        return bracketed_root(function, low, high)
+        return root_between(function, low, high)
     except ValueError:
         raise WholeCamUndercut from None

@@ -16,13 +16,13 @@ Reference
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent, drop
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
+from cfmkit.families.rows import agree, fails, refuse_columns, remember_plain, root_between
 from cfmkit.numerics.quadrature import RunningIntegral
 from cfmkit.numerics.roots import bracketed_root
 
@@ -186,25 +186,26 @@ def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[
         (the brace turns horizontal, the path vertical, or the slider stops rising first),
         `end` is short of it: compare ``path.travel(end)``.
     """
-    x0, ideal = law.rest_half_width, float(ideal_position(law, travel))
-    if not law.friction and law.slope_factor == 1:
-        end = min(ideal, _farthest(law))
+    x0, ideal = law.rest_half_width, ideal_position(law, travel)
+    if law.is_ideal:
+        end = np.minimum(ideal, _farthest(law))
         return RollerPath(law, end, method), end
     high = x0 + 1.02 * (ideal - x0)
-    if high > 0.99 * law.brace_length or law.friction * law.frictionless(high) > 0.9 or law.slope_factor < 1:
-        high = min(high, _farthest(law))
+    nearly_level = agree(high > 0.99 * law.brace_length) or agree(law.slope_factor < 1)
+    if nearly_level or agree(law.friction * law.frictionless(high) > 0.9):
+        high = np.minimum(high, _farthest(law))
     path = RollerPath(law, high)
-    if float(path.travel(high)) < travel:
+    if fails(path.travel(high) < travel):
         path, high = _farther(path, travel)
     end = _position(path, travel, (x0, high), x0 + 0.97 * (ideal - x0))
     return (path if method == "quadrature" else RollerPath(law, end, method)), end
 
 
-@lru_cache(maxsize=CAMS_KEPT)
+@remember_plain(CAMS_KEPT)
 def reached_path(law: SlopeLaw, travel: float, method: Method) -> tuple[RollerPath, float, float]:
     """Return `reach`, and how far the slider comes to its end [m]."""
     path, end = reach(law, travel, method)
-    return path, end, float(path.travel(end))
+    return path, end, path.travel(end)
 
 
 def _farther(path: RollerPath, travel: float) -> tuple[RollerPath, float]:
@@ -221,20 +222,23 @@ def _position(path: RollerPath, travel: float, bracket: tuple[float, float], bel
     """Return x at a travel [m], or the bracket's end if that is short of it; `below` is a guess on the low side."""
     low, high = bracket
 
-    def excess(x: float) -> float:
-        return float(path.travel(x)) - travel
+    def excess(x: Any) -> Any:
+        return path.travel(x) - travel
 
-    if excess(high) <= 0:
+    if agree(excess(high) <= 0):
         return high
-    return bracketed_root(excess, below if below < high and excess(below) < 0 else low, high)
+    low = below if agree(below < high) and agree(excess(below) < 0) else low
+    return root_between(excess, low, high)
 
 
 def _farthest(law: SlopeLaw) -> float:
     """Return the x at which the path must end at the latest: vertical, at the brace's reach, or falling [m]."""
     x0 = law.rest_half_width
-    limit = max(law.vertical_at - max(1e-9 * (law.vertical_at - x0), 4e-15 * law.vertical_at), x0)
+    room = np.maximum(1e-9 * (law.vertical_at - x0), 4e-15 * law.vertical_at)
+    limit: Any = np.maximum(law.vertical_at - room, x0)
     if law.always_rises:
         return limit
+    refuse_columns(*law.numbers)
     # Cut for the way down, or with weights that help, the slider falls at first (friction or the weights exceed the
     # springs) and again near x = l.
     x = law.brace_length * np.sin(

@@ -11,7 +11,6 @@ A `Track` finds its ends when it is made; its formulas take numbers, or columns:
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -21,17 +20,16 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 from cfmkit.families.cam.geometry.path import RollerPath, ideal_position
-from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw, brace_tangent
-from cfmkit.families.rows import rows_of, stack
+from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent
+from cfmkit.families.rows import agree, fails, is_column, root_between, rows_of
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.flank_from_roller_path import CamCorner
 
 
 Reason = Literal["brace", "crossed", "dead"]
@@ -147,49 +145,49 @@ class Track:
         self.radius = roller_radius + offset
         self.shift = self.radius - profile.roller_radius
         self._corner_point = profile.corner.point if profile.corner else (0.0, 0.0)
-        x_first = float(profile.offset_points(profile.start, self.shift)[0])
+        x_first = profile.offset_points(profile.start, self.shift)[0]
         self._pivots = self._pivot_range()
-        begins = self._corner_point[0] + self.radius * math.sin(self._pivots[0]) if profile.corner else x_first
-        if min(x_first, begins) <= 0:
+        begins = self._corner_point[0] + self.radius * np.sin(self._pivots[0]) if profile.corner else x_first
+        if fails(np.minimum(x_first, begins) <= 0):
             raise NoTrack("crossed", begins)
-        if max(x_first, begins) >= brace_length * (1 - 1e-6):
+        if fails(np.maximum(x_first, begins) >= brace_length * (1 - 1e-6)):
             raise NoTrack("brace", max(x_first, begins))
         law, self._begins = profile.path.law, begins
-        self._is_shifted = bool(self.shift)
-        self._follows_law = not self.shift and brace_length == law.brace_length
-        self._is_ideal = self._follows_law and not law.friction and law.slope_factor == 1
+        self._is_shifted = agree(np.not_equal(self.shift, 0.0))
+        self._follows_law = not self._is_shifted and agree(np.equal(brace_length, law.brace_length))
+        self._is_ideal = self._follows_law and law.is_ideal
         self._limits(x_first)
 
-    def _pivot_range(self) -> tuple[float, float]:
+    def _pivot_range(self) -> tuple[Any, Any]:
         """Return the angles of the contact normal between which the roller turns about the corner [rad]."""
         xc, yc = self._corner_point
         law = self.profile.path.law
-        return math.atan2(law.rest_half_width - xc, yc), math.atan(law.slope(self.profile.start))
+        return np.arctan2(law.rest_half_width - xc, yc), np.arctan(law.slope(self.profile.start))
 
-    def _limits(self, x_first: float) -> None:
+    def _limits(self, x_first: Any) -> None:
         """Set the slider positions at which pieces begin and end."""
         pivots = self.profile.corner is not None
         at_corner, rate = self._evaluate_corner(self._pivots[0]) if pivots else self._evaluate_flank(self.profile.start)
-        self.start = self.dead_point = float(at_corner)
-        if pivots and self._evaluate_corner(self._pivots[1])[1] > 0:
+        self.start = self.dead_point = at_corner
+        if pivots and agree(self._evaluate_corner(self._pivots[1])[1] > 0):
             self.flank_range, self.turns_back = self._rising(skip=False)
-            self.corner_end = float(self._evaluate_flank(self.flank_range[0])[0])
-            self.dead_point = float(at_corner) if rate >= 0 else self._collinear()
+            self.corner_end = self._evaluate_flank(self.flank_range[0])[0]
+            self.dead_point = at_corner if agree(rate >= 0) else self._collinear()
         else:
             self.flank_range, self.turns_back = self._rising(skip=True)
-            low = float(self._evaluate_flank(self.flank_range[0])[0])
-            self.dead_point, self.corner_end = min(low, self.start), self.start
-        self.end = float(self._evaluate_flank(self.flank_range[1])[0])
-        if self.end - self.start <= 1e-11 * self.brace_length:
+            low = self._evaluate_flank(self.flank_range[0])[0]
+            self.dead_point, self.corner_end = low if agree(low < self.start) else self.start, self.start
+        self.end = self._evaluate_flank(self.flank_range[1])[0]
+        if fails(self.end - self.start <= 1e-11 * self.brace_length):
             raise NoTrack("dead", x_first)
 
-    def _collinear(self) -> float:
+    def _collinear(self) -> Any:
         """Return the slider position at which brace and roller are in line over the corner [m]."""
         xc, yc = self._corner_point
         across = self.brace_length - self.radius
-        return float(yc + ((across - xc) * (across + xc)) ** 0.5)
+        return yc + ((across - xc) * (across + xc)) ** 0.5
 
-    def _rising(self, skip: bool) -> tuple[tuple[float, float], bool]:
+    def _rising(self, skip: bool) -> tuple[tuple[Any, Any], bool]:
         """Return the path coordinates between which the slider rises on the flank, and whether it falls beyond.
 
         With `skip`, a part at the beginning on which it falls is left out.
@@ -197,25 +195,34 @@ class Track:
         low, high = self.profile.start, self._brace_limit()
         if self._follows_law and self.profile.path.law.always_rises:
             return (low, high), False
-        knots = np.linspace(low, high, N_KNOTS)
+        knots = low + (high - low) * np.linspace(0.0, 1.0, N_KNOTS)
         rising = self._evaluate_flank(knots)[1] > 0
-        rising[0] |= not skip or self._evaluate_flank(low)[1] >= -1e-12
-        if not rising.any():
+        rising[..., :1] |= not skip or self._evaluate_flank(low)[1] >= -1e-12
+        if fails(~rising.any(axis=-1)):
             raise NoTrack("dead", low)
-        first = int(np.argmax(rising))
-        falls = first + int(np.argmin(rising[first:])) if not rising[first:].all() else 0
-        rate = lambda u: float(self._evaluate_flank(u)[1])  # noqa: E731
-        begin = bracketed_root(rate, float(knots[first - 1]), float(knots[first])) if first else low
-        return (begin, bracketed_root(rate, float(knots[falls - 1]), float(knots[falls])) if falls else high), falls > 0
+        first = np.argmax(rising, axis=-1)[..., None]
+        fallen = ~rising & (np.arange(N_KNOTS) > first)
+        falls = np.argmax(fallen, axis=-1)[..., None]
+        knots = np.broadcast_to(knots, rising.shape)
+        begins, turns_back = agree(_flat(first) > 0), agree(_flat(falls) > 0)
 
-    def _brace_limit(self) -> float:
+        def rate(u: Any) -> Any:
+            return self._evaluate_flank(u)[1]
+
+        def turn(knot: Any) -> Any:
+            before, after = (np.take_along_axis(knots, at, axis=-1) for at in (knot - 1, knot))
+            return root_between(rate, _flat(before), _flat(after))
+
+        return (turn(first) if begins else low, turn(falls) if turns_back else high), turns_back
+
+    def _brace_limit(self) -> Any:
         """Return the largest path coordinate at which the brace still reaches the axis [m]."""
         low, high = self.profile.start, self.profile.end
 
-        def margin(u: float) -> float:
-            return self.brace_length * (1 - 1e-12) - float(self.profile.offset_points(u, self.shift)[0])
+        def margin(u: Any) -> Any:
+            return self.brace_length * (1 - 1e-12) - self.profile.offset_points(u, self.shift)[0]
 
-        return high if margin(high) >= 0 else bracketed_root(margin, low, high)
+        return high if agree(margin(high) >= 0) else root_between(margin, low, high)
 
     def _slider(self, x: Real, y: Real | float) -> Real:
         return y + ((self.brace_length - x) * (self.brace_length + x)) ** 0.5
@@ -266,24 +273,15 @@ class Track:
         return TrackStates(xc + radius * sin, yc - radius * cos, sin / cos, bend, always, contact)
 
     @property
-    def kind(self) -> tuple[Any, ...] | None:
-        """Common kind of tracks side by side; None if the path's height is no formula."""
-        law, begins = self.profile.path.law, (self.corner_end > self.start, self.start > self.dead_point)
-        if type(law) is not SlopeLaw or law.friction or self.profile.path.method != "quadrature":
-            return None
-        cut = self.profile.corner is not None, self._is_shifted, self._follows_law, law.slope_factor == 1
-        return *begins, *cut, law.always_rises, self.turns_back
-
-    @property
     def pivot(self) -> Pivot:
         """The triangle that a brace and the corner make."""
         return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
 
     @property
-    def first_x(self) -> float:
+    def first_x(self) -> Any:
         """The x of the roller's centre at the start of the track [m]."""
-        if self.dead_point < self.start:  # the track begins where the slider is back at its start
-            return float(self.states(np.array([self.start])).x[0])
+        if agree(self.dead_point < self.start):  # the track begins where the slider is back at its start
+            return _flat(self.states(np.atleast_1d(self.start)).x)
         return self._begins
 
     def of_rows(self, _rows: Any) -> Track:
@@ -292,13 +290,14 @@ class Track:
 
     def stretches(self) -> Iterator[TrackStretch]:
         """Yield the parts of the track on which the slider rises, in order, from `start` on."""
-        passed = self.start - self.dead_point
-        if self.corner_end > self.start:
-            low = float(np.arctan(self._corner_states(np.array([self.start])).slope[0])) if passed else self._pivots[0]
+        passed, start = agree(self.start > self.dead_point), np.atleast_1d(self.start)
+        on_corner = agree(self.corner_end > self.start)
+        if on_corner:
+            low = _flat(np.arctan(self._corner_states(start).slope)) if passed else self._pivots[0]
             yield TrackStretch(True, low, self._pivots[1], self._corner_piece)
         low, high = self.flank_range
-        if passed and self.corner_end <= self.start:
-            low = float(self._flank_parameter(np.array([self.start]))[0])
+        if passed and not on_corner:
+            low = _flat(self._flank_parameter(start))
         yield TrackStretch(False, low, high, self._flank_piece)
 
     def slider_at(self, x: float) -> float:
@@ -356,6 +355,26 @@ class Track:
         return zero, root, knots - ideal_position(self.profile.path.law, root * root)
 
 
+def track_of(profile: CamProfile, roller_radius: Any, brace_length: Any, offset: Any = 0.0) -> Track:
+    """Return the track of one mechanism, or, where a number is a column (m, 1), tracks side by side.
+
+    Raises
+    ------
+    NoTrack
+        If the roller cannot run on the cam.
+    RowsDiffer
+        If that is so of some rows, or if they take different ways.
+    """
+    lengths = roller_radius, brace_length, offset, profile.roller_radius, profile.end
+    several = is_column(*lengths, *profile.path.law.numbers)
+    return (TrackRows if several else Track)(profile, roller_radius, brace_length, offset)
+
+
+def _flat(values: NDArray[Any]) -> Any:
+    """Return a column as it is, the one value of an array (1,) as a number."""
+    return values if values.ndim > 1 else values[0].item()
+
+
 def _join_states(on_corner: NDArray[np.bool_], corner: TrackStates, flank: TrackStates) -> TrackStates:
     """Return states of which some are on the corner; those on the flank are given where the others are not, or all."""
     found = []
@@ -367,49 +386,16 @@ def _join_states(on_corner: NDArray[np.bool_], corner: TrackStates, flank: Track
     return TrackStates(*found)
 
 
-_NUMBER_FIELDS = (
-    "brace_length",
-    "radius",
-    "shift",
-    "start",
-    "dead_point",
-    "corner_end",
-    "end",
-    "flank_range",
-    "_pivots",
-)
-
-
 class TrackRows(Track):
-    """Tracks of one kind side by side: numbers that differ are columns (m, 1), slider positions are (m, n).
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-        At least two, of equal `kind`.
-    """
-
-    def __init__(self, tracks: Sequence[Track]) -> None:
-        """Set the numbers of all side by side."""
-        first, profiles = tracks[0], [track.profile for track in tracks]
-        numbers = {name: stack([getattr(track, name) for track in tracks]) for name in _NUMBER_FIELDS}
-        alike = {name: getattr(first, name) for name in ("_is_shifted", "_follows_law", "_is_ideal", "turns_back")}
-        stretches = zip(
-            *([(one.on_corner, one.low, one.high) for one in track.stretches()] for track in tracks), strict=True
-        )
-        parts = tuple(stack(list(part)) for part in stretches)
-        self._set(profiles_in_rows(profiles), numbers | alike | {"_parts": parts})
-
-    def _set(self, profile: CamProfile, numbers: Mapping[str, Any]) -> None:
-        self.profile, self._corner_point = profile, profile.corner.point if profile.corner else (0.0, 0.0)
-        vars(self).update(numbers)
+    """Tracks of one kind side by side: numbers that differ are columns (m, 1), slider positions are (m, n)."""
 
     def of_rows(self, rows: Any) -> TrackRows:
         """Return some of the tracks."""
-        found, own = object.__new__(TrackRows), dict(vars(self))
-        profile = own.pop("profile")
-        parts = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
-        found._set(_profile(*parts), {name: rows_of(value, rows) for name, value in own.items()})
+        found, own, profile = object.__new__(TrackRows), dict(vars(self)), self.profile
+        del own["profile"]
+        law, radius, end, corner = rows_of((profile.path.law, profile.roller_radius, profile.end, profile.corner), rows)
+        found.profile = CamProfile(RollerPath(law, end), radius, end, corner)
+        vars(found).update({name: rows_of(value, rows) for name, value in own.items()})
         return found
 
     def states(self, slider: FloatArray) -> TrackStates:
@@ -420,22 +406,8 @@ class TrackRows(Track):
         few = self.of_rows(np.nonzero(on_corner)[0])._corner_states(slider[on_corner][:, None])
         return _join_states(on_corner, few, self._flank_states(np.maximum(slider, self.corner_end)))
 
-    def stretches(self) -> Iterator[TrackStretch]:
-        """Yield the parts of the tracks on which the slider rises; their ends are columns."""
-        for on_corner, low, high in vars(self)["_parts"]:
-            yield TrackStretch(on_corner, low, high, self._corner_piece if on_corner else self._flank_piece)
-
     @staticmethod
     def _interpolate(at: FloatArray, places: FloatArray, values: FloatArray) -> FloatArray:
         if places.ndim == 1:  # what differs in these tracks does not move them
             return np.interp(at, places, values)
         return np.stack([np.interp(*row) for row in zip(at, places, values, strict=True)])
-
-
-def profiles_in_rows(profiles: Sequence[CamProfile]) -> CamProfile:
-    """Return cut cams of one kind side by side, as one whose numbers are columns (m, 1)."""
-    return _profile(*stack([(one.path.law, one.roller_radius, one.end, one.corner) for one in profiles]))
-
-
-def _profile(law: Any, radius: Any, end: Any, corner: CamCorner | None) -> CamProfile:
-    return CamProfile(RollerPath(law, end), radius, end, corner)

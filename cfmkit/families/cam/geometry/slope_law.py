@@ -30,6 +30,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cfmkit.arrays import FloatArray
+from cfmkit.families.rows import agree
 from cfmkit.numerics.roots import bracketed_root
 
 Real = TypeVar("Real", float, FloatArray)
@@ -80,7 +81,18 @@ class SlopeLaw:
     @property
     def always_rises(self) -> bool:
         """Whether the slider rises all along the path, with the brace that it is cut for."""
-        return self.friction >= 0.0 and self.slope_factor >= 1.0
+        return agree(self.friction >= 0.0) and agree(self.slope_factor >= 1.0)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Its parameters, of which some may be columns."""
+        sizes = self.force_constant, self.rest_half_width, self.brace_length
+        return *sizes, self.friction, self.slope_factor, self.preload
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether it carries no weight, and is cut for no friction."""
+        return agree(self.friction == 0.0) and agree(self.slope_factor == 1.0)
 
     def position(self, travel: Real) -> Real:
         """Return x after a slider travel [m]: exact without friction and weight, s = (D^2 - d0^2)/2A, else near it."""
@@ -89,7 +101,7 @@ class SlopeLaw:
 
     def undercuts(self, roller_radius: float) -> bool:
         """Return whether the path is curved more tightly at its start than a roller [m]."""
-        return not self.curvature_radius(self.rest_half_width) >= roller_radius
+        return not agree(self.curvature_radius(self.rest_half_width) >= roller_radius)
 
     def frictionless(self, x: Real) -> Real:
         """Return p(x), the slope before the contact normal is turned by friction [SS, eq. 3]."""
@@ -231,7 +243,7 @@ class SlopeLaw:
     @cached_property
     def vertical_at(self) -> float:
         """The x at which the path turns vertical, where p = 1/mu; the brace length if it never does [m]."""
-        if self.friction <= 0:
+        if agree(self.friction <= 0):
             return self.brace_length
         start = math.asin(self.rest_half_width / self.brace_length)
         if self._vertical_margin(start) <= 0:

@@ -1,0 +1,66 @@
+"""Curves with contacts beside the same curves without: processor times in turn, minima of some turns.
+
+Run: nice python benchmarks/contacts.py [--only TEXT] [--turns N]; another version's: the same with its interpreter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import cfmkit
+from cfmkit.elastica import Control, trace
+from cfmkit.families.beam.network_from_spec import assemble
+
+ROOT = Path(__file__).parents[1]
+sys.path += [str(ROOT / "tests" / part) for part in ("support", "unit")]
+from contact_layouts import among_discs, with_pads  # noqa: E402
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+DISC_SEEDS, PAD_SEED = (1, 2, 50), 0
+LANS_STOP = "  stops:\n    end: {node: n3, direction: 0 deg, gap: 0.26513192912 mm}\n"
+
+
+def cases() -> Iterator[tuple[str, Any, Any, Control]]:
+    """Yield name, network, drive and control of each case."""
+    for name, block in (("beam_stop", ""), ("beam_gripper", ""), ("beam_lan2010", LANS_STOP)):
+        text = (ROOT / "configs" / f"{name}.yaml").read_text(encoding="utf-8")
+        assembly = assemble(cfmkit.loads(text.replace("  drive:", f"{block}  drive:", 1)))
+        yield f"{name} with a stop" if block else name, assembly.network, assembly.drive(), Control()
+    yield "stops and pads, out and back", *with_pads(PAD_SEED), Control()
+    for seed in DISC_SEEDS:
+        yield f"side among discs {seed}, out and back", *among_discs(seed), Control()
+
+
+def main() -> None:
+    """Print one line a case."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--only", default="")
+    parser.add_argument("--turns", type=int, default=3)
+    given = parser.parse_args()
+    print("| case | points | events | without [ms] | with [ms] | ratio |\n|---|---|---|---|---|---|")
+    for name, network, drive, control in cases():
+        if given.only not in name:
+            continue
+        least = {True: np.inf, False: np.inf}
+        for _ in range(given.turns):
+            for touches in least:
+                began = time.process_time()
+                path = trace(network if touches else replace(network, contacts=()), drive, control)
+                least[touches] = min(least[touches], time.process_time() - began)
+                if touches:
+                    points, events = len(path), len(path.contact_events)
+        times = f"{1e3 * least[False]:.1f} | {1e3 * least[True]:.1f} | {least[True] / least[False]:.1f}"
+        print(f"| {name} | {points} | {events} | {times} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

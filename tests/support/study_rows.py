@@ -1,0 +1,63 @@
+"""Rows of a study beside a run of each of its points: one comparison for all families."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from given_points import GivenPoints
+
+import cfmkit
+from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.variants_in_rows import evaluate_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+GROUPS = (("force",), ("torque", "rotational_stiffness"), ("length",), ("angle",))
+"""Dimensions of columns that are compared with the largest of all: one of them may be the difference of others."""
+FLAT_EXTREMES = {"peak_force", "peak_displacement", "valley_force", "valley_displacement"}
+"""Metrics that of what is left in the last digits of forces keep the root, where a path was traced."""
+
+
+def study_of(spec: Any, values: Mapping[str, Any], names: tuple[str, ...] = ()) -> tuple[Study, GivenPoints]:
+    """Return a study over given values (path -> one a point), by default with every metric that a sweep notes."""
+    plan = GivenPoints(values)
+    return Study(spec, plan.paths, metrics_of(spec, names, cfmkit.analyze(spec).curves[0])), plan
+
+
+def vary_numbers(spec: Any, draw: np.random.Generator, count: int, spread: float) -> dict[str, Any]:
+    """Return up to three numbers of a specification at random about their own values: path -> one a point."""
+    own = {
+        path: value
+        for path, value in spec.leaves()
+        if path.startswith(("mechanism.", "analysis.")) and isinstance(value, float) and value
+    }
+    chosen = draw.choice(sorted(own), draw.integers(1, 4), replace=False).tolist()
+    return {path: own[path] * draw.uniform(1 - spread, 1 + spread, count) for path in chosen}
+
+
+def compare_rows_with_runs(study: Study, plan: Any, step: int = 1, rtol: float = 1e-12, flat: float = 1e-12) -> Any:
+    """Return the rows of a study; every `step`-th has status, message, warnings, requirements, numbers of a run."""
+    together = evaluate_rows(study, plan, 0, len(plan))
+    sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
+    kinds = [metric.dimension for metric in study.metrics]
+    for group in GROUPS:
+        same = [k for k, dimension in enumerate(kinds) if dimension in group]
+        sizes[same] = sizes[same].max(initial=0.0)
+    sizes = np.where(np.equal(kinds, "ratio"), sizes * np.maximum(sizes, 1.0), sizes)  # large: of a mean that vanishes
+    force = sizes[kinds.index("force")] if "force" in kinds else 0.0
+    sizes = np.where(np.equal(kinds, "energy"), np.maximum(sizes, 0.1 * force), sizes)
+    tolerance = np.where([name in FLAT_EXTREMES for name in study.names], flat, rtol) * sizes
+    for k in range(0, len(plan), step):
+        point, alone = dict(zip(plan.paths, plan.point(k), strict=True)), study.evaluate(plan.point(k))
+        assert not alone.bug
+        assert together.status(k) == (alone.status, alone.message)
+        assert {name for name, mask in together.warned.items() if mask[k]} == set(alone.warnings), point
+        if alone.values:
+            own, row = np.array([np.nan if v is None else v for v in alone.values]), together.values[k]
+            wrong = ~((np.abs(row - own) <= tolerance) | (np.isnan(own) & np.isnan(row)))
+            assert not [(study.names[m], row[m], own[m]) for m in np.flatnonzero(wrong)], point
+            assert tuple(together.met[k].tolist()) == alone.met
+    return together

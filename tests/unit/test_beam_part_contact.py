@@ -1,0 +1,150 @@
+"""Contacts between parts in beam specifications: results, columns, findings, figures, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import InputError, SpecError
+from cfmkit.families.beam.figures import figures
+from cfmkit.results import Status
+
+TWO_LEAVES = """cfmkit: 1
+family: beam
+mechanism:
+  material: {name: steel-1.4310}
+  width: 10 mm
+  thickness: 0.5 mm
+  nodes:
+    root: {at: [0 mm, 10 mm], support: clamped}
+    tip: {at: [100 mm, 10 mm]}
+    wall: {at: [0 mm, 0 mm], support: clamped}
+    end: {at: [130 mm, 0 mm]}
+  beams: {upper: {start: root, end: tip}, lower: {start: wall, end: end}}
+  contacts:
+    - {between: [tip, lower], radius: 1 mm}
+  drive: {kind: displacement, node: tip, direction: -90 deg}
+analysis: {travel: 30 mm, points: 16}
+"""
+PAIR = "{between: [tip, lower], radius: 1 mm}"
+
+
+def stated(pair=PAIR, **changes):
+    """Return the specification of two leaves with another contact, and other changes of its text."""
+    text = TWO_LEAVES.replace(PAIR, pair)
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.fixture(scope="module")
+def result():
+    return cfmkit.analyze(cfmkit.loads(TWO_LEAVES))
+
+
+def test_a_pad_on_a_beam_has_columns_of_its_force_and_place_and_a_row_where_it_begins(result):
+    force, place, event = (result.curve.extra[name].values for name in ("tip_lower_force", "tip_lower_at", "event"))
+    (row,) = np.flatnonzero(event != "")
+    assert event[row] == "tip lower begins"
+    assert result.curve.displacement[row] == pytest.approx(8.75e-3, rel=1e-12)
+    assert (force[: row + 1] == 0).all()
+    assert np.isnan(place[: row + 1]).all()
+    assert (force[row + 1 :] > 0).all()
+    assert (np.diff(place[row + 1 :]) < 0).all()  # the tip moves inwards
+    assert result.values["first_contact"].value == pytest.approx(8.75e-3, rel=1e-12)
+    assert result.values["contact_force_max"].value == pytest.approx(force.max(), rel=1e-9)
+
+
+def test_the_force_of_the_pad_is_what_holds_the_other_leaf(result):
+    vertical, across = (result.curve.extra[f"lower_force_{axis}"].values for axis in "yx")
+    assert np.abs(across).max() == pytest.approx(0.0, abs=1e-9)  # its end is free
+    assert np.abs(vertical).max() == pytest.approx(0.0, abs=1e-9)
+    support = result.state.path.end_force("lower", 0)[result.state.keep, :2]
+    assert np.hypot(*support.T) == pytest.approx(result.curve.extra["tip_lower_force"].values, abs=1e-9)
+
+
+def test_the_force_of_the_pad_can_be_a_requirement_by_its_name():
+    line = 'requirements:\n  - {metric: "contact_force[tip_lower]", min: 0.1 N}\nanalysis:'
+    result = cfmkit.analyze(cfmkit.loads(TWO_LEAVES.replace("analysis:", line)))
+    assert result.requirements[0].ok
+
+
+def test_the_order_of_node_and_beam_is_free_and_a_free_end_has_the_radius_of_half_its_thickness():
+    contacts = cfmkit.analyze(cfmkit.loads(stated("{between: [lower, tip]}"))).state.path.network.contacts
+    assert [(pad.node, pad.beam, pad.radius) for pad in contacts] == [("tip", "lower", 0.25e-3)]
+
+
+def test_beams_in_a_stated_contact_do_not_count_as_touching(result):
+    said = {warning.name: warning.message for warning in result.warnings}
+    assert said["contact_begins"] == "contact begins at 8.75 mm between 'tip' and 'lower'"
+    assert "beams_touch" not in said
+    plain = cfmkit.analyze(cfmkit.loads(TWO_LEAVES.replace(f"  contacts:\n    - {PAIR}\n", "")))
+    assert (
+        "state it in 'mechanism.contacts'"
+        in {warning.name: warning.message for warning in plain.warnings}["beams_touch"]
+    )
+
+
+def test_beams_that_pass_through_each_other_beside_the_pad_are_reported():
+    """The pad is below the thickness of its own leaf: the leaf itself enters the other one."""
+    result = cfmkit.analyze(cfmkit.loads(stated("{between: [tip, lower], radius: 0.05 mm}")))
+    assert "beams_touch" in {warning.name for warning in result.warnings}
+
+
+def test_pads_that_touch_are_drawn(result):
+    drawn = {artist.get_gid() for artist in figures(result)["shapes"]().axes[0].get_children()}
+    assert {"pad-0-16-0", "side-0-16-0"} <= drawn
+
+
+def test_a_pad_that_leaves_its_beam_gives_a_partial_result_with_the_reason():
+    text = stated().replace("[130 mm, 0 mm]", "[99 mm, 0 mm]").replace("radius: 1 mm", "radius: 4 mm")
+    result = cfmkit.analyze(cfmkit.loads(text))
+    assert result.status is Status.PARTIAL
+    assert "'tip' on beam 'lower'" in result.message
+
+
+@pytest.mark.parametrize(
+    ("pair", "says"),
+    [
+        ("{between: [top, lower]}", "there is no node or beam 'top'; nodes are root, tip, wall, end; beams are upper"),
+        ("{between: [upper, lower]}", "these are two beams: give a node and a beam, such as [tip, lower]"),
+        ("{between: [tip, end]}", "these are two nodes"),
+        ("{between: [end, lower]}", "node 'end' is an end of beam 'lower'"),
+        ("{between: [root, lower]}", "no beam ends freely at node 'root': state the radius of its round pad"),
+        ("{between: [tip]}", "item 2 of the list is missing"),
+        ("{between: [tip, lower], radius: -1 mm}", "must be >= 0"),
+        ("{between: [tip, lower], radus: 1 mm}", "radius"),
+        (f"{PAIR}\n    - {PAIR}", "its column 'tip_lower_force' has the name of another one"),
+    ],
+)
+def test_a_contact_that_cannot_be_is_refused_with_its_place(pair, says):
+    with pytest.raises(SpecError) as caught:
+        cfmkit.loads(stated(pair))
+    assert "contacts" in str(caught.value)
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("analysis: {", "analysis: {fidelity: solid, ", "mechanism.contacts is not supported"),
+        ("analysis: {", "analysis: {modes: 1, ", "natural frequencies are not known with contacts"),
+        ("  drive:", "  copies: {layers: 2}\n  drive:", "contact is not supported with stages in series"),
+        ("direction: -90 deg}", "direction: -90 deg}\ndesign: {rescale: {force: 5 N}}", "do not scale with them"),
+        (
+            "  drive:", "  stops: {s: {node: tip, direction: 0 deg, gap: 1 mm, friction: 0.2}}\n  drive:",
+            "flanks of beams beside contacts with friction are not modelled",
+        ),
+        ("  drive:", "  stops: {tip_lower: {node: tip, direction: 0 deg, gap: 1 mm}}\n  drive:", "has its name"),
+    ],
+)  # fmt: skip
+def test_what_is_not_possible_with_contacts_is_refused(old, new, says):
+    text = stated().replace("steel-1.4310", "steel-1.4310").replace(old, new)
+    with pytest.raises(SpecError, match="(?s)" + says):
+        cfmkit.loads(text)
+
+
+def test_a_pad_that_overlaps_a_beam_at_rest_is_refused_with_depth_and_place():
+    with pytest.raises(InputError, match=r"'tip' overlaps beam 'lower' by 0\.25 mm at 77% of its length"):
+        cfmkit.analyze(cfmkit.loads(stated("{between: [tip, lower], radius: 10 mm}")))
