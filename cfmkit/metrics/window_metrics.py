@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import partial
 from math import isnan, sqrt
 from operator import attrgetter, methodcaller
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.branch_views import Branch
-    from cfmkit.metrics.metrics_of_rows import RowsInWindow
     from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 
@@ -241,22 +240,22 @@ def effort_after(branch: Branch, time: float) -> float:
     return float(branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time))
 
 
-# --- the same of many curves, (d,) each; functions with names, since studies are pickled -----------------------------
+# --- the same of many curves, `RowsInWindow`, (d,) each; functions with names, since studies are pickled --------------
 
 
-def _extreme(which: int, rows: RowsInWindow) -> FloatArray:
+def _extreme(which: int, rows: Any) -> FloatArray:
     return np.asarray(rows.many.extremes[which])
 
 
-def _of_spread(function: Callable[[spread.Spread], FloatArray], rows: RowsInWindow) -> FloatArray:
+def _of_spread(function: Callable[[spread.Spread], FloatArray], rows: Any) -> FloatArray:
     return function(rows.many.spread)
 
 
-def _deviations_from_target(rows: RowsInWindow) -> FloatArray:
+def _deviations_from_target(rows: Any) -> FloatArray:
     return np.asarray(spread.deviation_from_target(rows.many.spread, rows.curves.target))
 
 
-def _where_known(function: Callable[[RowsInWindow], FloatArray], rows: RowsInWindow) -> FloatArray:
+def _where_known(function: Callable[[Any], FloatArray], rows: Any) -> FloatArray:
     return rows.where_known(function(rows))
 
 

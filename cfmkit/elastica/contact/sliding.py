@@ -28,6 +28,7 @@ from cfmkit.elastica.mechanics.moving_elements import (
     MOVED_TABLES,
     PLACE_STEP,
     compute_moved_tables,
+    unloaded_beam_at,
     with_own_tables,
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
@@ -214,7 +215,7 @@ class SlidingEquations(NumpyEquations):
         parameter = float(z[contact.slide])
         x, y, turn, _ = mesh.attachments.unknowns[contact.place]
         place = mesh.attachments.origin[contact.place] + z[[x, y]]
-        slope, bend, radius, taper = self._beam_at(contact, parameter)
+        slope, bend, radius, taper = unloaded_beam_at(self.mesh, contact, parameter)
         angle = slope[0] + float(z[turn])
         along = np.array([np.cos(angle), np.sin(angle)])
         across = np.array([-along[1], along[0]])
@@ -234,23 +235,6 @@ class SlidingEquations(NumpyEquations):
             (-taper * slope[2], rises * slope[1]), np.append([x, y, turn], motion.unknowns), curvature, rises,
             float(edge.curvature), along,
         )  # fmt: skip
-
-    def _beam_at(self, contact: ContactAt, parameter: float) -> tuple[tuple[float, float, float], float, float, float]:
-        """Return the unloaded angle, its slope and ds/dt by the parameter, curvature, half thickness and its slope."""
-        mesh, item = self.mesh, contact.item
-        beam, fitted = mesh.fits.network.beams[item.beam], mesh.fits[item.beam]  # type: ignore[union-attr]
-        inside, step, length = float(mesh.elements.cuts[contact.element].mean()), PLACE_STEP, mesh.scales.length
-        if is_plain(beam):
-            angle, turning = _value_and_slope(lambda t: fitted.angle(t, inside), parameter)
-            half, speed = 0.5 * float(beam.section.thickness_at(0.5, inside)) / length, fitted.length / length
-            return (angle, turning, speed), turning / speed, half, 0.0
-        t = np.array([parameter - step, parameter, parameter + step])
-        angle = np.real(fitted.angle(t, inside)) + 0.0 * t
-        speed = float(np.real(fitted.speed(np.array([parameter]), inside) + np.zeros(1))[0]) / length
-        along = (fitted.arc(np.clip(t, 0, 1)), float(np.real(fitted.arc(inside))))
-        half = 0.5 * (np.real(beam.section.thickness_at(*along)) + 0.0 * t) / length
-        turning, tapering = (angle[2] - angle[0]) / (2 * step), float(half[2] - half[0]) / (2 * step)
-        return (float(angle[1]), float(turning), speed), float(turning) / speed, float(half[1]), tapering / speed
 
     def _curvature(self, contact: ContactAt, z: FloatArray, unloaded: float) -> float:
         """Return the curvature of the loaded beam at a contact: the mean of both elements that meet there."""
@@ -503,9 +487,3 @@ class SlidingEquations(NumpyEquations):
             total[side.unknowns] -= z[contact.unknown] * side.gap_row
             total[contact.unknown] -= side.gap
         return total
-
-
-def _value_and_slope(function: Callable[[complex], Any], at: float) -> tuple[float, float]:
-    """Return an analytic function and its derivative at a place."""
-    value = complex(function(at + 1j * COMPLEX_STEP))
-    return value.real, value.imag / COMPLEX_STEP

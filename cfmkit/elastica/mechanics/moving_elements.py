@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics.element_tables import smooth_marks, smooth_tables
+from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
 
 
@@ -113,3 +118,29 @@ def _parts(mesh: Discretisation) -> list[tuple[Any, str, float]]:
                     parts.append((rows, beam, 0.5 * (begin + end)))
         mesh.known[_parts] = parts
     return mesh.known[_parts]  # type: ignore[no-any-return]
+
+
+def unloaded_beam_at(
+    mesh: Discretisation, contact: ContactAt, parameter: float
+) -> tuple[tuple[float, float, float], float, float, float]:
+    """Return the unloaded angle, its slope and ds/dt by the parameter, curvature, half thickness and its slope."""
+    name: Any = contact.item.beam  # type: ignore[union-attr]
+    beam, fitted = mesh.fits.network.beams[name], mesh.fits[name]
+    inside, step, length = float(mesh.elements.cuts[contact.element].mean()), PLACE_STEP, mesh.scales.length
+    if is_plain(beam):
+        angle, turning = _value_and_slope(lambda t: fitted.angle(t, inside), parameter)
+        half, speed = 0.5 * float(beam.section.thickness_at(0.5, inside)) / length, fitted.length / length
+        return (angle, turning, speed), turning / speed, half, 0.0
+    t = np.array([parameter - step, parameter, parameter + step])
+    angle = np.real(fitted.angle(t, inside)) + 0.0 * t
+    speed = float(np.real(fitted.speed(np.array([parameter]), inside) + np.zeros(1))[0]) / length
+    along = (fitted.arc(np.clip(t, 0, 1)), float(np.real(fitted.arc(inside))))
+    half = 0.5 * (np.real(beam.section.thickness_at(*along)) + 0.0 * t) / length
+    turning, tapering = (angle[2] - angle[0]) / (2 * step), float(half[2] - half[0]) / (2 * step)
+    return (float(angle[1]), float(turning), speed), float(turning) / speed, float(half[1]), tapering / speed
+
+
+def _value_and_slope(function: Callable[[complex], Any], at: float) -> tuple[float, float]:
+    """Return an analytic function and its derivative at a place."""
+    value = complex(function(at + 1j * COMPLEX_STEP))
+    return value.real, value.imag / COMPLEX_STEP
