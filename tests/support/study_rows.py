@@ -46,7 +46,8 @@ def compare_rows_with_runs(study: Study, plan: Any, step: int = 1, rtol: float =
     for group in GROUPS:
         same = [k for k, dimension in enumerate(kinds) if dimension in group]
         sizes[same] = sizes[same].max(initial=0.0)
-    sizes = np.where(np.equal(kinds, "ratio"), sizes * np.maximum(sizes, 1.0), sizes)  # large: of a mean that vanishes
+    # of ratios large ones are of a mean that vanishes, small ones may be what a difference leaves of one: 1e-15
+    sizes = np.where(np.equal(kinds, "ratio"), np.maximum(sizes * np.maximum(sizes, 1.0), 1e-3), sizes)
     force = sizes[kinds.index("force")] if "force" in kinds else 0.0
     sizes = np.where(np.equal(kinds, "energy"), np.maximum(sizes, 0.1 * force), sizes)
     tolerance = np.where([name in FLAT_EXTREMES for name in study.names], flat, rtol) * sizes
