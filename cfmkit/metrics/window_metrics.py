@@ -256,7 +256,7 @@ def _deviations_from_target(rows: Any) -> FloatArray:
 
 
 def _where_known(function: Callable[[Any], FloatArray], rows: Any) -> FloatArray:
-    return rows.where_known(function(rows))
+    return np.asarray(rows.where_known(function(rows)))
 
 
 _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
