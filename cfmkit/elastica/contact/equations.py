@@ -172,13 +172,13 @@ class ContactEquations(NumpyEquations):
         judged = [contact for contact in mesh.contacts if contact.closed is None]
         good = easy.converged & np.all([gaps(mesh, contact, z) >= 0 for contact in judged], axis=0)
         left = np.setdiff1d(np.arange(len(free)), rows[good])
-        whole_gradients = super().solve_each(free[left], way[left], tolerance, quick)
+        others = super().solve_each(free[left], way[left], tolerance, quick)
         whole = SolvedStates(
             np.ones(len(free), bool), np.zeros((len(free), self.n)), np.zeros((len(free), self.n)),
             np.zeros(len(free), np.int64), np.zeros(len(free)),
         )  # fmt: skip
         padded = easy._replace(free=np.pad(easy.free, pad), rate=np.pad(easy.rate, pad))
-        for total, some, other in zip(whole, padded, whole_gradients, strict=True):
+        for total, some, other in zip(whole, padded, others, strict=True):
             total[rows[good]], total[left] = some[good], other
         return whole
 
