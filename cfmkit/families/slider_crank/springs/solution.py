@@ -423,8 +423,6 @@ class Solution(ShortRepr):
             forth, back = (self.broadcast(curves.effort) for curves in self.friction_branches)
             efforts = {"load": forth, "unload": back}
         full = np.full(len(self), motion.shape[1])
-        ends = motion[:, 0], motion[:, -1]
-        band = self.settings(lambda spec: spec.analysis.band)[:, 0]
         return {
             name: CurveRows(
                 RowSamples(motion, effort, full),
@@ -432,8 +430,8 @@ class Solution(ShortRepr):
                 partial(self.effort_at, name=name),
                 self.effort_error,
                 self.target[:, 0],
-                band,
-                ends,
+                self.settings(lambda spec: spec.analysis.band)[:, 0],
+                (motion[:, 0], motion[:, -1]),
                 self.part_efforts,
                 kind=self.drive,
                 pose=self.reference[:, 0],
