@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from functools import partial
 from pathlib import Path
@@ -108,12 +109,18 @@ def _tables(record: Mapping[str, Any]) -> Iterator[PageTable]:
 
 def _remarks(proposals: Sequence[Mapping[str, Any]]) -> Iterator[Note]:
     """Yield what was not judged and what is warned of, each once with the numbers of its proposals."""
-    texts: dict[str, list[int]] = defaultdict(list)
+    unjudged: dict[str, list[int]] = defaultdict(list)
+    warned: dict[str, dict[int, str]] = defaultdict(dict)
     for number, proposal in enumerate(proposals, 1):
-        for text in (*proposal["unjudged"], *(f"{name} (see `cfmkit show {name}`)" for name in proposal["warnings"])):
-            texts[text].append(number)
-    for text, numbers in texts.items():
+        for text in proposal["unjudged"]:
+            unjudged[text].append(number)
+        for text in proposal["warnings"]:  # a name, and often what it means for this proposal
+            warned[re.split("[: ]", text, maxsplit=1)[0]][number] = text
+    for text, numbers in unjudged.items():
         yield Note(f"no. {_numbers(numbers)}", text, whole=True)
+    for name, texts in warned.items():
+        text = next(iter(texts.values())) if len(set(texts.values())) == 1 else name
+        yield Note(f"no. {_numbers(list(texts))}", f"{text} (see `cfmkit show {name}`)", whole=True)
 
 
 def _unmet(near_misses: Sequence[Mapping[str, Any]]) -> Iterator[Note]:

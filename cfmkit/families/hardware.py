@@ -2,8 +2,8 @@
 
 Sizes that the specification states are kept; others are the smallest of their series that bear the load. What is
 assumed where nothing is stated: links and plates of S235, pins and rods of the same strength, a safety factor of
-`DEFAULT_SAFETY`, and a guide that carries at least `SIDE_SHARE` of the largest force across its rod, because no force
-acts exactly in its line. Friction is in the force only where it is stated.
+`DEFAULT_SAFETY` (more where a requirement asks for more), and a guide that carries at least `SIDE_SHARE` of the largest
+force across its rod, because no force acts exactly in its line. Friction is in the force only where it is stated.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from cfmkit.export.posed_part import PosedBody
+    from cfmkit.specs.spec import Spec
     from cfmkit.stock.material_and_part_spec import Guide, MaterialSpec
     from cfmkit.stock.stock_series import Screw, System
 
@@ -30,6 +31,9 @@ DEFAULT_MATERIAL = "steel-s235"
 
 DEFAULT_SAFETY = 1.5
 """Against yield, where `safety_factor` is not above 1."""
+
+SAFETY_METRICS = ("safety_factor", "link_safety_factor")
+"""Metrics of strength: what a requirement asks of them is asked of pins, shafts and screws, too."""
 
 PIN_STRENGTH = 235e6
 """Yield strength of pins and rods [Pa]: plain carbon steel, EN 10025-2 S235; hardened ones bear more."""
@@ -71,6 +75,13 @@ class PartStrength:
             strength = float(reference.yield_strength or 0.0)
             return cls(reference.name, reference.youngs_modulus, strength / safety, PIN_STRENGTH / safety, True)
         return cls(material.name or material.words, material.modulus, allowable, PIN_STRENGTH / safety, False)
+
+
+def required_safety(spec: Spec) -> float:
+    """Return the safety factor of parts that join: that of the mechanism, with what requirements ask beyond it."""
+    stated: float = spec.mechanism.safety_factor  # type: ignore[attr-defined]
+    least = [entry.min for entry in spec.requirements if entry.metric in SAFETY_METRICS and entry.min is not None]
+    return max(stated if stated > 1.0 else DEFAULT_SAFETY, stated * max(map(float, least), default=1.0))
 
 
 @dataclass(frozen=True)

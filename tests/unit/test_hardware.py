@@ -8,7 +8,7 @@ import pytest
 import cfmkit
 from cfmkit.export.posed_part import PosedBody, rectangle, screw_positions, swept
 from cfmkit.families.cam.hardware import hardware as cam_hardware
-from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rod, link_width, screw_for
+from cfmkit.families.hardware import PIN_STRENGTH, PartStrength, guide_rod, link_width, required_safety, screw_for
 from cfmkit.families.slider_crank.springs.hardware import hardware as crank_hardware
 from cfmkit.stock.joint_strength import (
     SHEAR_SHARE,
@@ -150,3 +150,26 @@ def test_a_design_without_stated_friction_says_what_pins_and_guide_take():
     assert "with 0.15 in pins (" in note
     rubbing = cfmkit.load("configs/slider_crank_friction.yaml")
     assert friction_note(cfmkit.analyze(rubbing), Run()) == ""
+
+
+@pytest.mark.parametrize(
+    ("config", "metric"), [("cam", "safety_factor"), ("slider_crank_bilancia2019", "link_safety_factor")]
+)
+@pytest.mark.parametrize(
+    ("stated", "least", "safety"), [(1, 1, 1.5), (1, 1.5, 1.5), (1.2, 1, 1.2), (1, 3, 3), (2, 1.5, 3)]
+)
+def test_parts_that_join_have_the_safety_that_a_requirement_asks_for(config, metric, stated, least, safety):
+    spec = cfmkit.load(f"configs/{config}.yaml")
+    asked = {"mechanism.safety_factor": stated, "requirements": ({"metric": metric, "min": least},)}
+    assert required_safety(spec.replace(asked)) == safety
+
+
+def test_pins_of_a_cam_are_thicker_where_a_requirement_asks_for_more_safety():
+    """They bore 1.5 times their load whatever `suggest --safety` said."""
+    spec, sizes = cfmkit.load("configs/cam.yaml"), []
+    for least in (1.5, 6.0):
+        result = cfmkit.analyze(spec.replace({"requirements": ({"metric": "safety_factor", "min": least},)}))
+        pins = [row["size"] for row in table(result) if row["standard"] == "ISO 2338"]
+        sizes.append([float(size.split()[0]) for size in pins])
+    assert len(sizes[0]) == 2
+    assert all(safer > plain for plain, safer in zip(*sizes, strict=True))

@@ -28,6 +28,7 @@ from cfmkit.families.hardware import (
     mm,
     pin_for,
     pin_part,
+    required_safety,
     screw_bears,
     screw_for,
     screw_part,
@@ -53,11 +54,11 @@ SHAFT_IN_ROLLER = 0.7
 
 def hardware(solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism."""
-    mechanism = solution.assembly.spec.mechanism
+    spec = solution.assembly.spec
+    mechanism = spec.mechanism
     plate, system = mechanism.plate, mechanism.plate.stock
-    strength = PartStrength.from_material(
-        mechanism.contact.material if mechanism.contact else None, mechanism.safety_factor
-    )
+    material = mechanism.contact.material if mechanism.contact else None
+    strength = PartStrength.from_material(material, required_safety(spec))
     thick = plate.thickness or (mechanism.contact.width if mechanism.contact else PLATE_THICKNESS)
     brace, arm = min(thick, BRACE_WIDTH), 0.5 * (thick + min(thick, BRACE_WIDTH))
     pull, press, force = (_largest(solution, name) for name in ("brace", "contact", "slider"))

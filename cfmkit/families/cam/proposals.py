@@ -193,7 +193,7 @@ def _slider_pin(request: Request, size: dict[str, float], thick: float, material
 
     None if it, or the shaft of a roller, is too thick for roller and slider.
     """
-    strength = PartStrength.from_material(material, 1.0)
+    strength = PartStrength.from_material(material, request.safety)
     brace = min(thick, BRACE_WIDTH)
     arm = 0.5 * (thick + brace)
     rise = np.sqrt(size["brace"] ** 2 - size["end"] ** 2)

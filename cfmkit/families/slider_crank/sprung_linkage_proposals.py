@@ -295,7 +295,7 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
         return None
     loads = _loads(spec)
     widest = min((_hole_of_coil(spec, name, loads_of) for name, loads_of in _turns_of(spec).items()), default=np.inf)
-    own = PartStrength.from_material(material, spec.mechanism.safety_factor)
+    own = PartStrength.from_material(material, request.safety)
     strength = replace(own, allowable=min(request.strength_used * allowable, own.allowable))
     link = links_that_bear(loads, sheet, strength, request.thinnest, widest)
     if link is None:

@@ -23,6 +23,7 @@ from cfmkit.families.hardware import (
     mm,
     pin_for,
     pin_part,
+    required_safety,
     screw_for,
     screw_part,
     with_faults,
@@ -57,7 +58,7 @@ LEAST_GROUND = 4.0
 def hardware(spec: SliderCrankSpec, solution: Solution) -> Hardware:
     """Return the parts of a solved mechanism, of all legs together."""
     mechanism, legs = spec.mechanism, spec.mechanism.sets
-    strength = PartStrength.from_material(mechanism.material, mechanism.safety_factor)
+    strength = PartStrength.from_material(mechanism.material, required_safety(spec))
     motion = np.linspace(float(solution.motion[0, 0]), float(solution.motion[0, -1]), N_LOADS)
     loads = link_loads(solution.assembly, motion, solution.legs[:1, 0])
     eye, hole = eye_and_hole(spec)
