@@ -103,7 +103,7 @@ def _settings(summary: Mapping[str, Any]) -> Iterator[Note]:
     if summary["best"]:
         values = summary["best"]["values"].items()
         settings = [f"{path}={''.join(str(value).split())}" for path, value in values]
-        yield Note("best", " ".join(f"--set {setting}" for setting in settings), is_command=True)
+        yield Note("best", " ".join(f"--set {setting}" for setting in settings), whole=True, is_command=True)
 
 
 def _best(summary: Mapping[str, Any], dimensions: Mapping[str, str]) -> Iterator[ValueRow]:
