@@ -191,7 +191,9 @@ def _nearest_feasible(nearest: Mapping[str, str]) -> Iterator[Note]:
     """Yield the nearest values that work: plain values as options that can be pasted, bounds and others in words."""
     plain = {path: "".join(value.split()) for path, value in nearest.items() if _PLAIN_VALUE.fullmatch(value)}
     if plain:
-        yield Note("feasible", " ".join(f"--set {path}={value}" for path, value in plain.items()), whole=True, is_command=True)
+        yield Note(
+            "feasible", " ".join(f"--set {path}={value}" for path, value in plain.items()), whole=True, is_command=True
+        )
     for path, value in nearest.items():
         if path not in plain:
             yield Note("feasible", f"{path}: {value}", whole=True)
