@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from contact_paths import at_drive, check_complementarity, place_of
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -76,22 +77,9 @@ def falling_leaf(stiffness=100.0, contacts=CONTACTS):
 BULGE = two_leaves(((0, 0.1), -0.4, 1.0, 1.0), ((0, 0), 0.0, 0.0, 1.2))
 
 
-def at_drive(path, drive):
-    return int(np.flatnonzero(np.abs(path.drive - drive) < 1e-12)[0])
-
-
-def place_of(path, node, point):
-    at = path.network.nodes[node]
-    return path.motion(node)[point, :2] + [at.x, at.y]
-
-
-def check_complementarity(path):
-    """Forces press, nothing overlaps, and what is apart has no force; shapes say so, too."""
-    for number in range(len(path.network.contacts)):
-        force, gap = path.contact_force(number), path.contact_gap(number)
-        assert force.min() > -1e-9 * max(1.0, force.max())
-        assert gap.min() > -1e-9
-        assert np.minimum(gap, force).max() < 1e-8
+def check_pair(path):
+    """Complementarity, and the shapes say so, too."""
+    check_complementarity(path)
     for point in range(len(path)):
         lines = [shapely.LineString(path.shape(name, point)) for name in ("upper", "lower")]
         assert lines[0].distance(lines[1]) > 2 * HALF - 1e-4  # of straight pieces
@@ -111,7 +99,7 @@ def test_two_sides_have_the_force_and_the_places_of_shooting_both_ways():
     moved = path.motion("end")[path.at_requested]
     assert moved[2] == pytest.approx(moved[5], abs=1e-9)
     assert path.stable.all()
-    check_complementarity(path)
+    check_pair(path)
 
 
 def test_two_sides_that_begin_to_nest_end_the_path_where_shooting_says():
@@ -168,7 +156,7 @@ def test_a_tip_becomes_tangent_and_touches_with_its_side_and_goes_back():
     before, behind = at_drive(path, 0.2), at_drive(path, 0.34)
     assert path.contact_force(TIP)[before] > 0 == path.contact_force(UPPER)[before]
     assert path.contact_force(UPPER)[behind] > 0 == path.contact_force(TIP)[behind]
-    check_complementarity(path)
+    check_pair(path)
 
 
 def test_a_leaf_that_falls_on_a_stiffer_and_stiffer_one_falls_on_a_floor():
@@ -217,7 +205,7 @@ def test_a_random_pair_returns_to_its_own_points_and_keeps_every_condition(seed)
     path = trace(*layout(seed), Control(tolerance=1e-8))
     assert path.status is PathStatus.COMPLETE
     assert path.contact_events
-    check_complementarity(path)
+    check_pair(path)
     moved = np.stack([path.motion(node)[path.at_requested] for node in ("tip", "end")])
     assert moved[:, :5] == pytest.approx(moved[:, 10:5:-1], abs=1e-9)
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_paths import at_drive, check_complementarity, place_of
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -50,24 +51,6 @@ def two_leaves(*contacts, height=0.1, lower=1.3, section=THIN, upper=THIN, **cha
     }  # fmt: skip
     beams = {"upper": Beam("root", "tip", upper), "lower": Beam("wall", "end", section)}
     return Network(nodes | changes, beams, contacts=contacts or (PAD,))
-
-
-def at_drive(path, drive):
-    return int(np.flatnonzero(np.abs(path.drive - drive) < 1e-12)[0])
-
-
-def place_of(path, node, point):
-    at = path.network.nodes[node]
-    return path.motion(node)[point, :2] + [at.x, at.y]
-
-
-def check_complementarity(path):
-    """Forces press, nothing overlaps, and what is apart has no force."""
-    for number in range(len(path.network.contacts)):
-        force, gap = path.contact_force(number), path.contact_gap(number)
-        assert force.min() > -1e-9 * max(1.0, force.max())
-        assert gap.min() > -1e-9
-        assert np.minimum(gap, force).max() < 1e-8
 
 
 def test_the_tip_of_a_leaf_on_another_one_has_the_force_and_the_place_of_shooting_both_ways():
