@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.edges import measure_distance
+from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows
 from cfmkit.elastica.mechanics.equations import SideData
@@ -18,7 +18,7 @@ from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
-from cfmkit.elastica.model.contact import BeamOnObstacle
+from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
@@ -264,16 +264,28 @@ class SideGaps:
     @cached_property
     def _side(self) -> SideData | None:
         """The side as compiled code takes it."""
-        mesh = self.mesh
-        if not isinstance(self.item, BeamOnObstacle):
+        mesh, item = self.mesh, self.item
+        sides = {item.beam, *((item.partner,) if isinstance(item, BeamOnBeam) else ())}
+        if any(isinstance(mesh.fits.network.beams[beam].section.thickness, Taper) for beam in sides):
             return None
-        if isinstance(mesh.fits.network.beams[self.item.beam].section.thickness, Taper):
-            return None
-        edge = self.item.outline
         half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
-        counts = len(edge.length), len(edge.radius), float(edge.closed), N_ALONG
-        numbers = np.array([half, mesh.scales.length, *counts], float)
-        return SideData(self.elements, self.slack, edge_rows(edge), numbers, _packed_tables(mesh.degree))
+        edge, counts, circle = np.empty((0, 6)), (0.0, 0.0, 0.0), (-1.0, 0.0)
+        if isinstance(item, BeamOnObstacle):
+            edge, outline = edge_rows(item.outline), item.outline
+            counts = float(len(outline.length)), float(len(outline.radius)), float(outline.closed)
+        elif isinstance(item, BeamOnBeam):
+            circle = -1.0, half_thickness_of(mesh, item.partner)
+        else:
+            circle = float(mesh.nodes[item.node]), item.radius / mesh.scales.length
+        numbers = np.array([half, mesh.scales.length, *counts, N_ALONG, *circle])
+        tables, partner = _packed_tables(mesh.degree), np.array(self.partner_elements, float)
+        return SideData(self.elements, self.slack, edge, numbers, tables, partner)
+
+    @cached_property
+    def partner_elements(self) -> Any:
+        """Elements of the other beam that the side may touch, (m,)."""
+        partner = self.item.partner if isinstance(self.item, BeamOnBeam) else None
+        return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == partner], np.int64)
 
     def _dips(self, z: FloatArray, stage: LoadStage) -> tuple[Any, _Dips, SideStates]:
         """Return gaps at places of elements in n states, and between which of them lies a least one that is near."""

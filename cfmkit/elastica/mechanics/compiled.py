@@ -168,7 +168,7 @@ class CompiledEquations(NumpyEquations):
         result = np.empty((len(z), 5))
         elements = np.column_stack([side.elements, side.slack, side.slack]).astype(float)
         inputs = np.ascontiguousarray(z, float), np.ascontiguousarray(stages, float), elements
-        good = self.code.side_gaps(self.row, *inputs, side.edge, side.numbers, side.tables, result, watch)
+        good = self.code.side_gaps(self.row, *inputs, *side[2:], result, watch)
         return result if good else None
 
     def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:

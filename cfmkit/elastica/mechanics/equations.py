@@ -68,13 +68,16 @@ class MarchState(NamedTuple):
 
 
 class SideData(NamedTuple):
-    """The side of a beam of one thickness, and an obstacle, as `gaps.c` takes them."""
+    """The side of a beam of one thickness, and what it may touch, as `gaps.c` takes them."""
 
     elements: FloatArray  # (m,)
     slack: FloatArray  # (m,) by how much each may lie in the obstacle
     edge: FloatArray  # (parts, 6)
-    numbers: FloatArray  # half the thickness, unit of length [m], segments, arcs, whether it is closed, places
+    # half the thickness, unit of length [m], segments, arcs, whether it is closed, places, then the attachment of a pad
+    # instead, -1 if it is none, and the radius of it or of the other beam
+    numbers: FloatArray
     tables: FloatArray  # places and matrices, in one row
+    partner: FloatArray  # (p,) elements of another beam that may be touched
 
 
 class SolvedStates(NamedTuple):
