@@ -19,6 +19,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.edges import find_mate, measure_distance
 from cfmkit.elastica.contact.pair_gaps import make_gaps
+from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at
 from cfmkit.elastica.mechanics.polynomials import shape_functions
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.contact.side_gaps import LoadStage, SideGaps
     from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.equations import SideData
 
 ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
 NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins
@@ -174,7 +176,22 @@ class SideConditions:
 
     def values(self, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of all conditions in n states (n, size), (conditions, n)."""
-        return np.array([self.value(condition, z, stage) for condition in self.all]).reshape(len(self.all), len(z))
+        values = np.empty((len(self.all), len(z)))
+        rows, sides = self._touching
+        together = None if sides is None else search_sides(self.mesh, sides, z, stage, watch=True)
+        for k, condition in enumerate(self.all):
+            if together is None or k not in rows:
+                values[k] = self.value(condition, z, stage)
+            else:
+                values[k] = together[:, rows.index(k), 0]
+        return values
+
+    @cached_property
+    def _touching(self) -> tuple[list[int], SideData | None]:
+        """Rows of sides that may touch, and these as compiled code takes them; None if some thickness varies."""
+        rows = [k for k, condition in enumerate(self.all) if condition.kind == "touch"]
+        packed = [self.gaps_of(self.all[k].item).packed for k in rows]
+        return rows, join_sides(packed) if packed and all(packed) else None  # type: ignore[arg-type]
 
     def value(self, condition: SideCondition, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return the values of a condition in n states, (n,)."""

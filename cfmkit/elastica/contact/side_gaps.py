@@ -13,7 +13,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows
-from cfmkit.elastica.mechanics.equations import SideData
+from cfmkit.elastica.mechanics.equations import LineTables, SideData
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, cuts_at, with_places
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -22,6 +22,8 @@ from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
@@ -125,12 +127,12 @@ def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
 
 
 @lru_cache(maxsize=64)
-def _packed_tables(degree: int) -> FloatArray:
-    """Return places along an element, Gauss weights and the matrices at these places, in one row."""
+def _line_tables(degree: int) -> LineTables:
+    """Return what compiled code needs to follow lines."""
     fractions = _even_angles()
     at, rule = _rows_at(degree, fractions), basis(degree)
-    parts = fractions, rule.weights, at.values, at.integrals, at.interpolation, _series_matrix(degree)
-    return read_only(np.concatenate([np.ravel(part) for part in parts]))
+    parts = fractions, rule.weights, at.values.T, at.integrals.T, at.interpolation.T, _series_matrix(degree)
+    return LineTables(read_only(np.concatenate([np.ravel(part) for part in parts])), len(fractions))
 
 
 def _even_angles() -> FloatArray:
@@ -144,6 +146,24 @@ def interpolate_line(degree: int, fractions: FloatArray, start: Any, slopes: Any
     shape = (*fractions.shape, rows.integrals.shape[-1])
     place = start + np.einsum("...q,...qd->...d", rows.integrals.reshape(shape), slopes)
     return place, np.einsum("...q,...qd->...d", rows.interpolation.reshape(shape), slopes)
+
+
+def join_sides(sides: Sequence[SideData]) -> SideData:
+    """Return several sides in one."""
+    elements, numbers, edge = (np.concatenate(arrays) for arrays in zip(*sides, strict=True))
+    counts = np.array([(0, 0), *((len(side.elements), len(side.edge)) for side in sides[:-1])]).cumsum(axis=0)
+    numbers[:, [0, 10]] += counts[:, :1]
+    numbers[:, 4] += counts[:, 1]
+    return SideData(elements, numbers, edge)
+
+
+def search_sides(
+    mesh: Discretisation, sides: SideData, z: FloatArray, stage: LoadStage, watch: bool = False
+) -> FloatArray | None:
+    """Return what compiled code finds of the gaps of sides in n states, (n, sides, 5); None without it."""
+    if not len(z):
+        return None
+    return equations(mesh).search_sides(z, stage.rows(), sides, _line_tables(mesh.degree), watch)
 
 
 class LeastGap(NamedTuple):
@@ -257,29 +277,29 @@ class SideGaps:
 
     def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray | None:
         """Return what compiled code finds in n states, (n, 5); None without it, or if the thickness varies."""
-        if self._side is None or not len(z):
-            return None
-        return equations(self.mesh).search_side(z, stage.rows(), self._side, watch)
+        result = None if self.packed is None else search_sides(self.mesh, self.packed, z, stage, watch)
+        return None if result is None else result[:, 0]
 
     @cached_property
-    def _side(self) -> SideData | None:
-        """The side as compiled code takes it."""
+    def packed(self) -> SideData | None:
+        """The side as compiled code takes it; None if the thickness varies."""
         mesh, item = self.mesh, self.item
-        sides = {item.beam, *((item.partner,) if isinstance(item, BeamOnBeam) else ())}
-        if any(isinstance(mesh.fits.network.beams[beam].section.thickness, Taper) for beam in sides):
-            return None
-        half = float(np.ravel(self.half_thickness(0.5, int(self.elements[0])))[0])
-        edge, counts, circle = np.empty((0, 6)), (0.0, 0.0, 0.0), (-1.0, 0.0)
+        beams, edge, counts, circle = [item.beam], np.empty((0, 6)), (0, 0, 0), (-1, 0.0)
         if isinstance(item, BeamOnObstacle):
             edge, outline = edge_rows(item.outline), item.outline
-            counts = float(len(outline.length)), float(len(outline.radius)), float(outline.closed)
+            counts = len(outline.length), len(outline.radius), int(outline.closed)
         elif isinstance(item, BeamOnBeam):
-            circle = -1.0, half_thickness_of(mesh, item.partner)
+            beams.append(item.partner)
+            circle = -1, half_thickness_of(mesh, item.partner)
         else:
-            circle = float(mesh.nodes[item.node]), item.radius / mesh.scales.length
-        numbers = np.array([half, mesh.scales.length, *counts, N_ALONG, *circle])
-        tables, partner = _packed_tables(mesh.degree), np.array(self.partner_elements, float)
-        return SideData(self.elements, self.slack, edge, numbers, tables, partner)
+            circle = mesh.nodes[item.node], item.radius / mesh.scales.length
+        if any(isinstance(mesh.fits.network.beams[beam].section.thickness, Taper) for beam in beams):
+            return None
+        half, own, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
+        elements = np.zeros((own + len(partner), 2))
+        elements[:own, 0], elements[:own, 1], elements[own:, 0] = self.elements, self.slack, partner
+        numbers = np.array([[0, own, half, mesh.scales.length, 0, *counts, *circle, own, len(partner)]], float)
+        return SideData(elements, numbers, edge)
 
     @cached_property
     def partner_elements(self) -> Any:
@@ -457,7 +477,7 @@ def _sample(
     fractions = np.clip((flat - left) / (right - left), 0.0, 1.0)
     stages = stage.rows()
     numbers = elements[home]
-    result = equations(mesh).locate(z, stages, np.stack([numbers, fractions], axis=-1), _series_matrix(mesh.degree))
+    result = equations(mesh).locate(z, stages, np.stack([numbers, fractions], axis=-1), _line_tables(mesh.degree))
     if result is None:
         result = np.array([_locate(mesh, z[k], stage.take([k]), numbers[k], fractions[k]) for k in range(count)])
     result = result.reshape(*at.shape, 4)

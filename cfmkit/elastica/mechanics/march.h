@@ -105,11 +105,11 @@ int sides_couple(const Model *m, Int number, const double *z, Factors *f);
 void sides_columns(const Model *m, const double *z, Stage at, Term *t, Factors *f);
 int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number);
 
-int side_gaps(const Model *m, const double *z, const double *stages, Int n, double *elements, Int count, const double *edge,
-              const double *numbers, const double *packed, const double *partner, Int partners, int watches, double *found);
-
+int side_gaps(const Model *m, const double *z, const double *stages, Int n, const double *elements, Int rows,
+              const double *numbers, Int count, const double *edge, const double *packed, Int along, int watches,
+              double *found);
 int side_places(const Model *m, const double *z, const double *stages, Int n, const double *places, Int count,
-                const double *weights, const double *series, double *found);
+                const double *packed, Int along, double *found);
 
 int factors_open(Factors *f, Int n, int unsymmetric);
 void factors_close(Factors *f);

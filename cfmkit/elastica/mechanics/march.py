@@ -33,7 +33,6 @@ from cfmkit.elastica.mechanics.equations import (
     MarchState,
     NaturalMarch,
     NumpyEquations,
-    SideData,
     SolvedStates,
     begin,
 )
@@ -115,13 +114,13 @@ class CompiledSides(CompiledEquations):
         """Return the gradient by all unknowns, (size,)."""
         return self.reference.gradient(free, place)
 
-    def search_side(self, z: FloatArray, stages: FloatArray, side: SideData, watch: bool = False) -> FloatArray | None:
-        """Return the least gaps of a side in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().search_side(z, stages, side, watch)
+    def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:
+        """Return the least gaps of sides in n states; None where something lies on an obstacle."""
+        return None if self._lies(z[:, self.mesh.free]).any() else super().search_sides(z, *rest, **named)
 
-    def locate(self, z: FloatArray, stages: FloatArray, places: FloatArray, series: FloatArray) -> FloatArray | None:
+    def locate(self, z: FloatArray, *rest: Any) -> FloatArray | None:
         """Return places and rotations in n states; None where something lies on an obstacle."""
-        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, stages, places, series)
+        return None if self._lies(z[:, self.mesh.free]).any() else super().locate(z, *rest)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
