@@ -24,8 +24,9 @@ from cfmkit.elastica import (
     slider_support,
     trace,
 )
+from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.pair_gaps import make_gaps
-from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage, carry
+from cfmkit.elastica.contact.side_gaps import NEAR_GAP, LoadStage
 from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE, CompiledEquations, load_compiled
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import CompiledSides, equations

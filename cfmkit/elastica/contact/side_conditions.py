@@ -20,7 +20,9 @@ import numpy as np
 from cfmkit.elastica.contact.edges import find_mate, measure_distance
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
+from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
@@ -113,14 +115,11 @@ class SideConditions:
 
     def roots(self, item: BeamSide) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
-        if item not in self._roots:
+        known, key = self.mesh.fits.known, (SideConditions.roots, item)
+        if key not in known:
             ends = (last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at(item, last))
-            self._roots[item] = tuple(ends)
-        return self._roots[item]
-
-    @cached_property
-    def _roots(self) -> dict[BeamSide, tuple[bool, ...]]:
-        return {}
+            known[key] = tuple(ends)
+        return known[key]  # type: ignore[no-any-return]
 
     def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
         mesh, network = self.mesh, self.mesh.fits.network
@@ -272,6 +271,9 @@ class SideConditions:
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""
         mesh, item = self.mesh, contact.item
+        curvatures = equations(mesh).measure_curvatures(z)
+        if curvatures is not None:
+            return np.asarray(curvatures[side_contacts(mesh).index(contact)])
         fitted = mesh.fits[item.beam]  # type: ignore[union-attr]
         inside = float(mesh.elements.cuts[contact.element].mean())
         columns = [3, 7, *range(8, mesh.degree + 7)]

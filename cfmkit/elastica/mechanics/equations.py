@@ -71,7 +71,7 @@ class LineTables(NamedTuple):
     """What `gaps.c` needs to follow the lines of elements of one degree."""
 
     packed: FloatArray  # places along an element, Gauss weights, matrices to these places, and to Legendre coefficients
-    count: int  # places
+    n_places: int
 
 
 class SideData(NamedTuple):
@@ -173,6 +173,10 @@ class NumpyEquations:
 
     def measure_nodes(self, z: FloatArray) -> FloatArray | None:
         """Return the gaps of all contacts of nodes in states (n, size), (contacts, n); None without compiled code."""
+        return None
+
+    def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
+        """Return the curvatures of gaps at contacts of sides in compiled code, (sides, n); None without it."""
         return None
 
     def search_sides(

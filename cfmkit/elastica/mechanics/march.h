@@ -103,6 +103,7 @@ int side_presses(const Model *m, Int number, const double *z);
 Int side_term(const Model *m, Int number, const double *z, Term *t, double *frozen);
 int sides_couple(const Model *m, Int number, const double *z, Factors *f);
 void sides_columns(const Model *m, const double *z, Stage at, Term *t, Factors *f);
+int side_curvatures(const Model *m, const double *z, Int n, double *curvatures);
 int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number);
 
 int side_gaps(const Model *m, const double *z, const double *stages, Int n, const double *elements, Int rows,

@@ -114,6 +114,12 @@ class CompiledSides(CompiledEquations):
         """Return the gradient by all unknowns, (size,)."""
         return self.reference.gradient(free, place)
 
+    def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
+        """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""
+        curvatures, states = np.empty((len(side_contacts(self.mesh)), len(z))), np.ascontiguousarray(z, float)
+        lies = self._lies(z[:, self.mesh.free]).any()
+        return None if lies or not self.code.side_curvatures(self.row, states, curvatures) else curvatures
+
     def search_sides(self, z: FloatArray, *rest: Any, **named: Any) -> FloatArray | None:
         """Return the least gaps of sides in n states; None where something lies on an obstacle."""
         return None if self._lies(z[:, self.mesh.free]).any() else super().search_sides(z, *rest, **named)

@@ -210,6 +210,20 @@ static PyObject *py_contact_gaps(PyObject *self, PyObject *arguments) {
     return Py_None;
 }
 
+/* side_curvatures(model, z, curvatures) -> whether no element vanishes */
+static PyObject *py_side_curvatures(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    int good;
+    (void)self;
+    if (!take(arguments, 0, 3, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Model *m = at(&b, 0);
+    good = side_curvatures(m, at(&b, 1), b.view[1].len / (m->size * (Int)sizeof(double)), at(&b, 2));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(good);
+}
+
 /* side_places(model, z, stages, places, tables, found, along) -> whether no element vanishes */
 static PyObject *py_side_places(PyObject *self, PyObject *arguments) {
     Buffers b;
@@ -231,7 +245,8 @@ static PyMethodDef methods[] = {
     {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
     {"solve_many", py_solve_many, METH_VARARGS, NULL}, {"soften", py_soften, METH_VARARGS, NULL},
     {"place", py_place, METH_VARARGS, NULL},
-    {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL}, {"side_places", py_side_places, METH_VARARGS, NULL},
+    {"contact_gaps", py_contact_gaps, METH_VARARGS, NULL}, {"side_gaps", py_side_gaps, METH_VARARGS, NULL},
+    {"side_places", py_side_places, METH_VARARGS, NULL}, {"side_curvatures", py_side_curvatures, METH_VARARGS, NULL},
     {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };

@@ -258,3 +258,12 @@ int sides_stiffen(const Model *m, Factors *f, const Term *element, Int number) {
     }
     return 1;
 }
+
+/* Curvatures of the gaps along the beams in states (n, size), (sides, n). Return 0 if an element vanishes. */
+int side_curvatures(const Model *m, const double *z, Int n, double *curvatures) {
+    for (Int k = 0; k < n; k++, z += m->size) {
+        if (!sides_move(m, z)) return 0;
+        for (Int c = 0; c < m->sides; c++) curvatures[c * n + k] = side_at(m, c, z).curvature;
+    }
+    return 1;
+}
