@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath
 from cfmkit.elastica.contact.side_changes import locate_side_change
+from cfmkit.elastica.contact.step_between import StepBetween
 from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped

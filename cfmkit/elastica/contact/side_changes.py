@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
 from cfmkit.elastica.contact.places_of_sides import (
@@ -29,6 +29,7 @@ from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
     from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.step_between import StepBetween
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
