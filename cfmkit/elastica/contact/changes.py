@@ -181,7 +181,7 @@ class PieceOfPath:
 
     def expand_state(self, values: FloatArray) -> FloatArray:
         """Return a state of the own unknowns among those of all."""
-        return np.asarray(self.expand(values) + self._kept)
+        return np.asarray(self.expand(values) + self._kept if self.friction else self.expand(values))
 
     def expand(self, values: Any) -> Any:
         """Return values of the own unknowns among those of all, zero for the others."""
@@ -297,9 +297,10 @@ class PieceOfPath:
         slope = np.abs(rate[:, whole.motions]).max(axis=1)
         dense = SAMPLES_PER_RADIUS * moved * whole.mesh.scales.length <= FEWEST_SAMPLES * self.smallest_radius
         smooth = np.maximum(slope[:-1], slope[1:]) * np.abs(width[:, 0]) <= MAX_SLOPE_STEPS * moved
-        s = np.linspace(0.0, 1.0, n_samples)[:, None, None]
-        between = x[:-1] + s * s * (3 - 2 * s) * chord
-        between = between + width * (s * (1 - s) ** 2 * rate[:-1] + s * s * (s - 1) * rate[1:])
+        s, some = np.linspace(0.0, 1.0, n_samples)[:, None, None], self.seen_unknowns
+        between = np.zeros((n_samples, *chord.shape))
+        between[..., some] = x[:-1, some] + s * s * (3 - 2 * s) * chord[:, some]
+        between[..., some] += width * (s * (1 - s) ** 2 * rate[:-1, some] + s * s * (s - 1) * rate[1:, some])
         drives = drive[:-1] + s[:, :, 0] * width[:, 0]
         values = self.values(between.reshape(-1, len(kept)), drives.ravel())
         values = values.reshape(len(values), n_samples, -1).swapaxes(1, 2)
@@ -312,6 +313,16 @@ class PieceOfPath:
         if not calm[suspect] and dense[suspect] and smooth[suspect] and not self.slipping_rows:
             self.seen_between[float(drive[suspect]), float(drive[suspect + 1])] = values[:, suspect]
         return calm & dense & smooth
+
+    @cached_property
+    def seen_unknowns(self) -> Any:
+        """Free unknowns of the whole that `values` depends on: all if sides may touch, else those of nodes that do."""
+        mesh = self.whole.mesh
+        if self.sides.all:
+            return slice(None)
+        unknowns = [*mesh.attachments.unknowns[[contact.place for contact in mesh.contacts]].ravel().tolist()]
+        unknowns += [unknown for contact in mesh.contacts for unknown in contact.own_unknowns]
+        return np.flatnonzero(np.isin(mesh.free, unknowns))
 
     @cached_property
     def smallest_radius(self) -> float:
