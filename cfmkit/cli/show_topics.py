@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
@@ -166,6 +165,7 @@ def references_page() -> Document:
 
 def family_page(name: str) -> Document:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
+    from cfmkit.runs.dimension_drawing import DRAWING_FILE
     from cfmkit.specs.keys_and_schema import keys
     from cfmkit.specs.units import border_unit
 
@@ -173,10 +173,10 @@ def family_page(name: str) -> Document:
     spec_keys = [asdict(key) for key in keys(record.spec_type)]
     values = [
         {"name": key, "unit": border_unit(dimension), "definition": definition, "per_branch": False}
-        for key, (dimension, definition) in record.values.items()
+        for key, (dimension, definition) in record.outputs.values.items()
     ]
-    findings = [{"name": key, "meaning": meaning} for key, meaning in record.findings.items()]
-    references = [{"reference": reference} for reference in record.references]
+    findings = [{"name": key, "meaning": meaning} for key, meaning in record.outputs.findings.items()]
+    references = [{"reference": paper.reference} for paper in record.papers]
     sections = (
         *_key_sections(spec_keys),
         ("values beside the metrics", values, METRIC_FIELDS),
@@ -184,8 +184,8 @@ def family_page(name: str) -> Document:
         ("references", references, (field("reference", "", wraps=True),)),
     )
     data = {"keys": spec_keys, "values": values, "findings": findings, "references": references}
-    starts = f"`cfmkit new {name}` starts a file" if record.template else ""
-    drawn = f"`cfmkit show {name} --figure` draws it with its dimensions named" if record.dimension_drawing else ""
+    starts = f"`cfmkit new {name}` starts a file" if record.file("template.yaml") else ""
+    drawn = f"`cfmkit show {name} --figure` draws it with its dimensions named" if record.file(DRAWING_FILE) else ""
     commands = "; ".join(filter(None, (starts, drawn)))
     return _page(name, f"{record.summary}. {commands}" if commands else record.summary, sections, data)
 
@@ -235,25 +235,20 @@ def find_page(name: str) -> Document | None:
     if not sections:
         return None
     page = _page(name, "", sections, {kind: entries_of_kind for kind, entries_of_kind, _ in sections})
-    entries = [
-        text
-        for kind, entries_of_kind, _ in sections
-        if kind == "references"
-        for entry in entries_of_kind
-        if (text := _bibtex(entry))
-    ]
+    papers = {paper.name: paper.bibtex for record in families.records() for paper in record.papers}
+    entries = [papers[entry["name"]] for kind, shown, _ in sections if kind == "references" for entry in shown]
     more = (block for text in entries for block in (line(""), Verbatim(text + "\n")))
     return Document({**page.data, **({"bibtex": entries} if entries else {})}, (*page.body, *more))
 
 
 def _symbols(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families."""
-    from cfmkit.runs.dimension_drawing import read_dimensions
+    from cfmkit.runs.dimension_drawing import DRAWING_FILE, read_dimensions
 
     return [
         {"name": row["symbol"], "family": record.name, "key": row["key"], "meaning": row["meaning"]}
         for record in families.records()
-        if record.dimension_drawing
+        if record.file(DRAWING_FILE)
         for row in read_dimensions(record)
         if name in re.split(r", | \.\.\. ", row["symbol"])
     ]
@@ -267,25 +262,10 @@ def names() -> list[str]:
 def references() -> list[dict[str, str]]:
     """Return the papers behind all families: name, family and the reference in full."""
     return [
-        {"name": _tag(text), "family": record.name, "reference": text}
+        {"name": paper.name, "family": record.name, "reference": paper.reference}
         for record in families.records()
-        for text in record.references
+        for paper in record.papers
     ]
-
-
-def _bibtex(reference: Record) -> str:
-    """Return the BibTeX entry of a paper, whose key begins with its first author and ends with its year."""
-    author, _, year = reference["name"].rpartition("-")
-    entries = re.split(r"\n(?=@)", families.family(reference["family"]).bibtex.strip())
-    key = re.compile(rf"@\w+\{{{author.replace('-', '')}[a-z]*{year},", re.IGNORECASE)
-    return next((entry.strip() for entry in entries if key.match(entry)), "")
-
-
-def _tag(reference: str) -> str:
-    """Return the first author's family name and the year: ``lan-2010``."""
-    author = reference.partition(",")[0].split()[-1].lower()
-    years = re.findall(r"\b(?:19|20)[0-9]{2}\b", reference)
-    return "-".join([author, *years[:1]])
 
 
 def _keys(kind: str, name: str) -> list[str]:
@@ -346,10 +326,7 @@ def _values() -> Records:
     from cfmkit.specs.units import border_unit
 
     every = families.records()
-    values_by_source = [(record.name, record.values) for record in every]
-    values_by_source += [
-        (record.name, import_module(record.attribution).DEVIATION_DEFINITIONS) for record in every if record.attribution
-    ]
+    values_by_source = [(record.name, {**record.outputs.values, **record.outputs.causes}) for record in every]
     values_by_source.append(("recordings", define_recorded_values("torque") | define_recorded_values("force")))
     return _gather_records(
         (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})
@@ -382,7 +359,7 @@ def _findings() -> Records:
     from cfmkit.experiment import calibration, correction, findings
     from cfmkit.studies.findings import STUDY_FINDINGS
 
-    findings_by_source = [(record.name, record.findings) for record in families.records()]
+    findings_by_source = [(record.name, record.outputs.findings) for record in families.records()]
     findings_by_source += [("recordings", findings.RECORDING_FINDINGS), ("calibrate", calibration.CALIBRATION_FINDINGS)]
     findings_by_source += [("correct", correction.CORRECTION_FINDINGS), *STUDY_FINDINGS.items()]
     return _gather_records(
