@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import PieceOfPath, StepBetween
+from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.side_changes import locate_side_change
 from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.numerics.continuation.correct import correct

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange
-from cfmkit.elastica.contact.follow import Remeshed, follow_in_contact
+from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, follow_network
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.mechanics.similar_arrays import make_inextensible
@@ -72,7 +71,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
             return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
-        for item in follow_in_contact(ramp, begin, np.ones(1), options, branch):
+        for item in follow_network(ramp, begin, np.ones(1), options, branch):
             if isinstance(item, ContactChange):
                 continue
             if isinstance(item, Remeshed):
