@@ -8,58 +8,44 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
-LENGTH, SHUTTLE = 35e-3, slider_support(np.pi / 2)
+LENGTH, SHUTTLE = 35e-3, el.slider_support(np.pi / 2)
 
 
 def leaves(many: Any, count: int, thickness: float = 7e-4, angle: float = 8.0, support: Any = SHUTTLE) -> Any:
     """Return leaves left and right of one shuttle, that many or with these factors on their thickness; the drive."""
     factors = [1.0] * many if isinstance(many, int) else many
     rise, across = LENGTH * np.sin(np.radians(angle)), LENGTH * np.cos(np.radians(angle))
-    nodes, beams = {"d": Node(0, rise, support)}, {}
+    nodes, beams = {"d": el.Node(0, rise, support)}, {}
     for i, factor in enumerate(factors):
         down = 5e-3 * (i // 2)
-        nodes[f"w{i}"] = Node((-1 if i % 2 == 0 else 1) * across, -down, CLAMPED_SUPPORT)
-        beams[f"b{i}"] = Beam(f"w{i}", "d", Section(1477e6, 6e-3, thickness * factor), end_offset=(0.0, -down))
-    return Network(nodes, beams), Displacement("d", -np.pi / 2, np.linspace(0.05, 2.1, count) * rise)
+        nodes[f"w{i}"] = el.Node((-1 if i % 2 == 0 else 1) * across, -down, el.CLAMPED_SUPPORT)
+        beams[f"b{i}"] = el.Beam(f"w{i}", "d", el.Section(1477e6, 6e-3, thickness * factor), end_offset=(0.0, -down))
+    return el.Network(nodes, beams), el.Displacement("d", -np.pi / 2, np.linspace(0.05, 2.1, count) * rise)
 
 
 @cache
-def alone(count: int = 15, factor: float = 1.0, thickness: float = 7e-4, angle: float = 8.0) -> Path:
-    return trace(*leaves([factor], count, thickness, angle), Control(tolerance=1e-9))
+def alone(count: int = 15, factor: float = 1.0, thickness: float = 7e-4, angle: float = 8.0) -> el.Path:
+    return el.trace(*leaves([factor], count, thickness, angle), el.Control(tolerance=1e-9))
 
 
-def moments(path: Path, point: int) -> Any:
+def moments(path: el.Path, point: int) -> Any:
     """Return the moments at the shuttle."""
     at = path.at_requested[point]
     return np.array([path.end_force(name, 1)[at, 2] for name in path.network.beams])
 
 
-def changes(path: Path) -> list[tuple[str, int, int]]:
+def changes(path: el.Path) -> list[tuple[str, int, int]]:
     return [(event.kind, event.before, event.after) for event in path.events]
 
 
 @pytest.mark.parametrize(("many", "tolerance"), [(2, 1e-9), (5, 1e-5), (8, 1e-3)])
 def test_equal_leaves_buckle_together_and_straighten_together(many: int, tolerance: float) -> None:
     """They do not act on each other: everything is as for one of them, that many times."""
-    one, paths = alone(), [trace(*leaves(many, 15), Control(tolerance=tolerance, sign=sign)) for sign in (1, -1)]
+    one, paths = alone(), [el.trace(*leaves(many, 15), el.Control(tolerance=tolerance, sign=sign)) for sign in (1, -1)]
     for path, sense in zip(paths, (-1, 1), strict=True):
-        assert path.status is PathStatus.COMPLETE, path.message
+        assert path.status is el.PathStatus.COMPLETE, path.message
         assert path.stable.all()
         assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
         assert [event.drive for event in path.events] == pytest.approx([event.drive for event in one.events], rel=1e-7)
@@ -87,8 +73,8 @@ def test_leaves_that_hardly_differ_bear_what_each_bears_alone(
     factors: tuple[float, ...], thickness: float, angle: float, tolerance: float
 ) -> None:
     """They buckle together; those that differ by 1e-3 straighten one after the other: several ends of branches."""
-    path = trace(*leaves(factors, 15, thickness, angle), Control(tolerance=tolerance))
-    assert path.status is PathStatus.COMPLETE, path.message
+    path = el.trace(*leaves(factors, 15, thickness, angle), el.Control(tolerance=tolerance))
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable.all()
     if max(factors) < 1 + 1e-3:
         assert changes(path) == [("bifurcation", 0, len(factors)), ("bifurcation", len(factors), 0)]
@@ -103,20 +89,20 @@ def test_no_rounded_corner_hides_a_bifurcation_of_several_modes(many: int, count
     """Its branch has its name, the sign decides, and whoever wants to stop there is told."""
     one, places = alone(count, 1.0, 5.66e-4, 4.6), []
     for sign in (1, -1):
-        path = trace(*leaves(many, count, 5.66e-4, 4.6), Control(tolerance=1e-6, sign=sign))
+        path = el.trace(*leaves(many, count, 5.66e-4, 4.6), el.Control(tolerance=1e-6, sign=sign))
         assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
         assert (sign * moments(path, count // 3) < 0).all()
         places.append([event.drive for event in path.events])
     assert places[0] == pytest.approx([event.drive for event in one.events], rel=1e-6)
-    stopped = trace(*leaves(many, count, 5.66e-4, 4.6), Control(tolerance=1e-6, branch="stop"))
-    assert stopped.status is PathStatus.JUMPS
+    stopped = el.trace(*leaves(many, count, 5.66e-4, 4.6), el.Control(tolerance=1e-6, branch="stop"))
+    assert stopped.status is el.PathStatus.JUMPS
 
 
 def test_steps_do_not_shrink_until_they_follow_a_rounded_corner() -> None:
     """As they did here, where every shorter step came a little nearer to the bifurcation and not past it."""
     network, drive = leaves(5, 29, 0.0006034841487544531, 5.047877770936848)
     points = np.linspace(0.03, 2.1, 29) * float(drive.points[-1]) / 2.1
-    path = trace(network, Displacement("d", -np.pi / 2, points), Control(tolerance=6.665797876563091e-08))
+    path = el.trace(network, el.Displacement("d", -np.pi / 2, points), el.Control(tolerance=6.665797876563091e-08))
     assert changes(path) == [("bifurcation", 0, 5), ("bifurcation", 5, 0)]
 
 
@@ -124,11 +110,13 @@ def test_steps_do_not_shrink_until_they_follow_a_rounded_corner() -> None:
 def test_leaves_on_a_shuttle_that_may_turn_fare_alike_with_any_points(sign: Any, tolerance: float) -> None:
     """One mode turns the shuttle, three do not: the branch that they lead to has a limit point, which ends the path."""
     paths = [
-        trace(*leaves(4, count, support=slider_support(np.pi / 2, True)), Control(tolerance=tolerance, sign=sign))
+        el.trace(
+            *leaves(4, count, support=el.slider_support(np.pi / 2, True)), el.Control(tolerance=tolerance, sign=sign)
+        )
         for count in (5, 43)
     ]
     for path, middle in zip(paths, (2, 21), strict=True):
-        assert path.status is PathStatus.LIMIT_POINT, path.message
+        assert path.status is el.PathStatus.LIMIT_POINT, path.message
         assert path.stable.all()
         assert changes(path) == [("bifurcation", 0, 4)]
         assert path.drive[-1] == pytest.approx(6.294452e-3, rel=max(1e-6, tolerance**2))
@@ -140,19 +128,19 @@ def test_leaves_on_a_shuttle_that_may_turn_fare_alike_with_any_points(sign: Any,
 def test_columns_under_one_platform_bear_its_load_together(many: int, factor: float) -> None:
     """Under a load as under a displacement; were one to buckle alone the others would bear more than they can."""
 
-    def columns(count: int) -> Path:
-        nodes, beams = {"d": Node(0, 0.1, SHUTTLE)}, {}
+    def columns(count: int) -> el.Path:
+        nodes, beams = {"d": el.Node(0, 0.1, SHUTTLE)}, {}
         for i in range(count):
             x = 0.02 * (i - 0.5 * (count - 1))
-            nodes[f"w{i}"] = Node(x, 0, CLAMPED_SUPPORT)
-            section = Section(2e9, 1e-2, 1e-3 * (factor if i else 1.0))
-            beams[f"b{i}"] = Beam(f"w{i}", "d", section, end_offset=(x, 0.0))
-        drive = Loading((PointLoad("d", fy=-count * critical),), np.linspace(0.1, 1.3, 13))
-        return trace(Network(nodes, beams), drive, Control(tolerance=1e-5))
+            nodes[f"w{i}"] = el.Node(x, 0, el.CLAMPED_SUPPORT)
+            section = el.Section(2e9, 1e-2, 1e-3 * (factor if i else 1.0))
+            beams[f"b{i}"] = el.Beam(f"w{i}", "d", section, end_offset=(x, 0.0))
+        drive = el.Loading((el.PointLoad("d", fy=-count * critical),), np.linspace(0.1, 1.3, 13))
+        return el.trace(el.Network(nodes, beams), drive, el.Control(tolerance=1e-5))
 
     critical = 4 * np.pi**2 * 2e9 * (1e-2 * 1e-9 / 12) / 0.1**2
     one, path = columns(1), columns(many)
-    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.stable.all()
     apart = changes(path)  # a column that differs buckles before the others, or behind them
     assert [before for _, before, _ in apart] == [0] * len(apart)
@@ -164,8 +152,8 @@ def test_columns_under_one_platform_bear_its_load_together(many: int, factor: fl
 
 
 def test_a_mode_that_is_one_of_several_bends_all_leaves() -> None:
-    path = trace(*leaves(3, 15), Control(tolerance=1e-5, imperfection=1e-5))
-    assert path.status is PathStatus.COMPLETE
+    path = el.trace(*leaves(3, 15), el.Control(tolerance=1e-5, imperfection=1e-5))
+    assert path.status is el.PathStatus.COMPLETE
     assert path.events == ()
     found = moments(path, 4)
     assert found == pytest.approx(np.full(3, found.mean()), rel=0.05)

@@ -8,41 +8,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 from cfmkit.elastica.results.between_points import interpolate_path
 
 LENGTH = 35e-3
 
 
-def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path:
+def pressed(angle: float, thickness: float, points: Any, **control: Any) -> el.Path:
     nodes = {
-        "wall": Node(0, 0, CLAMPED_SUPPORT),
-        "d": Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), slider_support(np.pi / 2)),
+        "wall": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "d": el.Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), el.slider_support(np.pi / 2)),
     }
-    leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
-    return trace(leaf, Displacement("d", -np.pi / 2, np.asarray(points)), Control(**control))
+    leaf = el.Network(nodes, {"v": el.Beam("wall", "d", el.Section(1477e6, 6e-3, thickness))})
+    return el.trace(leaf, el.Displacement("d", -np.pi / 2, np.asarray(points)), el.Control(**control))
 
 
 def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> None:
     """A leaf of a twelfth of its rise: the end of its branch is passed over."""
     angle = 0.0796134409080207
     path = pressed(angle, 2.3904131510924884e-4, [5.051286820682658e-3], tolerance=1.0623860005428965e-6, sign=-1)
-    assert path.status is PathStatus.COMPLETE
+    assert path.status is el.PathStatus.COMPLETE
     assert path.stable.all()
     assert path.branch[-1] == "primary"
 
@@ -86,15 +71,19 @@ def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1.7e-5, 1e-6])
 def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float) -> None:
     half, rise = 0.06, 0.012
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED_SUPPORT)}
-    section = Section(2e9, 8e-3, rise / 12)
-    beams = {
-        "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
-        "y": Beam("t", "b", section, CosineArch(-rise, 0.5)),
+    nodes = {
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "t": el.Node(half, rise),
+        "b": el.Node(2 * half, 0, el.CLAMPED_SUPPORT),
     }
-    drive = Displacement("t", -np.pi / 2, np.linspace(0, 1.2 * rise, 7)[1:])
+    section = el.Section(2e9, 8e-3, rise / 12)
+    beams = {
+        "x": el.Beam("a", "t", section, el.CosineArch(rise, 0.5)),
+        "y": el.Beam("t", "b", section, el.CosineArch(-rise, 0.5)),
+    }
+    drive = el.Displacement("t", -np.pi / 2, np.linspace(0, 1.2 * rise, 7)[1:])
     loose, tight = (
-        trace(Network(nodes, beams), drive, Control(limit, imperfection=3e-5)) for limit in (tolerance, 1e-9)
+        el.trace(el.Network(nodes, beams), drive, el.Control(limit, imperfection=3e-5)) for limit in (tolerance, 1e-9)
     )
     assert "buckling mode" in loose.imperfection
     turns = [np.abs(path.motion("t")[path.at_requested, 2]) for path in (loose, tight)]
@@ -105,18 +94,22 @@ def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float
 def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
     """Where no node moves in the mode, by the moment at the clamp; else by the node's rotation."""
     angle, rise, half = np.radians(7), 0.006, 0.03
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED_SUPPORT)}
-    section = Section(2e9, 8e-3, rise / 10)
-    beams = {
-        "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
-        "y": Beam("t", "b", section, CosineArch(-rise, 0.5)),
+    nodes = {
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "t": el.Node(half, rise),
+        "b": el.Node(2 * half, 0, el.CLAMPED_SUPPORT),
     }
-    down = Displacement("t", -np.pi / 2, np.linspace(0, 1.0 * rise, 7)[1:])
+    section = el.Section(2e9, 8e-3, rise / 10)
+    beams = {
+        "x": el.Beam("a", "t", section, el.CosineArch(rise, 0.5)),
+        "y": el.Beam("t", "b", section, el.CosineArch(-rise, 0.5)),
+    }
+    down = el.Displacement("t", -np.pi / 2, np.linspace(0, 1.0 * rise, 7)[1:])
     moments, turns = [], []
     for tolerance in (1e-3, 1e-5, 5e-6, 1e-6, 1e-8):
         leaf = pressed(angle, 1e-3, [1e-3, 2e-3], tolerance=tolerance, sign=sign)
         moments.append(leaf.end_force("v", 1)[leaf.at_requested[-1], 2])
-        arch = trace(Network(nodes, beams), down, Control(tolerance=tolerance, sign=sign))
+        arch = el.trace(el.Network(nodes, beams), down, el.Control(tolerance=tolerance, sign=sign))
         turns.append(arch.motion("t")[arch.at_requested[-1], 2])
     assert moments == pytest.approx([-0.01141 * sign] * 5, rel=1e-2)
     assert abs(turns[0]) > 0.05
@@ -130,15 +123,19 @@ def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(t
 
     N = 20.1907 EI / L^2 (tan u = u); there is no stable equilibrium near.
     """
-    angle, length, stiff = np.radians(8), 0.05, Section(2e9, 8e-3, 1e-3, axial=False)
+    angle, length, stiff = np.radians(8), 0.05, el.Section(2e9, 8e-3, 1e-3, axial=False)
     across, up = length * np.cos(angle), length * np.sin(angle)
-    nodes = {"left": Node(-across, 0, CLAMPED_SUPPORT), "apex": Node(0, up), "right": Node(across, 0, CLAMPED_SUPPORT)}
-    beams = {"one": Beam("left", "apex", stiff), "two": Beam("right", "apex", stiff)}
+    nodes = {
+        "left": el.Node(-across, 0, el.CLAMPED_SUPPORT),
+        "apex": el.Node(0, up),
+        "right": el.Node(across, 0, el.CLAMPED_SUPPORT),
+    }
+    beams = {"one": el.Beam("left", "apex", stiff), "two": el.Beam("right", "apex", stiff)}
     root = 4.493409457909064
     force = 2 * np.sin(angle) * root**2 * 2e9 * 8e-3 * 1e-9 / 12 / length**2
-    drive = Loading((PointLoad("apex", fy=-force),), np.linspace(0.0, 1.5, steps + 1)[1:])
-    path = trace(Network(nodes, beams), drive, Control(tolerance=tolerance))
-    assert path.status is PathStatus.JUMPS
+    drive = el.Loading((el.PointLoad("apex", fy=-force),), np.linspace(0.0, 1.5, steps + 1)[1:])
+    path = el.trace(el.Network(nodes, beams), drive, el.Control(tolerance=tolerance))
+    assert path.status is el.PathStatus.JUMPS
     assert path.stable.all()
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
     assert path.events[0].drive == pytest.approx(1.0, rel=10 * tolerance)

@@ -5,72 +5,63 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.elastica import (
-    CLAMPED_SUPPORT,
-    PINNED_SUPPORT,
-    Beam,
-    Control,
-    CosineArch,
-    Displacement,
-    Loading,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    PointLoad,
-    Section,
-    slider_support,
-    trace,
-)
+import cfmkit.elastica as el
 
 DOWN = -np.pi / 2
 RISE = 35e-3 * np.sin(np.radians(8.0))
-SECTION = Section(2e9, 8e-3, 1e-3)
+SECTION = el.Section(2e9, 8e-3, 1e-3)
 TOLERANCES = (1e-3, 1e-5, 1e-7)
 
 
-def leaves(count: int) -> Network:
+def leaves(count: int) -> el.Network:
     """Return equal inclined leaves on a guided shuttle: pressed down they buckle, and straighten out beyond."""
     across = 35e-3 * np.cos(np.radians(8.0))
-    nodes, beams = {"d": Node(0, RISE, slider_support(np.pi / 2))}, {}
+    nodes, beams = {"d": el.Node(0, RISE, el.slider_support(np.pi / 2))}, {}
     for k in range(count):
-        nodes[f"w{k}"] = Node(across * (-1) ** k, 0, CLAMPED_SUPPORT)
-        beams[f"b{k}"] = Beam(f"w{k}", "d", Section(1477e6, 6e-3, 7e-4))
-    return Network(nodes, beams)
+        nodes[f"w{k}"] = el.Node(across * (-1) ** k, 0, el.CLAMPED_SUPPORT)
+        beams[f"b{k}"] = el.Beam(f"w{k}", "d", el.Section(1477e6, 6e-3, 7e-4))
+    return el.Network(nodes, beams)
 
 
-def pressed(points: object, tolerance: float, count: int = 1, **control: object) -> Path:
+def pressed(points: object, tolerance: float, count: int = 1, **control: object) -> el.Path:
     """Return the path of leaves pressed down by shares of their rise; it must be complete."""
-    drive = Displacement("d", DOWN, np.asarray(points, dtype=float) * RISE)
-    path = trace(leaves(count), drive, Control(tolerance=tolerance, **control))  # type: ignore[arg-type]
-    assert path.status is PathStatus.COMPLETE, path.message
+    drive = el.Displacement("d", DOWN, np.asarray(points, dtype=float) * RISE)
+    path = el.trace(leaves(count), drive, el.Control(tolerance=tolerance, **control))  # type: ignore[arg-type]
+    assert path.status is el.PathStatus.COMPLETE, path.message
     return path
 
 
-def toggle(shift: float) -> Network:
+def toggle(shift: float) -> el.Network:
     """Return two clamped bars, one longer by a shift."""
-    nodes = {"a": Node(0, 0, CLAMPED_SUPPORT), "t": Node(0.1, 0.012), "b": Node(0.2 + shift, 0, CLAMPED_SUPPORT)}
-    return Network(nodes, {"x": Beam("a", "t", SECTION), "y": Beam("t", "b", SECTION)})
+    nodes = {
+        "a": el.Node(0, 0, el.CLAMPED_SUPPORT),
+        "t": el.Node(0.1, 0.012),
+        "b": el.Node(0.2 + shift, 0, el.CLAMPED_SUPPORT),
+    }
+    return el.Network(nodes, {"x": el.Beam("a", "t", SECTION), "y": el.Beam("t", "b", SECTION)})
 
 
-def arch() -> Network:
-    nodes = {"a": Node(0, 0, PINNED_SUPPORT), "t": Node(0.1, 0.02), "b": Node(0.2, 0, PINNED_SUPPORT)}
-    beams = {"x": Beam("a", "t", SECTION, CosineArch(0.02, 0.5)), "y": Beam("t", "b", SECTION, CosineArch(-0.02, 0.5))}
-    return Network(nodes, beams)
+def arch() -> el.Network:
+    nodes = {"a": el.Node(0, 0, el.PINNED_SUPPORT), "t": el.Node(0.1, 0.02), "b": el.Node(0.2, 0, el.PINNED_SUPPORT)}
+    beams = {
+        "x": el.Beam("a", "t", SECTION, el.CosineArch(0.02, 0.5)),
+        "y": el.Beam("t", "b", SECTION, el.CosineArch(-0.02, 0.5)),
+    }
+    return el.Network(nodes, beams)
 
 
-def loaded(network: Network, points: object, tolerance: float, **control: object) -> Path:
-    load = Loading((PointLoad("t", fy=-1.0),), np.asarray(points, dtype=float))
-    path = trace(network, load, Control(tolerance=tolerance, through_folds=True, **control))  # type: ignore[arg-type]
-    assert path.status is PathStatus.COMPLETE, path.message
+def loaded(network: el.Network, points: object, tolerance: float, **control: object) -> el.Path:
+    load = el.Loading((el.PointLoad("t", fy=-1.0),), np.asarray(points, dtype=float))
+    path = el.trace(network, load, el.Control(tolerance=tolerance, through_folds=True, **control))  # type: ignore[arg-type]
+    assert path.status is el.PathStatus.COMPLETE, path.message
     return path
 
 
-def reported(path: Path) -> list[tuple[str, int, int]]:
+def reported(path: el.Path) -> list[tuple[str, int, int]]:
     return [(event.kind, event.before, event.after) for event in path.events]
 
 
-def places(path: Path) -> list[float]:
+def places(path: el.Path) -> list[float]:
     return [event.drive for event in path.events]
 
 
@@ -102,16 +93,16 @@ def test_on_a_branch_the_drive_may_turn_round_as_often_as_it_likes(tolerance: fl
 
 
 def test_a_path_that_ends_in_a_stretch_does_not_begin_the_next() -> None:
-    path = trace(arch(), Loading((PointLoad("t", fy=-1.0),), np.array([0.3, 2.0, 0.3])))
-    assert path.status is PathStatus.JUMPS
+    path = el.trace(arch(), el.Loading((el.PointLoad("t", fy=-1.0),), np.array([0.3, 2.0, 0.3])))
+    assert path.status is el.PathStatus.JUMPS
     assert path.requested[path.at_requested].tolist() == [0]
 
 
 @pytest.mark.parametrize("tolerance", TOLERANCES)
 def test_a_toggle_snaps_and_snaps_back_at_the_limit_points_of_its_force(tolerance: float) -> None:
     """Bars of different length: driven by its travel the toggle has no bifurcation, only a force that falls."""
-    travel = Displacement("t", DOWN, np.linspace(0, 0.02, 801)[1:])
-    force = trace(toggle(1e-3), travel, Control(tolerance=1e-7)).effort
+    travel = el.Displacement("t", DOWN, np.linspace(0, 0.02, 801)[1:])
+    force = el.trace(toggle(1e-3), travel, el.Control(tolerance=1e-7)).effort
     first = int((np.diff(force) < 0).argmax())
     top, low = force[first], force[first:].min()
     path = loaded(toggle(1e-3), [0.4, 0.8, 1.5, 0.8, 0.4, 0], tolerance)
