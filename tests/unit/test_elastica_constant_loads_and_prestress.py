@@ -1,4 +1,4 @@
-"""Prestressed springs and constant loads beyond a bifurcation: the path starts on the stable branch and says so.
+"""Constant loads and prestressed springs beyond a bifurcation: the path starts on the stable branch and says so.
 
 A column, clamped at its foot, is pressed by a tendon from its top to its foot. The force goes through the foot, so that
 the column bends as one with two pinned ends does: it buckles at four times Euler's load, and its foot, where it is
@@ -7,10 +7,12 @@ clamped, is inclined to the tendon as such a column's end is.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from buckling_structures import STIFF_STRIP, STRIP, half_arch, load
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk, ellipkinc
 
@@ -19,12 +21,11 @@ import cfmkit.elastica as el
 LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
 EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
 STIFF = 50 * EULER / LENGTH  # of the tendon
-RIGID = el.Section(2e9, 8e-3, 1e-3, axial=False)
 NODES = {"foot": el.Node(0, 0, el.CLAMPED_SUPPORT), "top": el.Node(LENGTH, 0)}
 
 
 def column(springs: Any, loads: Any = ()) -> el.Network:
-    return el.Network(NODES, {"column": el.Beam("foot", "top", RIGID)}, springs=springs, loads=loads)
+    return el.Network(NODES, {"column": el.Beam("foot", "top", STIFF_STRIP)}, springs=springs, loads=loads)
 
 
 def tendon(ratio: float, pull: float = 0.0, **control: Any) -> el.Path:
@@ -80,20 +81,29 @@ def test_a_prestressed_spring_of_fixed_direction_buckles_a_column_as_a_dead_load
     assert abs(path.motion("top")[0, 2]) == pytest.approx(2 * np.arcsin(np.sqrt(m)), rel=1e-6)
 
 
-def test_prestress_beyond_a_bifurcation_as_the_control_says() -> None:
+@pytest.mark.parametrize("cause", ["prestress", "constant loads"])
+def test_a_start_beyond_a_bifurcation_is_as_the_control_says(cause: str) -> None:
     """Straight on, unstable; nowhere, since stability is lost before the drive begins; bent by an imperfection."""
-    primary = tendon(5.0, branch="primary")
+
+    def start(ratio: float, **control: Any) -> el.Path:
+        if cause == "prestress":
+            return tendon(4 * ratio, **control)
+        return pressed(ratio, el.PointLoad("top", fy=0.01 * EULER), [0.5, 1.0], **control)
+
+    primary = start(1.25, branch="primary")
+    assert primary.status is el.PathStatus.COMPLETE
     assert (primary.unstable == 1).all()
     assert primary.events == ()
-    stopped = tendon(5.0, branch="stop")
+    stopped = start(1.25, branch="stop")
     assert (stopped.status, len(stopped)) == (el.PathStatus.JUMPS, 0)
-    assert "of the prestress" in stopped.message
-    assert tendon(3.9, branch="stop").status is el.PathStatus.COMPLETE
-    one, other = (tendon(5.0, imperfection=size) for size in (1e-6, -1e-6))
-    assert one.stable.all()
-    assert other.stable.all()
-    assert one.imperfection == "1e-06 m of the buckling mode under 80 % of the prestress"
-    assert one.motion("top")[0, 1] == pytest.approx(-other.motion("top")[0, 1])
+    assert f"of the {cause}" in stopped.message
+    assert start(0.9, branch="stop").status is el.PathStatus.COMPLETE
+    left, right = (start(1.25, imperfection=size) for size in (1e-6, -1e-6))
+    assert left.stable.all()
+    assert right.stable.all()
+    assert left.imperfection == f"1e-06 m of the buckling mode under 80 % of the {cause}"
+    assert left.motion("top")[0, 1] * right.motion("top")[0, 1] < 0
+    assert cause != "prestress" or left.motion("top")[0, 1] == pytest.approx(-right.motion("top")[0, 1])
 
 
 @pytest.mark.parametrize("pull", [0.4, 1.0, 1.5, 2.0])
@@ -189,8 +199,7 @@ def test_a_branch_under_constant_loads_ends_where_the_drive_relieves_them(tolera
 def test_a_column_bent_by_little_is_pressed_far_beyond_its_critical_load(tolerance: float) -> None:
     """Without leaving the path it turns sharply near that load: the coarse mesh needs as much patience as the drive."""
     nodes = {"foot": NODES["foot"], "middle": el.Node(0.5 * LENGTH, 0), "top": NODES["top"]}
-    section = el.Section(2e9, 8e-3, 1e-3)
-    beams = {"one": el.Beam("foot", "middle", section), "two": el.Beam("middle", "top", section)}
+    beams = {"one": el.Beam("foot", "middle", STRIP), "two": el.Beam("middle", "top", STRIP)}
     springs = (el.LineSpring("top", None, EULER / LENGTH, ground=(1.5 * LENGTH, 0.0)),)
     bent = el.Network(nodes, beams, springs=springs, loads=(el.PointLoad("top", fx=-4.16 * EULER),))
     push = el.Loading((el.PointLoad("top", fy=0.5 * EULER),), np.array([0.2, 0.5]))
@@ -199,3 +208,54 @@ def test_a_column_bent_by_little_is_pressed_far_beyond_its_critical_load(toleran
     )
     assert path.status is el.PathStatus.COMPLETE, path.message
     assert path.motion("top")[-1] == pytest.approx(fine.motion("top")[-1], rel=10 * tolerance)
+
+
+@pytest.mark.parametrize("loads", [(), (el.PointLoad("top", fy=1e-6),)])
+def test_a_spring_may_be_prestressed_by_a_large_turn(loads: tuple[el.PointLoad, ...]) -> None:
+    """A torsion spring of 0.05 N m/rad bends the end of a cantilever: the end moment is k (2 - turn)."""
+    springs = (el.TorsionSpring(None, "top", 0.05, 2.0),)
+    strip = el.Network(NODES, {"x": el.Beam("foot", "top", STRIP)}, springs=springs, loads=loads)
+    path = el.trace(strip, el.Displacement("top", 0.0, np.array([-1e-4])), el.Control(tolerance=1e-9))
+    assert path.status is el.PathStatus.COMPLETE
+    turn = path.motion("top")[-1, 2]
+    assert path.end_force("x", 1)[-1, 2] == pytest.approx(0.05 * (2.0 - turn), rel=1e-6)
+
+
+@pytest.mark.parametrize(("sign", "ratio"), [(1, 1.05), (-1, 1.2), (1, 2.0), (1, 6.0)])
+def test_constant_loads_beyond_a_bifurcation_start_on_its_stable_branch(sign: Any, ratio: float) -> None:
+    """The elastica; S. P. Timoshenko and J. M. Gere, Theory of Elastic Stability, 1961, sec. 2.7, k = sin(angle/2)."""
+    path = pressed(ratio, el.PointLoad("top", fy=-sign * 1e-9 * EULER), [0.5, 1.0], tolerance=1e-9, sign=sign)
+    k = brentq(lambda k: ellipk(k * k) / (np.pi / 2) - np.sqrt(ratio), 1e-9, 1 - 1e-12)
+    assert path.status is el.PathStatus.COMPLETE
+    assert path.stable.all()
+    assert abs(path.motion("top")[0, 2]) == pytest.approx(2 * np.arcsin(k), rel=1e-6)
+    assert path.motion("top")[0, 1] * sign < 0
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation under constant loads", 0, 1)]
+    assert path.events[0].drive * ratio == pytest.approx(1.0, rel=1e-7)
+    assert set(path.branch) == {f"bifurcated under {100 / ratio:.4g} % of the constant loads, sign {sign:+d}"}
+
+
+def test_a_displacement_held_from_the_start_beyond_a_bifurcation() -> None:
+    """A guided column shortened by its support, then driven sideways at its middle: buckled from the start."""
+    short = el.Support(True, True, True, displacement=(-2e-3, 0.0, 0.0))
+    nodes = {"foot": NODES["foot"], "middle": el.Node(0.05, 0), "top": el.Node(0.1, 0, short)}
+    beams = {"one": el.Beam("foot", "middle", STRIP), "two": el.Beam("middle", "top", STRIP)}
+    drive = el.Loading((el.PointLoad("middle", fy=1e-9),), np.array([1.0]))
+    signs: tuple[Any, ...] = (1, -1)
+    paths = [el.trace(el.Network(nodes, beams), drive, el.Control(sign=sign)) for sign in signs]
+    rises = [path.motion("middle")[0, 1] for path in paths]
+    assert all(path.stable.all() for path in paths)
+    assert rises[0] == pytest.approx(-rises[1], rel=1e-4)
+    # shallow: y = h (1 - cos(2 pi x / L)) / 2 is longer than its span by (pi h)^2 / (4 L)
+    assert abs(rises[0]) == pytest.approx(2 / np.pi * np.sqrt(2e-3 * 0.1), rel=0.03)
+
+
+def test_constant_loads_beyond_a_limit_point_say_at_which_share() -> None:
+    """The limit load itself is that of the same load as a drive."""
+    half = half_arch(4e-3, 1.6e-3)
+    alone = el.trace(half, load("t", [10.0]), el.Control(branch="primary"))
+    assert alone.status is el.PathStatus.LIMIT_POINT
+    heavy = replace(half, loads=(el.PointLoad("t", fy=-2.5 * float(alone.drive[-1])),))
+    path = el.trace(heavy, load("t", [0.1]))
+    assert path.status is el.PathStatus.NO_START
+    assert "lost at 0.4 of the constant loads" in path.message
