@@ -547,6 +547,29 @@ def test_the_laws_of_a_family_out_of_reach_are_asked_once_for_each_key_and_facto
     assert len(relaxed_keys) < len(asked) <= 1 + len(relaxed_keys) * len(relaxed_requests.RELAXATION_FACTORS)
 
 
+def test_no_requirement_is_relaxed_by_more_than_six_times(monkeypatch):
+    sides = []
+
+    def offer(relaxed, *_):
+        sides.append(relaxed.envelope[0] / request().envelope[0])
+        return ("a candidate",) if sides[-1] > 5.9 else ()
+
+    monkeypatch.setattr(relaxed_requests, "_offer", offer)
+    monkeypatch.setattr(relaxed_requests, "make_proposal", lambda job: Proposal(job.family, "too large still"))
+    monkeypatch.setattr(relaxed_requests, "ProposalJob", lambda name, *_: Proposal(name, ""))
+    (edge,) = [edge for edge in edges(request(), ("beam",), 0, UNLIMITED_CLOCK) if edge.key == "envelope"]
+    assert confirm(request(), 0, UNLIMITED_CLOCK, edge) is None
+    assert 5.9 < max(sides) < 6.001
+
+
+def test_a_request_that_nothing_comes_near_says_so(monkeypatch):
+    monkeypatch.setattr(search, "names", lambda: ("beam",))
+    monkeypatch.setattr(search, "edges", lambda *_: iter(()))
+    found = suggest(request(envelope="[26 mm, 20 mm, 12 mm]"), Run())
+    assert found.remote
+    assert message(found) == "no mechanism meets the requirements, nor with one of them relaxed up to 6 times"
+
+
 def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeypatch):
     monkeypatch.setattr(relaxed_requests, "_offer", lambda *_: ("a candidate",))
     assert {edge.factor for edge in edges(request(), ("beam",), 0, UNLIMITED_CLOCK)} == {1.0}
