@@ -92,7 +92,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
     candidates: list[Candidate] = []
     for index in chosen:
         made = _candidate(request, {name: float(values[index]) for name, values in found.items()})
-        candidates += [made, _from_catalogue(made)] if made else []
+        candidates += [made, _from_catalogue(made, request)] if made else []
         if len(candidates) >= MAX_PROPOSALS:
             break
     if not candidates:
@@ -173,10 +173,10 @@ def _candidate(request: Request, size: dict[str, float]) -> Candidate | None:
         pin = _slider_pin(request, size, thick, material)
         for count in SPRING_COUNTS if pin is not None else ():
             springs = Springs(stiffness=total / count, count=count)
-            depth = depth_of(thick, springs, stretch, size["start"])
+            depth = depth_of(thick, springs, stretch, size["start"], request.safety)
             if depth is None or depth > (request.depth or sum(request.envelope)):
                 continue
-            stack = stack_height(coil_diameter(springs, stretch, size["start"]) or 0.0, count)
+            stack = stack_height(coil_diameter(springs, stretch, size["start"], request.safety) or 0.0, count)
             below = 0.5 * stack - max(size["roller"], TAB_HEIGHT_RATIO * request.envelope[1])
             if size["height"] + max(below, 0.0) <= request.envelope[1]:
                 depths[count] = depth
@@ -204,7 +204,7 @@ def _slider_pin(request: Request, size: dict[str, float], thick: float, material
     return max(pin, PIN_SHARE * 2.0 * size["roller"]) if pin_bears and shaft_bears and max(pin, shaft) <= most else None
 
 
-def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
+def with_wire(spec: CamSpec, request: Request) -> CamSpec:
     """Return a designed cam whose springs have wire, coil and turns: the slimmest that fit between the rollers.
 
     They are those that its depth counts with (`part.depth_of`).
@@ -216,10 +216,11 @@ def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
     if springs.wound is not None or solution is None:
         return spec
     stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
-    coil = extension_spring(springs.total / count_of(springs), stretch, length)
+    coil = extension_spring(springs.total / count_of(springs), stretch, length, request.safety)
     if coil is None:
         return spec
-    return spec.replace({f"mechanism.springs.{key}": value for key, value in as_stated(coil).items()})
+    stated = {"count": springs.count, "preload": springs.preload} if springs.preload else {"count": springs.count}
+    return spec.replace({"mechanism.springs": {**stated, **as_stated(coil)}})
 
 
 def with_plate(spec: CamSpec, request: Request) -> CamSpec:
@@ -236,9 +237,11 @@ def with_plate(spec: CamSpec, request: Request) -> CamSpec:
     )
 
 
-def _from_catalogue(made: Candidate) -> Candidate:
+def _from_catalogue(made: Candidate, request: Request) -> Candidate:
     """Return the same proportions with springs of the generic series; from these the force constant follows."""
-    spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
+    spec = made.spec.replace(
+        {"design.choose": "catalogue", "design.catalogue": "generic", "design.spring_safety": request.safety}
+    )
     return replace(
         made,
         variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
