@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.errors import SolutionError
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.hardware import SHAFT_IN_ROLLER
 from cfmkit.families.cam.part_sizes import BRACE_WIDTH, coil_diameter, count_of, depth_of, stack_height
@@ -66,8 +67,8 @@ ROLLER_MIN = 0.0015
 SHAFT_ARM = 0.004
 """About how far from the braces a roller presses on its shaft [m]: half of a plate of 5 mm and of a brace."""
 
-SPRING_COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
-"""Numbers of springs that are tried."""
+SPRING_COUNTS = (2, 4, 6, 8, 12, 20, 40)
+"""Numbers of springs that are tried: an odd one would pull on one side of the plate."""
 
 SPARE_SHARE, SPARE_LENGTH = 0.03, 0.3e-3
 """Of the travel, and [m]: beyond the window where made parts have to be good; holes that lie 0.05 mm off move the end
@@ -229,6 +230,8 @@ def with_plate(spec: CamSpec, request: Request) -> CamSpec:
     from cfmkit.families.run_control import Run
     from cfmkit.metrics import evaluate
 
+    if count_of(spec.mechanism.springs) % 2:
+        raise SolutionError("an odd number of springs of the catalogue would pull on one side of the plate")
     factor = evaluate(analyze(spec, Run()), ["safety_factor"])["safety_factor"].value
     if factor is None or factor >= request.safety or spec.mechanism.contact is None:
         return spec

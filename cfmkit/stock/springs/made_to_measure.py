@@ -94,7 +94,7 @@ def torsion_spring(
     --------
     >>> spring = torsion_spring(0.05, 1.0, 0.05)
     >>> round(spring.rate, 4), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), spring.turns
-    (0.05, 0.8, 4.8, 6.58)
+    (0.05, 0.8, 4.8, 6.59)
     >>> torsion_spring(0.05, 1.0, 0.002) is None
     True
     """
