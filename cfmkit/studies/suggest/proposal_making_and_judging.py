@@ -17,6 +17,7 @@ from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import ENVELOPE_METRICS, add_size, function_named
+from cfmkit.families.hardware import SAFETY_METRICS
 from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
@@ -466,8 +467,8 @@ def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> d
 
 
 def _least_factor(found: Mapping[str, Any]) -> float | None:
-    """Return the smallest safety factor: of the part that bends, or of links."""
-    known = [found[name].value for name in ("safety_factor", "link_safety_factor") if name in found]
+    """Return the smallest safety factor: of the part that bends, of links, or of springs."""
+    known = [found[name].value for name in SAFETY_METRICS if name in found]
     return min((value for value in known if value is not None), default=None)
 
 
