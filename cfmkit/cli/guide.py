@@ -102,11 +102,6 @@ def read_terms() -> dict[str, str]:
     return meanings
 
 
-def list_terms() -> dict[str, list[dict[str, str]]]:
-    """Return the words of the glossary as `cfmkit show` lists names: by word, its records."""
-    return {name: [{"name": name, "meaning": meaning}] for name, meaning in read_terms().items()}
-
-
 def words_for_synonym(word: str) -> tuple[str, ...]:
     """Return the words and names that the glossary gives for a synonym; empty if it is none.
 

@@ -87,15 +87,6 @@ NoLock = Annotated[
     flag("--no-lock", text="Do not lock the output folder: no other run may use it (for file systems without locks)."),
 ]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse no results of an earlier run.")]
-Tables = Annotated[
-    str,
-    option(
-        "--table",
-        metavar="csv,parquet",
-        shown=True,
-        text="Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
-    ),
-]
 Animate = Annotated[
     Literal["gif", "mp4"] | None,
     option(
@@ -212,6 +203,16 @@ class ComputeOptions(OneSpec, FigureChoice):
 class StudyOptions(ComputeOptions):
     """Options of verbs that evaluate many points."""
 
+    report: WithReport = False
+    table: Annotated[
+        str,
+        option(
+            "--table",
+            metavar="csv,parquet",
+            shown=True,
+            text="Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
+        ),
+    ] = "csv"
     jobs: Jobs = None
     cluster: Annotated[
         str | None,

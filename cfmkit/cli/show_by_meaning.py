@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cfmkit.cli.guide import compile_phrases, read_terms, search, words_for_synonym
@@ -90,7 +89,7 @@ def _named_texts() -> tuple[tuple[str, str, str], ...]:
     return tuple(
         (singular, *_name_and_meaning(record))
         for kind, singular in KINDS_OF_NAMES.items()
-        for record in chain.from_iterable(TOPIC_KINDS[kind][0]().values())
+        for record in TOPIC_KINDS[kind].records()
     )
 
 

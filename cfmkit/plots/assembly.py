@@ -112,7 +112,7 @@ def _blank_axes(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
 
 def _print_size(ax: Axes) -> tuple[float, float]:
     """Return width and height of axes [mm of print]."""
-    (width, height), box = size_mm(ax.get_figure(root=True)), ax.get_position()
+    (width, height), box = size_mm(ax.figure), ax.get_position()
     return width * box.width, height * box.height
 
 

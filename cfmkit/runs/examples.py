@@ -105,14 +105,15 @@ def _first_sentence(text: str) -> str:
 
 
 def example(name: str) -> Example:
-    """Return one example by its name, with or without its ending.
+    """Return one example by its name, with or without its folder and its ending.
 
     Raises
     ------
     cfmkit.errors.UsageError
         If there is none of that name.
     """
-    known = {one.name: one for one in examples()}
+    listed = examples()
+    known = {one.path.stem: one for one in listed} | {one.name: one for one in listed}
     wanted = name.removesuffix(".yaml")
     if wanted in known:
         return known[wanted]
