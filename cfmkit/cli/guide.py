@@ -56,10 +56,7 @@ def _title(path: Path) -> str:
 def page(name: str) -> GuidePage:
     """Return one page by its name; ``docs/cam.md``, as files link to it, is the page ``cam``.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none of that name.
+    Raises UsageError if there is none of that name.
     """
     by_name = {guide_page.name: guide_page for guide_page in pages()}
     wanted = name.removeprefix("docs/").partition("#")[0].removesuffix(".md").replace("-", "_")

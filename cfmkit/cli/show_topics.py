@@ -41,10 +41,7 @@ if TYPE_CHECKING:
 def explain(name: str | None) -> Document:
     """Return what there is to say of a topic, a family, or whatever else has that name; without a name what there is.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If there is none; the message names the nearest.
+    Raises UsageError if there is none; the message names the nearest.
     """
     if name is None:
         return overview()

@@ -61,20 +61,13 @@ LETTERS_PER_MM = 0.6
 
 
 @apply_style
-def assembly_figure(title: str, bodies: Sequence[PosedBody], parts: Sequence[ListedPart], pose: int) -> Figure:
-    """Return the picture of an assembly.
-
-    Parameters
-    ----------
-    title : str
-        What the mechanism is called.
-    bodies : sequence of PosedBody
-        What is drawn, the lowest first; those of a part have the name that its `body` says.
-    parts : sequence of ListedPart
-        In the order of their item numbers.
-    pose : int
-        Which pose of bodies that move.
-    """
+def assembly_figure(
+    title: str,  # what the mechanism is called
+    bodies: Sequence[PosedBody],  # what is drawn, the lowest first; those of a part have the name that its `body` says
+    parts: Sequence[ListedPart],  # in the order of their item numbers
+    pose: int,  # which pose of bodies that move
+) -> Figure:
+    """Return the picture of an assembly."""
     drawn = [(body, mm(body.outline(pose))) for body in bodies]
     points = np.vstack([outline for _, outline in drawn])
     low, high = points.min(axis=0), points.max(axis=0)

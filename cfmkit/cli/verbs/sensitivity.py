@@ -111,12 +111,7 @@ def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
 def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
     """Return a spec with what the options say about its block `sensitivity`.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If an option is malformed.
-    cfmkit.errors.SpecError
-        If the block is not valid with it.
+    Raises UsageError if an option is malformed; SpecError if the block is not valid with it.
     """
     from cfmkit.studies.parts.uncertain_values import with_options
 
@@ -152,10 +147,7 @@ def changes_of(options: SensitivityOptions) -> dict[str, Any]:
 def spread(option: str) -> tuple[str, Any]:
     """Return (path, range or tolerance) of ``--vary``.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is neither.
+    Raises UsageError if it is neither.
     """
     path, equals, text = (part.strip() for part in option.partition("="))
     first, colon, second = (part.strip() for part in text.partition(":"))

@@ -90,10 +90,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
 def request(options: SweepOptions) -> SweepRequest:
     """Return what the options ask for.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If one is malformed, or two contradict each other.
+    Raises UsageError if one is malformed, or two contradict each other.
     """
     from cfmkit.cli.run_study_in_folder import names
     from cfmkit.studies.sweep_request_and_files import SweepRequest
