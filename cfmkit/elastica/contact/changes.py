@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
-from cfmkit.elastica.contact.side_conditions import SideCondition, SideConditions
+from cfmkit.elastica.contact.side_conditions import SideConditions
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
 from cfmkit.elastica.mechanics.discretise import FlankPlace
@@ -39,20 +39,6 @@ FEWEST_SAMPLES = 16  # of a step between whose ends a gap may close and open aga
 SAMPLES_PER_RADIUS = 6.0  # of the smallest radius that a pad may pass
 MAX_SLOPE_STEPS = 3.0  # times a step's motion that its slopes may promise, for a cubic to tell what is between
 SIDES_TOGETHER, NODES_TOGETHER = 6, 40  # states of a march, between which it is seen at once whether a contact changes
-
-
-class ContactChange(NamedTuple):
-    """The begin or end of a contact; unstable directions before and after it."""
-
-    kind: Literal["begins", "ends", "blocks", "moves", "spreads", "closes", "slips", "sticks"]
-    number: int  # of the contact in the arrays of its piece
-    at: PathEquilibrium
-    before: int
-    after: int
-    contact: int = -1  # in `Network.contacts`
-    condition: SideCondition | None = None  # on the side of a beam, that is met
-    piece: PieceOfPath | None = None  # whose unknowns `at` has; None: that of the piece before
-    states: int = 1  # of friction that are possible behind it
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,17 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.contact.path_items import StatesOfPiece
 
 FEWEST_APART = 0.02  # of the way between two neighbours, by which an open contact stays away from both
 SAME_POINT = 1e-3  # motion by which a joined state may be corrected
-
-
-class StatesOfPiece(NamedTuple):
-    """States of one piece: all unknowns (n, size) and drives (n,)."""
-
-    mesh: Discretisation
-    z: FloatArray
-    drive: FloatArray
 
 
 class _Slot(NamedTuple):

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import ContactChange, PieceOfPath
+from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
+from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.places_of_sides import (
     find_nearest_places,
     find_pads_at,

@@ -68,7 +68,7 @@ class MarchState(NamedTuple):
 
 
 class LineTables(NamedTuple):
-    """What `gaps.c` needs to follow the lines of elements of one degree."""
+    """Tables by which `gaps.c` follows the lines of elements of one degree."""
 
     packed: FloatArray  # places along an element, Gauss weights, matrices to these places, and to Legendre coefficients
     n_places: int
