@@ -53,7 +53,7 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     unstable = step.first.unstable
     if condition.kind == "touch":
         return _locate_touch(piece, step, row, condition)
-    at = step.bisect(row)
+    at = _locate_zero(piece, step, row)
     if at is None:
         return None
     if condition.kind == "tangent" and _is_parallel(piece, condition, at):
@@ -257,6 +257,17 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
             return None
         at = solved
     return piece.grow(at)
+
+
+def _locate_zero(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilibrium | None:
+    """Return the equilibrium of a step at which a condition is just met: by secants, else by bisection."""
+    share = step.crossing(row)
+    if share is not None:
+        guess, drive = step.interpolate(share)
+        at = _zero_of(piece, step.first._replace(x=guess, drive=float(drive)), row)
+        if at is not None and step.contains(at, guess):
+            return at
+    return step.bisect(row)
 
 
 def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
