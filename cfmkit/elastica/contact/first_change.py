@@ -65,10 +65,7 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
         lost = PathStop(WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=names, what=what))
         return next((stop for stop in located.values() if isinstance(stop, PathStop)), lost)
 
-    def share(change: ContactChange) -> float:
-        return step.share_of(change.at if change.piece is None else change.piece.carry(change.at, piece))
-
-    return changes[0] if len(changes) == 1 else min(changes, key=share)
+    return min(changes, key=lambda change: step.share_of(change.at, change.piece))
 
 
 def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:

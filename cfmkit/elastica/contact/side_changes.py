@@ -134,8 +134,7 @@ def _locate_touch(
             state = beyond.own.equations.solve(begin_guess.x, begin_guess.drive, border, 0.0)
             if state is not None and np.isfinite(state.rate).all():
                 at = beyond.grow(begin_guess._replace(x=state.free, drive=float(state.way), rate=state.rate))
-                back = beyond.carry(at, piece)
-                if -BESIDE_SHARE <= step.share_of(back) <= 1 + BESIDE_SHARE:
+                if -BESIDE_SHARE <= step.share_of(at, beyond) <= 1 + BESIDE_SHARE:
                     return ContactChange("begins", number, at, step.first.unstable, step.first.unstable,
                                          condition.number, condition, beyond)  # fmt: skip
         elif isinstance(condition.item, BeamOnBeam) or find_pads_at(piece, condition, least.parameter):

@@ -107,8 +107,21 @@ class StepBetween:
         part = 0.0 if before <= 0 else before / (before - after)
         return float(self.shares[behind - 1] + part * (self.shares[behind] - self.shares[behind - 1]))
 
-    def share_of(self, at: PathEquilibrium) -> float:
-        """Return at which share of the step an equilibrium lies, across its chord."""
+    @cached_property
+    def _follows_drive(self) -> bool:
+        """True if motions go on with the drive at both ends: no limit point lies between them."""
+        moves = self.part.whole.motions
+        chord, way = (self.last.x - self.first.x)[moves], self.last.drive - self.first.drive
+        return self._is_smooth and all(float(at.rate[moves] @ chord) * way > 0 for at in (self.first, self.last))
+
+    def share_of(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
+        """Return at which share of the step an equilibrium lies: by its drive, or by motions that do not follow it.
+
+        It has the unknowns of another `piece` if that is given.
+        """
+        if self._follows_drive:
+            return float((at.drive - self.first.drive) / (self.last.drive - self.first.drive))
+        at = at if piece is None else piece.carry(at, self.part)
         weights = arc_weights(self.part.whole, self.part.options.span)
         start = np.append(self.first.x, self.first.drive)
         chord, way = np.append(self.last.x, self.last.drive) - start, np.append(at.x, at.drive) - start
