@@ -41,17 +41,17 @@ def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[d
     """Return the arrays of contacts of sides in a `Model`, and the parts of their outlines, which begin at a row."""
     moving, sides, bundle = mesh.moving, side_contacts(mesh), mesh.fits.bundle
     assert moving is not None
-    rule, length, numbers = basis(mesh.degree), mesh.scales.length, np.asarray(moving.elements)
+    rule, length, numbers = basis(mesh.degree), mesh.scales.length, np.asarray(moving.elements).tolist()
     rows, values, parts = [], [], [np.empty((0, 6))]
     for contact in sides:
         item: Any = contact.item
         edge = item.outline if isinstance(item, BeamOnObstacle) else None
         closed = -1 if contact.closed is None else int(contact.closed)
         at = contact.element, contact.place, contact.unknown, contact.slide, contact.flag, closed
-        row = int(np.flatnonzero(numbers == contact.element)[0])
         counts = (len(edge.length), len(edge.radius), int(edge.closed)) if edge else (0, 0, 0)
         circle, radius = (-1, 0.0) if edge else find_circle(mesh, item)
-        rows.append((*at, first_part, circle, row, *counts, sides.index(find_leading(mesh, contact))))
+        row, leading = numbers.index(contact.element), sides.index(find_leading(mesh, contact))
+        rows.append((*at, first_part, circle, row, *counts, leading))
         values.append((half_thickness_of(mesh, item.beam), length, radius))
         if edge:
             parts.append(edge_rows(edge))

@@ -57,17 +57,15 @@ def find_moving_cuts(beam: Beam, fitted: Fit, places: Sequence[float]) -> CutLaw
 
     There are more, which move with these, only where the unloaded beam turns far: what lies on an obstacle is one.
     """
-    whole = np.eye(len(places))
-    ends = [(mark, np.array([mark]), np.zeros((1, len(places)))) for mark in smooth_marks(beam, fitted)]
-    ends += [(place, np.zeros(1), whole[k : k + 1]) for k, place in enumerate(places)]
-    ends.sort(key=lambda end: end[0])
+    marks, n = smooth_marks(beam, fitted), len(places)
+    order = np.argsort([*marks, *places], kind="stable")
+    fixed = np.array([*marks, *(0.0 for _ in places)])[order]
+    shares = np.concatenate([np.zeros((len(marks), n)), np.eye(n)])[order]
     count = 1 if turns_little(beam) else int(np.ceil(fitted.turn / MAX_TURN))
-    even = [k / count for k in range(1, count + 1)]
-    fixed, shares = [ends[0][1]], [ends[0][2]]
-    for (_, *low), (_, *high) in itertools.pairwise(ends):
-        for columns, (start, end) in zip((fixed, shares), zip(low, high, strict=True), strict=True):
-            columns.extend(start + share * (end - start) for share in even)
-    return CutLaw(np.concatenate(fixed), np.concatenate(shares))
+    even = np.arange(1, count + 1)[:, None] / count
+    fixed_inside = fixed[:-1] + even * (fixed[1:] - fixed[:-1])
+    shares_inside = shares[:-1, None] + even * (shares[1:] - shares[:-1])[:, None]
+    return CutLaw(np.append(fixed[0], fixed_inside.T), np.concatenate([shares[:1], shares_inside.reshape(-1, n)]))
 
 
 def join_cut_laws(laws: Mapping[str, CutLaw], beams: tuple[str, ...], sides: Sequence[tuple[str, int]]) -> MovingCuts:
