@@ -146,6 +146,26 @@ def test_least_gaps_of_pads_on_beams_and_of_two_beams_are_those_of_numpy(places:
     check_gaps(mesh, carry(whole, random_states(whole, 20), stage, mesh), stage)  # lines are continuous
 
 
+@pytest.mark.parametrize("mesh", [touching(None, ()), leaves_that_touch(None, ())], ids=["obstacles", "leaves"])
+def test_gaps_that_are_not_measured_again_are_below_those_that_would_be(mesh: Discretisation) -> None:
+    rng, share, passed = np.random.default_rng(7), np.linspace(0, 1, 120)[:, None], 0
+    for _ in range(10):
+        ends = 0.1 * rng.standard_normal((2, mesh.size))
+        states, stage = ends[0] + share * (ends[1] - ends[0]), LoadStage(share[:, 0])
+        for item in mesh.fits.network.contacts:
+            if not isinstance(item, BeamSide):
+                continue
+            gaps = make_gaps(mesh, item)
+            watched, each = gaps.least(states, stage, watch=True), gaps.least(states, stage)
+            near = np.abs(each) < NEAR_GAP
+            assert watched[near] == pytest.approx(each[near], abs=1e-13)
+            assert (watched <= np.maximum(each, -NEAR_GAP) + 1e-13).all()
+            assert ((watched < 0) == (each < 0)).all()
+            alone = np.concatenate([gaps.least(z[None], stage.take([k]), watch=True) for k, z in enumerate(states)])
+            passed += int((watched < alone - 1e-9).sum())
+    assert passed > 1000
+
+
 def check_gaps(mesh: Discretisation, states: Any, stage: LoadStage) -> None:
     """Both find the same least gaps and places, of states near and far."""
     counts = np.zeros(2, int)
