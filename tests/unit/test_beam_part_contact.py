@@ -146,7 +146,7 @@ def test_an_end_that_is_held_is_a_round_pad_on_which_the_other_beam_bends(suppor
     contacts = f"contacts: [{PAIR_OF_HELD}]"
     disc = "obstacles: {disc: {kind: disc, centre: [20 mm, 10 mm], radius: 0.25 mm, beams: [upper]}}"
     alone = cfmkit.analyze(cfmkit.loads(text.replace(contacts, disc)))
-    assert result.curve.force[-8:] == pytest.approx(alone.curve.force[-8:], rel=1e-9)
+    assert result.curve.force[-4:] == pytest.approx(alone.curve.force[-4:], rel=1e-9)
 
 
 PAIR_OF_HELD = "{between: [upper, lower]}"
@@ -164,7 +164,7 @@ mechanism:
   beams: {{upper: {{start: root, end: tip, shape: {{kind: arc, sweep: 30 deg}}}}, lower: {{start: wall, end: end}}}}
   contacts: [{PAIR_OF_HELD}]
   drive: {{kind: displacement, node: root, direction: -90 deg}}
-analysis: {{travel: 24 mm, points: 25}}
+analysis: {{travel: 24 mm, points: 13}}
 """
 
 

@@ -34,7 +34,7 @@ OUTLINES = {
     "hole": circle((0.0, 0.0), 1.4, hole=True),
 }
 SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
-SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True, shear=True)}
+SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True)}
 
 
 def leaf(shape: str = "straight", section: str = "stiff") -> Network:
