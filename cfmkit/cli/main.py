@@ -76,12 +76,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Without the program's name; default: those of the process.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
-    streams.prepare()
+    streams.make_tolerant()
     try:
         try:
             return int(_run(given))
         finally:
-            streams.settle()
+            streams.flush()
     except Stopped as stop:  # while it was told how the command has ended
         return int(stop.exit_code)
 

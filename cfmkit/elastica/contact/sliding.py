@@ -21,15 +21,15 @@ import numpy as np
 
 from cfmkit.elastica.contact.edges import find_mate, find_motion, measure_distance
 from cfmkit.elastica.contact.equations import GapBounds, number_free_unknowns, open_all_contacts
-from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.moving_elements import (
     MOVED_TABLES,
     PLACE_STEP,
     compute_moved_tables,
+    copy_moved_tables,
     unloaded_beam_at,
-    with_own_tables,
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
@@ -101,7 +101,7 @@ class SlidingEquations(NumpyEquations):
     @classmethod
     def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
-        mesh = with_own_tables(mesh)
+        mesh = copy_moved_tables(mesh)
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
@@ -354,7 +354,7 @@ class SlidingEquations(NumpyEquations):
                 if slot >= 0:
                     residual[slot], tangent[slot, slot] = -z[contact.unknown], -1.0
                 continue
-            term = press(self.mesh, contact, z)
+            term = contact_contribution(self.mesh, contact, z)
             slots = self.slots[term.unknowns]
             indices = slots >= 0
             pushed = slots[indices]
@@ -477,7 +477,7 @@ class SlidingEquations(NumpyEquations):
             if not z[contact.unknown]:
                 continue
             if contact.slide < 0:
-                term = press(self.mesh, contact, z)
+                term = contact_contribution(self.mesh, contact, z)
                 total[term.unknowns] += term.gradient
                 continue
             if (leading := self._find_leading(contact)) is not contact:

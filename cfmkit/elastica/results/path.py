@@ -11,7 +11,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.contact.pair_gaps import least_side_gaps
-from cfmkit.elastica.contact.terms import gaps, press
+from cfmkit.elastica.contact.terms import contact_contribution, gaps
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -449,7 +449,7 @@ def strain_energy(at: Equilibria) -> Any:
         )
     for contact in at.mesh.contacts:
         if contact.slide < 0:
-            total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
+            total = total + np.array([contact_contribution(at.mesh, contact, z).energy for z in at.z])
     return total
 
 

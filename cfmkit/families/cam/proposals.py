@@ -222,7 +222,7 @@ def with_wire(spec: CamSpec, _request: Request) -> CamSpec:
     return spec.replace({f"mechanism.springs.{key}": value for key, value in as_stated(coil).items()})
 
 
-def with_plate(spec: CamSpec, request: Request) -> CamSpec:
+def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
     """Return a designed cam whose plate bears its rollers: the pressure goes with the root of force over thickness."""
     from cfmkit.families.cam.model import analyze
     from cfmkit.families.run_control import Run
@@ -243,7 +243,7 @@ def _from_catalogue(made: Candidate) -> Candidate:
         made,
         variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
         spec=spec,
-        finish=f"{__name__}:with_plate",
+        finish=f"{__name__}:widen_plate",
         springs="catalogue",
     )
 
