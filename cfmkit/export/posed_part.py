@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.arrays import distinct
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -161,20 +163,15 @@ def swept(bodies: Iterable[PosedBody]) -> Any:
     return union_all([body.shape(pose) for body in bodies for pose in range(len(body.core))])
 
 
-def screw_positions(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
+def screw_positions(
+    ground: FloatArray,  # (4, 2): rectangle along the axes [m]
+    moving: Sequence[PosedBody],  # what passes over it
+    head: float,  # diameter of the screw's head, which is also its distance from the edge [m]
+) -> list[FloatArray]:
     """Return a position next to each corner of a base plate where a screw can be reached beside all that moves.
 
     Positions along the edges are tried, the nearest to the corner first; a corner from which half of both edges is
     covered has no screw. If fewer than two are left, the screws are in the corners, below what moves.
-
-    Parameters
-    ----------
-    ground : (4, 2) array
-        Rectangle along the axes [m].
-    moving : sequence of PosedBody
-        What passes over it.
-    head : float
-        Diameter of the screw's head, which is also its distance from the edge [m].
     """
     from shapely import Point
 
@@ -195,4 +192,4 @@ def _evenly_moved(core: FloatArray) -> Any:
     """Return the numbers of poses (p, k, 2) between which a body moves by equal distances, the ends included."""
     steps = np.hypot(*np.moveaxis(np.diff(core, axis=0), -1, 0)).max(axis=1)
     path = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.unique(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))
+    return distinct(np.searchsorted(path, np.linspace(0.0, path[-1], N_COVERING)))

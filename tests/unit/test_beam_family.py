@@ -503,7 +503,7 @@ def test_thinner_beams_for_the_same_force_reach_further_at_the_same_stress():
 
 def test_the_force_wanted_is_reached_with_stretching_too_and_the_error_of_equation_6_is_told():
     changes = ("mechanism.axial=true", "design.rescale.force=12 N", "design.rescale.free=thickness")
-    design = family("beam").design(config("beam_lan2010", *changes), Run())  # before its digits are rounded
+    design = family("beam").design.make(config("beam_lan2010", *changes), Run())  # before its digits are rounded
     assert value(cfmkit.analyze(design.spec), "nominal_force") == pytest.approx(12, rel=1e-8)
     assert "off by" in {item.name: item.message for item in design.warnings}["rescale_approximate"]
 
