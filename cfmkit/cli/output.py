@@ -61,7 +61,7 @@ class Terminal:
         """Print blocks to standard output."""
         from cfmkit.documents.terminal import print_blocks
 
-        ascii_only = not streams.speaks_utf8(sys.stdout)
+        ascii_only = not streams.can_encode_all(sys.stdout)
         streams.write_output(print_blocks(blocks, self.width, sys.stdout.isatty(), ascii_only))
 
     def show_page(self, document: Document) -> None:
@@ -72,13 +72,13 @@ class Terminal:
 
     def show_json(self, data: Mapping[str, Any]) -> None:
         """Print one JSON document to standard output."""
-        ascii_only = not streams.speaks_utf8(sys.stdout)
+        ascii_only = not streams.can_encode_all(sys.stdout)
         streams.write_output(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
 
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""
         for line in lines:
-            streams.complain(f"{visible(line)}\n")
+            streams.write_error(f"{visible(line)}\n")
 
     @contextmanager
     def progress(self) -> Iterator[Report]:
@@ -119,7 +119,7 @@ class ProgressLines:
             self._reported = now
             left = (now - self._start) * (1.0 - self._most) / self._most
             time_left = f", {duration(left)} left" if self._most >= FIRST_ESTIMATE else ""
-            streams.complain(f"{100 * self._most:.0f} %{time_left}: {text}\n")
+            streams.write_error(f"{100 * self._most:.0f} %{time_left}: {text}\n")
 
 
 def duration(seconds: float) -> str:

@@ -80,7 +80,7 @@ class StudyProgress:
             text = f"{self._done} of {self._all} {self._things}, {self._sentence(now)}"
             self._bar.show(self._done, self._all, text)
         else:
-            streams.complain(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
+            streams.write_error(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
 
     def _sentence(self, now: float) -> str:
         rate = self._rate(now)
@@ -123,7 +123,7 @@ class StudyProgress:
         if self._bar is not None:
             self._bar.close()
             self._bar = None
-        streams.complain(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
+        streams.write_error(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
 
     def close(self) -> None:
         """Remove the bar."""

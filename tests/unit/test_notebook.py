@@ -33,7 +33,7 @@ def test_texts_of_everything_are_short(name):
     assert spec.name in repr(found)
 
 
-def test_a_curve_says_over_which_travel_it_goes_there_and_back(result):
+def test_a_curve_says_over_which_travel_it_goes_loading_and_unloading(result):
     assert "962 points, 0 ... 0.24 m, branches load, unload" in repr(result.curve)
 
 

@@ -16,7 +16,7 @@ def told(monkeypatch):
     def run(events, total, reused=0):
         clock, lines = SimpleNamespace(now=0.0), []
         monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
-        monkeypatch.setattr(progress.streams, "complain", lines.append)
+        monkeypatch.setattr(progress.streams, "write_error", lines.append)
         monitor = StudyProgress(SimpleNamespace(json=False, quiet=False))
         monitor.total(total)
         if reused:
