@@ -180,10 +180,7 @@ def _spell_out_empty_values(arguments: list[str]) -> list[str]:
 def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     """Return what a command line asks for; None if the parser answered it itself (``--help``).
 
-    Raises
-    ------
-    Exception
-        Of typer's kind, if it is malformed.
+    Raises Exception of typer's kind, if it is malformed.
     """
     try:
         call = _plain(typer.main.get_command(app)).main(

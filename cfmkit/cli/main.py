@@ -67,14 +67,10 @@ def _one_thread() -> None:
         os.environ.setdefault(name, value)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program; return its exit code.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Without the program's name; default: those of the process.
-    """
+def main(
+    arguments: Sequence[str] | None = None,  # without the program's name; default: those of the process
+) -> int:
+    """Run the program; return its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     streams.prepare()
     try:

@@ -24,10 +24,7 @@ def prepare() -> None:
 def write_output(text: str) -> None:
     """Write to standard output; where its reader has left (``| head``) the rest is dropped.
 
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If it cannot be written for another reason: a full disk behind a redirection.
+    Raises OutputError if it cannot be written for another reason: a full disk behind a redirection.
     """
     try:
         _write(sys.stdout, text)

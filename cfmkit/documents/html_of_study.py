@@ -61,33 +61,15 @@ class StudyPoints(NamedTuple):
 
 
 def page(
-    document: Document,
-    spec: Spec,
-    varied: Sequence[str],
-    files: Mapping[str, bytes],
-    command: str,
-    drawn: Mapping[str, Figure] = MappingProxyType({}),
-    point: str = "cfmkit analyze SPEC",
+    document: Document,  # what the study found
+    spec: Spec,  # what was varied
+    varied: Sequence[str],  # paths of what was varied
+    files: Mapping[str, bytes],  # name -> content of the study's files: results.csv and metrics.json at least
+    command: str,  # how the study was started
+    drawn: Mapping[str, Figure] = MappingProxyType({}),  # the pictures of the study, by their names
+    point: str = "cfmkit analyze SPEC",  # the command that computes one point as the study did, but for what was varied
 ) -> bytes:
-    """Return the page of a study.
-
-    Parameters
-    ----------
-    document : Document
-        What the study found.
-    spec : Spec
-        What was varied.
-    varied : sequence of str
-        Paths of what was varied.
-    files : mapping of str to bytes
-        Name -> content of the study's files: results.csv and metrics.json at least.
-    command : str
-        How the study was started.
-    drawn : mapping of str to Figure
-        The pictures of the study, by their names.
-    point : str
-        The command that computes one point as the study did, but for what was varied.
-    """
+    """Return the page of a study."""
     summary = json.loads(files["metrics.json"])
     head, *points = csv.reader(io.StringIO(files["results.csv"].decode()))
     rows = points[:MOST_POINTS]

@@ -20,34 +20,21 @@ DEFAULT_FORMATS = FILE_FORMATS[:3]
 
 
 def files(
-    drawing: Drawing,
+    drawing: Drawing,  # what to draw; its name is the stem of the file names
+    # width of the cut [m]. Adds ``<name>-kerf.dxf``, where all cut contours are moved into the waste by half of it; the
+    # other files always have the true size
     kerf: float | None = None,
+    # largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs;
+    # default: that of the drawing
     tolerance: float | None = None,
-    formats: Sequence[str] = DEFAULT_FORMATS,
+    formats: Sequence[str] = DEFAULT_FORMATS,  # of `FILE_FORMATS`
 ) -> dict[str, bytes]:
     """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are requested.
 
     A drawing without anything on layer `reference` gets a reference square beside it.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw; its name is the stem of the file names.
-    kerf : float, optional
-        Width of the cut [m]. Adds ``<name>-kerf.dxf``, where all cut contours are moved
-        into the waste by half of it; the other files always have the true size.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs;
-        default: that of the drawing.
-    formats : sequence of str
-        Of `FILE_FORMATS`.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is, or not with that kerf; if it has no thickness for a body.
-    cfmkit.errors.UsageError
-        If the library for a format is not installed.
+    Raises GeometryError if the drawing cannot be cut as it is, or not with that kerf; if it has no thickness for a
+    body; UsageError if the library for a format is not installed.
     """
     from cfmkit.export.arc_outlines import outlines
     from cfmkit.export.dxf import dxf_bytes

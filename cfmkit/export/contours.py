@@ -214,16 +214,11 @@ def mark(shape: FloatArray, driven: bool) -> Contour:
     return Contour((Line(*corners),), layer) if len(corners) == 2 else polygon(corners, layer)
 
 
-def reference_square(size: float = 0.05, corner: tuple[float, float] = (0.0, 0.0)) -> Contour:
-    """Return a square on layer `reference`, with which a user checks the scale of a print.
-
-    Parameters
-    ----------
-    size : float
-        Length of a side [m].
-    corner : (float, float)
-        The lower left corner [m].
-    """
+def reference_square(
+    size: float = 0.05,  # length of a side [m]
+    corner: tuple[float, float] = (0.0, 0.0),  # the lower left corner [m]
+) -> Contour:
+    """Return a square on layer `reference`, with which a user checks the scale of a print."""
     x, y = corner
     return polygon([(x, y), (x + size, y), (x + size, y + size), (x, y + size)], "reference")
 

@@ -36,20 +36,14 @@ _ALIGN_CENTER, _ALIGN_MIDDLE = 1, 2  # of texts, about their point
 _EZDXF_LOCK = threading.Lock()
 
 
-def write_dxf(drawing: Drawing, tolerance: float | None = None) -> bytes:
+def write_dxf(
+    drawing: Drawing,  # what to draw
+    # largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing
+    tolerance: float | None = None,
+) -> bytes:
     """Return the drawing as DXF.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is.
+    Raises GeometryError if the drawing cannot be cut as it is.
     """
     return dxf_bytes(outlines(drawing, tolerance), drawing.labels)
 

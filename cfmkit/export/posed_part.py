@@ -163,20 +163,15 @@ def swept(bodies: Iterable[PosedBody]) -> Any:
     return union_all([body.shape(pose) for body in bodies for pose in range(len(body.core))])
 
 
-def screw_positions(ground: FloatArray, moving: Sequence[PosedBody], head: float) -> list[FloatArray]:
+def screw_positions(
+    ground: FloatArray,  # (4, 2): rectangle along the axes [m]
+    moving: Sequence[PosedBody],  # what passes over it
+    head: float,  # diameter of the screw's head, which is also its distance from the edge [m]
+) -> list[FloatArray]:
     """Return a position next to each corner of a base plate where a screw can be reached beside all that moves.
 
     Positions along the edges are tried, the nearest to the corner first; a corner from which half of both edges is
     covered has no screw. If fewer than two are left, the screws are in the corners, below what moves.
-
-    Parameters
-    ----------
-    ground : (4, 2) array
-        Rectangle along the axes [m].
-    moving : sequence of PosedBody
-        What passes over it.
-    head : float
-        Diameter of the screw's head, which is also its distance from the edge [m].
     """
     from shapely import Point
 

@@ -25,20 +25,14 @@ _DRAWING_MARGIN = 5.0  # around the drawing [mm]
 _STROKE_WIDTH = 0.25  # width of every line [mm]
 
 
-def write_svg(drawing: Drawing, tolerance: float | None = None) -> bytes:
+def write_svg(
+    drawing: Drawing,  # what to draw
+    # largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing
+    tolerance: float | None = None,
+) -> bytes:
     """Return the drawing as SVG 1.1 at real size.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        What to draw.
-    tolerance : float, optional
-        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
-
-    Raises
-    ------
-    cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is.
+    Raises GeometryError if the drawing cannot be cut as it is.
     """
     return svg_bytes(drawing.name, outlines(drawing, tolerance), drawing.labels)
 

@@ -239,10 +239,7 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], execution: BatchExecuti
 def choose_executor(jobs: int | None, count: int, timeout: float | None) -> Executor:
     """Return the executor of the jobs: this process, or a pool of several.
 
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the timeout is not above zero.
+    Raises UsageError if the timeout is not above zero.
     """
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores, serial

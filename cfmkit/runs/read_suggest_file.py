@@ -19,20 +19,13 @@ OPTIONS_SOURCE = "options"
 """Name of a request that has no file."""
 
 
-def read_request(name: str | None, keys: Mapping[str, str]) -> SuggestBlock:
+def read_request(
+    name: str | None,  # the file; ``-`` is standard input
+    keys: Mapping[str, str],  # key of the request -> its value as a file would have it
+) -> SuggestBlock:
     """Return the request of a file, or of none, with keys replaced by what options say.
 
-    Parameters
-    ----------
-    name : str, optional
-        The file; ``-`` is standard input.
-    keys : mapping of str to str
-        Key of the request -> its value as a file would have it.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        With everything that is wrong with it.
+    Raises SpecError with everything that is wrong with it.
     """
     if name is None:
         document = read_document("cfmkit: 1\nsuggest: {}\n", OPTIONS_SOURCE)

@@ -34,19 +34,15 @@ def _is_safe(step: Path, is_last: bool) -> bool:
     return not shared and not stat.S_ISLNK(about.st_mode) and about.st_uid in (os.getuid(), 0)
 
 
-def private_folder(name: str, make: bool = True) -> Path | None:
+def private_folder(
+    name: str,  # what it is for, in a few letters
+    make: bool = True,  # whether to make one where there is none; otherwise None
+) -> Path | None:
     """Return a folder for files that this user's later runs may use again; None if there is no room for any.
 
     It has a fixed name, so that it serves every process of the user. What stands there and belongs to somebody
     else, or can be written by others, is not trusted (code and settings are loaded from it): then the folder is a new
     one. Where others can rename it, in a folder of temporary files that is shared without protection, there is none.
-
-    Parameters
-    ----------
-    name : str
-        What it is for, in a few letters.
-    make : bool
-        Whether to make one where there is none; otherwise None.
     """
     try:
         folder = place(name)

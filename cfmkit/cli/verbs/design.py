@@ -52,7 +52,7 @@ def long_run(
     jobs: int, fresh: bool, folder: RunFolder, plain: Run, budget: float | None = None
 ) -> AbstractContextManager[Run]:
     """Return a run in several processes, for so long [s], that says on a signal whether the same command continues."""
-    from cfmkit.cli.run_study_in_folder import noting
+    from cfmkit.cli.run_study_in_folder import open_journal
     from cfmkit.runs import run
 
-    return run.long_run(jobs, fresh, folder, replace(plain, time_budget=budget), noting)
+    return run.long_run(jobs, fresh, folder, replace(plain, time_budget=budget), open_journal)

@@ -67,7 +67,7 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
     def share(change: ContactChange) -> float:
         return step.share_of(change.at if change.piece is None else change.piece.carry(change.at, piece))
 
-    return min(changes, key=share)
+    return changes[0] if len(changes) == 1 else min(changes, key=share)
 
 
 def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:

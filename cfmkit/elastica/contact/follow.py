@@ -137,18 +137,17 @@ def _follow(
             yield change._replace(kind="blocks") if after.end is WhyStopped.BLOCKED else change
             yield after
             return
-        names, what = (change.piece or part).say(change.number), change.kind
-        before = part.friction
+        changed, before = change.piece or part, part.friction
         part, at, sense, turned, states = after
         yield change._replace(after=at.unstable, states=states)
         yield from _change_others(ChosenState(part, at, sense, 1), before, change.number)
         if part.whole.mesh is not mesh:
             yield Remeshed(part.whole)
         if turned and not options.through_folds:
-            yield PathStop(WhyStopped.LIMIT_POINT, place, SNAP_MESSAGE.format(names=names, what=what))
+            yield _stop_at_change(WhyStopped.LIMIT_POINT, SNAP_MESSAGE, changed, change)
             return
         if at.unstable > change.before and options.branch != "primary" and not options.through_folds:
-            yield PathStop(WhyStopped.JUMPS, place, STABILITY_LOSS_MESSAGE.format(names=names, what=what))
+            yield _stop_at_change(WhyStopped.JUMPS, STABILITY_LOSS_MESSAGE, changed, change)
             return
         if turned:
             yield PathEvent("limit point", place, change.before, at.unstable, at)
@@ -163,6 +162,12 @@ def _follow(
             iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
             at,
         )
+
+
+def _stop_at_change(end: WhyStopped, message: str, changed: PieceOfPath, change: ContactChange) -> PathStop:
+    """Return the end of a path at a change of a contact."""
+    text = message.format(names=changed.say(change.number), what=change.kind)
+    return PathStop(end, change.at.drive, text)
 
 
 def _turn_back(

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.contact.side_gaps import LoadStage, carry
+from cfmkit.elastica.contact.carried_states import carry
+from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
 from cfmkit.elastica.mechanics.march import equations

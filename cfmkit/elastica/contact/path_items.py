@@ -1,21 +1,17 @@
-"""The path of a network, with contacts or without; the machinery of contacts is loaded for a network that has some."""
+"""Items of a path with contacts: points, events, changes of contacts, and further points on another mesh."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.contact.changes import PieceOfPath
     from cfmkit.elastica.contact.side_conditions import SideCondition
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
-    from cfmkit.numerics.continuation.path import Options, PathBranch
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 
@@ -48,21 +44,3 @@ class StatesOfPiece(NamedTuple):
 
 
 PathItem = Point | PathEvent | PathStop | ContactChange | Remeshed
-
-
-def follow_network(
-    problem: NetworkProblem,
-    start: PathEquilibrium,
-    targets: FloatArray,
-    options: Options,
-    branch: PathBranch | None = None,
-) -> Iterator[PathItem]:
-    """Yield points, events and changes of contacts of a path in order, and its ending at last; see `follow`.
-
-    Every change comes behind a point that lies at it.
-    """
-    if not problem.mesh.fits.network.contacts:
-        return follow(problem, start, targets, options, branch)
-    from cfmkit.elastica.contact.follow import follow_in_contact
-
-    return follow_in_contact(problem, start, targets, options, branch)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece, follow_network
+from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
@@ -21,7 +21,7 @@ from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import ContactEvent, Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
-from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
+from cfmkit.elastica.tracing.start import DriveStart, find_start, follow_network, is_stretched
 from cfmkit.elastica.tracing.taut_beams import drop_locked_points, find_tension
 from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped

@@ -72,10 +72,7 @@ class UnitField:
     def read(self, value: Any) -> tuple[float, str]:
         """Return (SI value, dimension) of text, or of a number that is SI already.
 
-        Raises
-        ------
-        cfmkit.errors.QuantityError
-            With what is wrong and what to write instead.
+        Raises QuantityError with what is wrong and what to write instead.
         """
         number, dimension = self._read(value)
         if number and not MIN_QUANTITY <= abs(number) <= MAX_QUANTITY:
@@ -106,10 +103,7 @@ class UnitField:
     def check(self, value: float, bounds: Mapping[str, float], given: Any = None) -> float:
         """Return `value` if it keeps its SI bounds: gt, ge, lt, le.
 
-        Raises
-        ------
-        cfmkit.errors.QuantityError
-            With the value as it was given, and the bounds with units.
+        Raises QuantityError with the value as it was given, and the bounds with units.
         """
         if all(_BOUND_OPERATORS[name][1](value, bound) for name, bound in bounds.items()):
             return value
@@ -234,10 +228,7 @@ class _OpenQuantity:
 def quantity(dimension: str) -> UnitField:
     """Return the annotation for a float of that dimension: ``Annotated[float, quantity("length")]``.
 
-    Raises
-    ------
-    KeyError
-        If there is no such dimension.
+    Raises KeyError if there is no such dimension.
     """
     return UnitField((dimension_of(dimension).name,))
 

@@ -163,10 +163,7 @@ UNITS_BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
 def dimension_of(name: str) -> Dimension:
     """Return the dimension called `name`.
 
-    Raises
-    ------
-    KeyError
-        If there is none; the message lists them.
+    Raises KeyError if there is none; the message lists them.
     """
     try:
         return DIMENSIONS_BY_NAME[name]
