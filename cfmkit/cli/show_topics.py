@@ -30,6 +30,7 @@ from cfmkit.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
+    from cfmkit.curves import Kind
     from cfmkit.documents.document import Block
     from cfmkit.specs.keys_and_schema import Key
 
@@ -301,7 +302,7 @@ def _materials() -> list[Record]:
     return [asdict(entry) for entry in dict.fromkeys(MATERIALS_BY_NAME.values())]
 
 
-def _metrics(effort: str | None = None) -> list[Record]:
+def _metrics(effort: Kind | None = None) -> list[Record]:
     """Return the metrics of curves of an effort, or of any, and those of many parts."""
     from cfmkit.metrics import definitions
     from cfmkit.specs.units import border_unit
