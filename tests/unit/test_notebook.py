@@ -248,7 +248,7 @@ def test_a_metric_that_is_not_there_is_answered_with_the_nearest(result):
 
 
 def test_python_is_told_of_arguments_and_not_of_options():
-    with pytest.raises(cfmkit.SpecError, match="^envelope is missing"):
+    with pytest.raises(cfmkit.SpecError, match=r"^envelope is missing"):
         cfmkit.suggest(force="20 N", travel="10 mm")
-    with pytest.raises(cfmkit.SpecError, match="^force: 20 has no unit"):
+    with pytest.raises(cfmkit.SpecError, match=r"^force: 20 has no unit"):
         cfmkit.suggest(force="20", travel="10 mm", envelope=["80 mm", "60 mm"])
