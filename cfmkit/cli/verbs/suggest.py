@@ -150,7 +150,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     ends = begun + budget
     block = read_request(options.request, given)
     out = folder_of(options.out, options.request or "options", "suggest")
-    with RunFolder(out) as folder, terminal.progress() as progress:
+    with RunFolder(out) as folder, terminal.progress(budget) as progress:
         folder.check("metrics.json", "suggestions.csv")
         plain = Run(options.seed, progress, time_budget=budget - (time.perf_counter() - start))
         jobs = options.jobs or cores()
