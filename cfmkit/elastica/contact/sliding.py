@@ -180,11 +180,11 @@ class SlidingEquations(NumpyEquations):
         )  # fmt: skip
         if not line_leaves_normal(mesh.fits.network.beams[item.beam].section):  # type: ignore[union-attr]
             return side
-        press, forces = float(z[contact.unknown]), mesh.elements.unknowns[[contact.element, contact.element + 1], -2:]
+        force, forces = float(z[contact.unknown]), mesh.elements.unknowns[[contact.element, contact.element + 1], -2:]
         compliances = measure_compliances(mesh, item.beam, parameter)  # type: ignore[union-attr]
-        at = measure_line_tangent(angle, normal, z[forces[0]] - 0.5 * press * normal, *compliances)
+        at = measure_line_tangent(angle, normal, z[forces[0]] - 0.5 * force * normal, *compliances)
         # by the force before the kink and that of the contact; with all places held by the forces on both sides of it
-        leaning, frozen = (bulge @ (at.slope - 0.5 * press * at.by_force)) @ apart, (bulge @ at.slope) @ apart
+        leaning, frozen = (bulge @ (at.slope - 0.5 * force * at.by_force)) @ apart, (bulge @ at.slope) @ apart
         leaning[2] = frozen[2] = at.by_turn
         half, turn_by_place = 0.5 * at.by_force, float(at.by_turn) * slope[1]
         return side._replace(
