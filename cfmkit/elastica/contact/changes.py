@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.equations import NO_FRICTION, with_closed
+from cfmkit.elastica.contact.line_tangent import raise_pad
 from cfmkit.elastica.contact.side_conditions import SideConditions
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.contact.terms import gaps, measure, rub_values, slip_way
@@ -209,6 +210,7 @@ class PieceOfPath:
                 spread_values[number] = z[:, contact.unknown]
             else:
                 spread_values[number] = gaps(mesh, contact, z) if measured is None else measured[number]
+                spread_values[number] += raise_pad(mesh, contact, z)
         spread_values[len(mesh.contacts) : count] = self.sides.values(z, LoadStage.from_problem(self.whole, drives))
         for row, number in enumerate(self.rubbing, count):
             spread_values[row] = rub_values(mesh, mesh.contacts[number], self.friction[number], z)
@@ -253,7 +255,8 @@ class PieceOfPath:
             condition = self.sides.all[number - len(mesh.contacts)]
             return float(self.sides.value(condition, z, LoadStage.from_problem(self.whole, drives))[0])
         contact = mesh.contacts[number]
-        return float(z[0, contact.unknown] if number in self.closed else gaps(mesh, contact, z)[0])
+        open_gap = gaps(mesh, contact, z) + raise_pad(mesh, contact, z)
+        return float(z[0, contact.unknown] if number in self.closed else open_gap[0])
 
     def roundings(self, values: FloatArray) -> FloatArray:
         """Return by how much a force or a gap (contacts, ..., shares) may be negative, (contacts, ...)."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.edges import find_mate
+from cfmkit.elastica.contact.line_tangent import KINK_REACH
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
 from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.places_of_sides import (
@@ -114,6 +115,11 @@ def _locate_touch(
     for _ in range(2):
         stage = LoadStage.from_problem(piece.whole, np.array([guess.drive]))
         least = piece.sides.gaps_of(condition.item).find_least(piece.whole.values(guess.x, guess.drive), stage)
+        if _is_beside_kink(piece, condition, guess, least.parameter):
+            why = why_not_laid(piece, condition.item)
+            return PathStop(
+                WhyStopped.LOST, guess.drive, SPREADS_MESSAGE.format(names=describe(condition.item), why=why)
+            )
         between = _contact_around(piece, condition, least.parameter)
         if between is not None:
             at = step.bisect(row)
@@ -146,6 +152,15 @@ def _locate_touch(
     if isinstance(condition.item, NodeOnBeam) and not 0.5 * NEW_PLACE < least.parameter < 1 - 0.5 * NEW_PLACE:
         return PathStop(WhyStopped.LOST, guess.drive, MEETS_END.format(names=describe(condition.item)))
     return None
+
+
+def _is_beside_kink(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium, parameter: float) -> bool:
+    """Return True if a place is near where the same touches, in a beam that shears: it lies there."""
+    mesh, z, beam = piece.whole.mesh, piece.whole.values(at.x, at.drive), condition.item.beam
+    section = mesh.fits.network.beams[beam].section
+    places = [float(z[contact.slide]) for contact in mesh.contacts if contact.number == condition.number]
+    near = KINK_REACH * section.thinnest / mesh.fits[beam].length
+    return section.shear and any(abs(place - parameter) < near for place in places)
 
 
 def _is_parallel(piece: PieceOfPath, condition: SideCondition, at: PathEquilibrium) -> bool:
