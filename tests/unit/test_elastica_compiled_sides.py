@@ -21,6 +21,7 @@ from cfmkit.elastica import (
     Node,
     PointLoad,
     Polynomial,
+    Section,
     slider_support,
     trace,
 )
@@ -50,7 +51,8 @@ OUTLINES = {
 SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
 LEAF_PLACES = FlankPlace(0, 0.3), FlankPlace(1, 0.7), FlankPlace(3, 0.4), FlankPlace(2, 0.6)
 DRIVE = np.array([0.3])
-SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True)}
+WIDE_SECTION = Section(1e7, 0.2, 0.01, axial=True, poisson_ratio=0.3, wide=True)
+SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True), "wide": WIDE_SECTION}
 
 
 def leaf(shape: str = "straight", section: str = "stiff") -> Network:

@@ -39,7 +39,7 @@ from cfmkit.elastica.mechanics.moving_elements import (
     unloaded_beam_at,
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
-from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.elastica.model.plain_beams_at_once import has_polynomial_angle
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
@@ -346,9 +346,9 @@ class SlidingEquations(NumpyEquations):
 
     @cached_property
     def _is_plain(self) -> bool:
-        """True if all elements that move are of plain beams."""
+        """True if all elements that move are of beams of one thickness with a polynomial angle."""
         beams = {self.mesh.elements.beam[number] for number in self.mesh.moving.elements}  # type: ignore[union-attr]
-        return all(is_plain(self.mesh.fits.network.beams[beam]) for beam in beams)
+        return all(has_polynomial_angle(self.mesh.fits.network.beams[beam]) for beam in beams)
 
     def _differentiate_plain(self, place: float, z: FloatArray, number: int) -> FloatArray:
         """Return the same exactly: tables of plain beams may have complex ends."""

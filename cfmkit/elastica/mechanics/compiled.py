@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.compiled_sides import CLOSED_SIDE, IN_PLACE, side_arrays
+from cfmkit.elastica.mechanics.compiled_sides import CLOSED_SIDE, IN_PLACE, N_LAW, side_arrays
 from cfmkit.elastica.mechanics.contact_arrays import (
     CLOSED_NODE,
     contact_arrays,
@@ -96,6 +96,8 @@ class CompiledEquations(NumpyEquations):
         arrays = model_arrays(self)
         row = np.zeros(len(COUNT_FIELDS) + len(ADDRESS_FIELDS), np.int64)
         row[: len(COUNT_FIELDS)] = list(model_counts(self.mesh, self.ramp).values())
+        if "moved_law" in arrays:
+            row[len(COUNT_FIELDS) - 2 : len(COUNT_FIELDS)] = np.subtract(arrays["moved_law"].shape, (0, N_LAW))
         self.code.place(row, len(COUNT_FIELDS), tuple(arrays.get(name) for name in ADDRESS_FIELDS))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
@@ -290,8 +292,7 @@ def model_counts(mesh: Discretisation, ramp: bool) -> dict[str, int]:
     presses = len({at.unknown for at in nodes}.intersection(mesh.free.tolist())) if nodes else 0
     values = (elements, points, mesh.degree, mesh.size, len(mesh.free), len(mesh.springs))
     more = (len(mesh.loads), int(ramp), int(follows), len(nodes), presses, len(sides))
-    moved = (len(mesh.moving.elements), mesh.fits.bundle.coefficients.shape[-1]) if mesh.moving is not None else (0, 0)
-    return dict(zip(COUNT_FIELDS, (*values, *more, *moved), strict=True))
+    return dict(zip(COUNT_FIELDS, (*values, *more, 0, 0), strict=True))
 
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
@@ -310,7 +311,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     if mesh.moving is not None:
         sides, parts = side_arrays(mesh, len(arrays["edge"]), slope_products(mesh.degree))
         arrays |= sides | {"edge": np.concatenate([arrays["edge"], parts])}
-        arrays |= {name: np.array(arrays[name]) for name in IN_PLACE}  # which C changes
+        arrays |= {name: np.array(arrays[name]) for name in IN_PLACE if arrays[name] is not None}  # which C changes
     return {
         name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
         for name, values in arrays.items()

@@ -13,34 +13,35 @@ from cfmkit.elastica.contact.edges import find_circle, find_leading, half_thickn
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows, side_contacts
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.contact import BeamOnBeam, BeamOnObstacle, NodeOnBeam, NodeOnObstacle, Stop
-from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.elastica.model.plain_beams_at_once import coefficients_of, has_polynomial_angle
 
 if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
 CLOSED_SIDE = 5  # column of `side_at`
-IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend")
+N_LAW = 3  # numbers of an element that moves, before the coefficients of its angle
+IN_PLACE = ("angle", "weight", "rigidity", "ahead", "length", "bend", "rest", "curl")
 """Arrays of a `Model` that `sides.c` changes where elements move."""
 
 
 def are_sides_compiled(mesh: Discretisation) -> bool:
-    """Return True if `sides.c` has all contacts: those of plain beams at points, and of nodes without friction."""
+    """Return True if `sides.c` has all contacts: those of uniform beams at points, and of nodes without friction."""
     follows = any(load.item.follows for load in mesh.loads)
     kinds = {type(contact.item) for contact in mesh.contacts}
     beams = {mesh.elements.beam[number] for number in mesh.moving.elements} if mesh.moving is not None else set()
     return (
         not follows
-        and mesh.elements.curl is None
         and kinds <= {Stop, NodeOnObstacle, BeamOnObstacle, NodeOnBeam, BeamOnBeam}
         and all(contact.rub < 0 and not contact.laid for contact in mesh.contacts)
-        and all(is_plain(mesh.fits.network.beams[beam]) for beam in beams)
+        and all(has_polynomial_angle(mesh.fits.network.beams[beam]) for beam in beams)
         and not any(mesh.fits.network.beams[beam].section.shear for beam in beams)
     )
 
 
 def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[dict[str, Any], Any]:
     """Return the arrays of contacts of sides in a `Model`, and the parts of their outlines, which begin at a row."""
-    moving, sides, bundle = mesh.moving, side_contacts(mesh), mesh.fits.bundle
+    moving, sides = mesh.moving, side_contacts(mesh)
     assert moving is not None
     rule, length, numbers = basis(mesh.degree), mesh.scales.length, np.asarray(moving.elements).tolist()
     rows, values, parts = [], [], [np.empty((0, 6))]
@@ -57,13 +58,25 @@ def side_arrays(mesh: Discretisation, first_part: int, products: Any) -> tuple[d
         if edge:
             parts.append(edge_rows(edge))
             first_part += len(parts[-1])
-    names = [bundle.names[k] for k in bundle.plain]
-    plain = [names.index(mesh.elements.beam[number]) for number in numbers]
-    rigidity = bundle.rigidities[0][plain] / (mesh.scales.force * length**2)
-    law = np.column_stack([bundle.length[plain] / length, rigidity, bundle.coefficients[plain]])
     arrays = {
         "side_at": np.array(rows), "side": np.array(values), "moved_at": numbers, "moved_fixed": moving.fixed,
-        "moved_shares": moving.shares, "moved_law": law, "rule": np.stack([rule.places, rule.weights]),
+        "moved_shares": moving.shares, "moved_law": measure_laws(mesh), "rule": np.stack([rule.places, rule.weights]),
         "unit_bend": rule.weights @ products,
     }  # fmt: skip
     return arrays, np.concatenate(parts)
+
+
+def measure_laws(mesh: Discretisation) -> FloatArray:
+    """Return length, rigidity and curling of the beam of each element that moves, and its angle, (moved, 3 + m)."""
+    length, force = mesh.scales.length, mesh.scales.force
+    laws: dict[str, FloatArray] = {}
+    names = [mesh.elements.beam[number] for number in mesh.moving.elements]  # type: ignore[union-attr]
+    beams = {name: mesh.fits.network.beams[name] for name in names}
+    angles = coefficients_of(list(beams.values())) + 0.0
+    for (name, beam), angle in zip(beams.items(), angles, strict=True):
+        section, fitted = beam.section, mesh.fits[name]
+        angle[0] += fitted.rotation
+        rigidity = float(np.ravel(section.rigidities(np.array([0.5]), 0.5)[0])[0])
+        curl = float(np.ravel(section.curling(section.thickness_at(0.5, 0.5))[0])[0])
+        laws[name] = np.array([fitted.length / length, rigidity / (force * length**2), curl / length**2, *angle])
+    return np.array([laws[name] for name in names])

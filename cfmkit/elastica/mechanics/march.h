@@ -53,7 +53,7 @@ typedef struct {
     const double *side;    /* (sides, 3): half the thickness, unit of length [m], radius of an edge that moves */
     const Int *moved_at;   /* (moved): elements */
     const double *moved_fixed, *moved_shares; /* (moved, 2), (moved, 2, sides): their ends are fixed + shares . parameters */
-    const double *moved_law; /* (moved, 2 + coefficients): length and rigidity of the beam, its unloaded angle by the parameter */
+    const double *moved_law; /* (moved, 3 + coefficients): length, rigidity and curling of the beam, its unloaded angle by the parameter */
     const double *rule, *unit_bend; /* (2, q) Gauss points and weights; (triangle) int N_i' N_j' */
 } Model;
 
@@ -92,6 +92,8 @@ static inline double larger(double a, double b) { return a > b ? a : b; } /* fma
 Stage stage(const Model *m, double way);
 Int terms(const Model *m);
 void term(const Model *m, Int number, const double *z, Stage at, int with_hessian, Term *out);
+
+double bending_change(const Model *m, Int o, double curvature, double grows, double rest);
 
 Pose pose(const Model *m, const double *z, Int k);
 Distance outline_distance(const Outline *o, double x, double y);

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics.element_tables import smooth_marks, smooth_tables
-from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.elastica.model.plain_beams_at_once import has_polynomial_angle
 from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def unloaded_beam_at(
     name: Any = contact.item.beam  # type: ignore[union-attr]
     beam, fitted = mesh.fits.network.beams[name], mesh.fits[name]
     inside, step, length = float(mesh.elements.cuts[contact.element].mean()), PLACE_STEP, mesh.scales.length
-    if is_plain(beam):
+    if has_polynomial_angle(beam):
         angle, turning = _value_and_slope(lambda t: fitted.angle(t, inside), parameter)
         half, speed = 0.5 * float(beam.section.thickness_at(0.5, inside)) / length, fitted.length / length
         return (angle, turning, speed), turning / speed, half, 0.0

@@ -13,7 +13,7 @@
 #define SMALLEST_FORCE 1e-12    /* of a contact that begins, in the curvature of its gap over its force */
 #define NEUTRAL_STIFFNESS 1e-6  /* of motions below which a direction counts as stable */
 
-enum { N_LAW = 2 }; /* numbers of a moving element before the coefficients of its angle: length and rigidity of its beam */
+enum { N_LAW = 3 }; /* numbers of a moving element before the coefficients of its angle */
 
 static double polynomial(const double *coefficients, Int count, double t, double *slope) {
     double value = 0.0;
@@ -22,6 +22,12 @@ static double polynomial(const double *coefficients, Int count, double t, double
         *slope = *slope * t + value;
         value = value * t + coefficients[k];
     }
+    return value;
+}
+
+static double second_slope(const double *coefficients, Int count, double t) {
+    double value = 0.0;
+    for (Int k = count - 1; k > 1; k--) value = value * t + (double)(k * (k - 1)) * coefficients[k];
     return value;
 }
 
@@ -53,6 +59,9 @@ int sides_move(const Model *m, const double *z) {
             weight[k] = speed * m->rule[q + k];
             rigidity[k] = law[1] / (speed * speed);
             ahead[k] = speed * (1.0 - m->rule[k]);
+            if (!m->curl) continue;
+            ((double *)m->rest)[e * q + k] = slope * width;
+            ((double *)m->curl)[e * q + k] = law[2] / (speed * speed);
         }
         ((double *)m->length)[e] = speed;
         for (Int k = 0; k < triangle; k++) bend[k] = law[1] / speed * m->unit_bend[k];
@@ -78,14 +87,16 @@ static void change_by_end(const Model *m, Int row, int end, const double *cuts, 
             turn += z[own[local_shape(k)]] * N[k];
             curvature += z[own[local_shape(k)]] * S[k];
         }
-        polynomial(law + N_LAW, m->coefficients, cuts[0] + width * u, &turned);
-        turned *= end ? u : 1.0 - u;
+        const double place = cuts[0] + width * u, share = end ? u : 1.0 - u;
+        polynomial(law + N_LAW, m->coefficients, place, &turned);
+        const double rest = (end ? turned : -turned) + width * share * second_slope(law + N_LAW, m->coefficients, place);
+        turned *= share;
         const double c = cos(turn), s = sin(turn);
         const double nx = z[own[count - 2]] + load[0] * m->ahead[o], ny = z[own[count - 1]] + load[1] * m->ahead[o];
         const double normal = nx * c + ny * s, shear = ny * c - nx * s, f = 1.0 + (a - b) * normal;
         const double more_normal = further * (load[0] * c + load[1] * s) + shear * turned;
         const double more_shear = further * (load[1] * c - load[0] * s) - normal * turned;
-        const double bent = -w * m->rigidity[o] * grows * curvature;
+        const double bent = w * bending_change(m, o, curvature, grows, rest);
         const double sheared = w * (grows * shear * f + more_shear * f + shear * (a - b) * more_normal);
         const double x = (1.0 + a * normal) * c - b * shear * s, y = (1.0 + a * normal) * s + b * shear * c;
         reach[0] += w * (grows * x + a * more_normal * c - b * more_shear * s - y * turned);

@@ -62,6 +62,20 @@ static void bending(const Model *m, Int o, double curvature, double *moment, dou
     *stiffness = rigidity * (stiff + 2.0 * curvature * rising + 0.5 * curvature * curvature * curved);
 }
 
+/* Change of the moment of bending times the weight of a point, over that weight, where its element grows by a share of its
+ * length and its curvature at rest changes. */
+double bending_change(const Model *m, Int o, double curvature, double grows, double rest) {
+    double moment, stiffness, g, first, second;
+    bending(m, o, curvature, &moment, &stiffness);
+    if (!m->curl || m->hindrance[o] == 0.0) return -grows * moment;
+    const double n = m->hindrance[o], curl = m->curl[o], whole = curvature + m->rest[o], by = 2.0 * curl * whole;
+    const double half = 0.5 * curvature * curvature;
+    curling_share(curl * whole * whole, &g, &first, &second);
+    const double by_rest = -n * (curvature * first * by + half * (second * by * by + 2.0 * curl * first));
+    const double by_curl = -n * whole * (curvature * first * whole + half * (second * by * whole + 2.0 * first));
+    return -grows * moment + m->rigidity[o] * (by_rest * rest - 2.0 * grows * curl * by_curl);
+}
+
 /* Sums over the Gauss points of an element; stiffness: lower triangle of the rotations' Hessian, by rows. */
 typedef struct {
     double rotation[MAX_SHAPES], change[MAX_SHAPES], by_x[MAX_SHAPES], by_y[MAX_SHAPES];

@@ -119,9 +119,12 @@ def check_fits(beams: Sequence[Beam], distance: Any, own: Any) -> None:
 
 def is_plain(beam: Beam) -> bool:
     """Return True if a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
-    if beam.section.wide or isinstance(beam.section.thickness, Taper):
-        return False
-    return isinstance(beam.shape, Polynomial) and not coils(beam)
+    return not beam.section.wide and has_polynomial_angle(beam)
+
+
+def has_polynomial_angle(beam: Beam) -> bool:
+    """Return True if a beam has a polynomial angle, no coil of many turns, and one thickness."""
+    return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper) and not coils(beam)
 
 
 def coils(beam: Beam) -> bool:
