@@ -136,6 +136,7 @@ def test_a_rotation_that_is_stopped_has_a_moment():
             "obstacles.o", "flanks of beams beside contacts with friction are not modelled",
         ),
         ("  stops: {s: {node: tip, gap: 1 mm}}\n", "stops.s", "direction"),
+        ("  stops: {s: {node: root, direction: 0 deg, gap: 1 mm}}\n", "stops.s.node", "is clamped: it reaches no stop"),
         (
             "  obstacles: {o: {kind: disc, centre: [400 mm, -10 mm], radius: 12 mm, nodes: {tip: 1 mm}}}\n",
             "obstacles.o", "the pad of node 'tip' lies 3 mm inside it before any load",
@@ -317,6 +318,7 @@ def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
     slips = columns["work_tip_state"].values == "slip"
     assert np.abs(rubbing)[slips] == pytest.approx(0.3 * force[slips], rel=1e-9)
     marks = [mark for mark in columns["event"].values.tolist() if mark]
+    assert "stability_of_sliding" in {warning.name for warning in rough.warnings}
     assert (marks[0], marks[-1]) == ("work tip begins", "work tip ends")
     assert set(marks[1:-1:2]) == {"work tip sticks"}  # where its sliding turns round, and where the drive does
     assert set(marks[2:-1:2]) == {"work tip slips"}
