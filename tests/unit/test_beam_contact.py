@@ -205,7 +205,8 @@ def test_the_shipped_stop_keeps_the_leaf_below_its_allowable_stress():
 
 
 def test_obstacles_stops_and_touching_pads_are_drawn():
-    for name, parts in (("beam_gripper", {"obstacle-work-0", "touch-0-71"}), ("beam_stop", {"stop-bumper-0-0"})):
+    gripper = {"obstacle-work-0", "hatch-work-0", "touch-0-71"}
+    for name, parts in (("beam_gripper", gripper), ("beam_stop", {"stop-bumper-0-0"})):
         figure = figures(solved(name))["shapes"]()
         drawn = {artist.get_gid() for artist in figure.axes[0].get_children()}
         assert parts <= drawn
@@ -300,6 +301,14 @@ def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
     said = {warning.name: warning.message for warning in result.warnings}
     assert "list it in 'beams'" in said["side_in_obstacle"]
     assert "pin_leaf_force" not in result.curve.extra
+
+
+def test_a_side_that_touches_one_obstacle_is_seen_to_pass_through_another():
+    more = "pin: {kind: disc, centre: [50 mm, -10 mm], radius: 4.75 mm, beams: [leaf]}\n"
+    more += "    bore: {kind: hole, centre: [99 mm, 0 mm], radius: 30 mm, nodes: {tip: 1 mm}}"
+    said = {warning.name: warning.message for warning in cfmkit.analyze(over(more)).warnings}
+    assert "passes through 'bore' from 0 mm on, at 0% of its length" in said["side_in_obstacle"]
+    assert "'leaf' and 'pin'" in said["contact_begins"]
 
 
 def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():

@@ -425,7 +425,7 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
             deep = depth > slack + max(yields, 0.0)
             if deep.any():
                 first = int(deep.any(axis=1).argmax())
-                place = float(found.place[int(depth[first].argmax())])
+                place = float(np.broadcast_to(found.place, depth.shape)[first, depth[first].argmax()])
                 yield (
                     "side_in_obstacle",
                     f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "
