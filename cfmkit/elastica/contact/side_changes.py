@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import PieceOfPath, StepBetween
+from cfmkit.elastica.contact.changes import PieceOfPath
 from cfmkit.elastica.contact.edges import find_mate
 from cfmkit.elastica.contact.line_tangent import KINK_REACH
 from cfmkit.elastica.contact.lying_sides import guess_laid, may_lie, presses, presses_where_it_spreads, why_not_laid
@@ -31,6 +31,7 @@ from cfmkit.numerics.continuation.path import PathStop, WhyStopped
 
 if TYPE_CHECKING:
     from cfmkit.elastica.contact.side_conditions import SideCondition
+    from cfmkit.elastica.contact.step_between import StepBetween
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 BESIDE_SHARE = 0.05  # of a step, by which a located change may lie beside it
@@ -53,7 +54,7 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     unstable = step.first.unstable
     if condition.kind == "touch":
         return _locate_touch(piece, step, row, condition)
-    at = step.bisect(row)
+    at = _locate_zero(piece, step, row)
     if at is None:
         return None
     if condition.kind == "tangent" and _is_parallel(piece, condition, at):
@@ -271,6 +272,17 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
             return None
         at = solved
     return piece.grow(at)
+
+
+def _locate_zero(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilibrium | None:
+    """Return the equilibrium of a step at which a condition is just met: by secants, else by bisection."""
+    share = step.crossing(row)
+    if share is not None:
+        guess, drive = step.interpolate(share)
+        at = _zero_of(piece, step.first._replace(x=guess, drive=float(drive)), row)
+        if at is not None and step.contains(at, guess):
+            return at
+    return step.bisect(row)
 
 
 def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:

@@ -28,15 +28,15 @@ from cfmkit.elastica.contact.line_tangent import (
     measure_line_tangent,
     raise_pad,
 )
-from cfmkit.elastica.contact.terms import measure, press
+from cfmkit.elastica.contact.terms import contact_contribution, measure
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations
 from cfmkit.elastica.mechanics.moving_elements import (
     MOVED_TABLES,
     PLACE_STEP,
     compute_moved_tables,
+    copy_moved_tables,
     unloaded_beam_at,
-    with_own_tables,
 )
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.plain_beams_at_once import is_plain
@@ -97,7 +97,7 @@ class SlidingEquations(NumpyEquations):
     @classmethod
     def from_mesh(cls, mesh: Discretisation, ramp: bool, make: Callable[..., NumpyEquations]) -> SlidingEquations:
         """Return the equations of a network; `make` returns those of one whose elements stand still."""
-        mesh = with_own_tables(mesh)
+        mesh = copy_moved_tables(mesh)
         return cls(mesh, ramp, plain=make(replace(open_all_contacts(mesh), moving=None), ramp))
 
     def rebase(self, base: FloatArray) -> SlidingEquations:
@@ -180,11 +180,11 @@ class SlidingEquations(NumpyEquations):
         )  # fmt: skip
         if not line_leaves_normal(mesh.fits.network.beams[item.beam].section):  # type: ignore[union-attr]
             return side
-        press, forces = float(z[contact.unknown]), mesh.elements.unknowns[[contact.element, contact.element + 1], -2:]
+        force, forces = float(z[contact.unknown]), mesh.elements.unknowns[[contact.element, contact.element + 1], -2:]
         compliances = measure_compliances(mesh, item.beam, parameter)  # type: ignore[union-attr]
-        at = measure_line_tangent(angle, normal, z[forces[0]] - 0.5 * press * normal, *compliances)
+        at = measure_line_tangent(angle, normal, z[forces[0]] - 0.5 * force * normal, *compliances)
         # by the force before the kink and that of the contact; with all places held by the forces on both sides of it
-        leaning, frozen = (bulge @ (at.slope - 0.5 * press * at.by_force)) @ apart, (bulge @ at.slope) @ apart
+        leaning, frozen = (bulge @ (at.slope - 0.5 * force * at.by_force)) @ apart, (bulge @ at.slope) @ apart
         leaning[2] = frozen[2] = at.by_turn
         half, turn_by_place = 0.5 * at.by_force, float(at.by_turn) * slope[1]
         return side._replace(
@@ -313,7 +313,7 @@ class SlidingEquations(NumpyEquations):
                 contact = contact._replace(
                     closed=bool(z[contact.unknown] > measure(self.mesh, contact, z).value + lowered)
                 )
-            term = press(self.mesh, contact, z)
+            term = contact_contribution(self.mesh, contact, z)
             slots = self.slots[term.unknowns]
             indices = slots >= 0
             pushed = slots[indices]
@@ -436,7 +436,7 @@ class SlidingEquations(NumpyEquations):
             if not z[contact.unknown]:
                 continue
             if contact.slide < 0:
-                term = press(self.mesh, contact, z)
+                term = contact_contribution(self.mesh, contact, z)
                 total[term.unknowns] += term.gradient
                 continue
             if (leading := find_leading(self.mesh, contact)) is not contact:
