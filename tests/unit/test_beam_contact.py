@@ -136,6 +136,7 @@ def test_a_rotation_that_is_stopped_has_a_moment():
             "obstacles.o", "flanks of beams beside contacts with friction are not modelled",
         ),
         ("  stops: {s: {node: tip, gap: 1 mm}}\n", "stops.s", "direction"),
+        ("  stops: {s: {node: root, direction: 0 deg, gap: 1 mm}}\n", "stops.s.node", "is clamped: it reaches no stop"),
         (
             "  obstacles: {o: {kind: disc, centre: [400 mm, -10 mm], radius: 12 mm, nodes: {tip: 1 mm}}}\n",
             "obstacles.o", "the pad of node 'tip' lies 3 mm inside it before any load",
@@ -204,7 +205,8 @@ def test_the_shipped_stop_keeps_the_leaf_below_its_allowable_stress():
 
 
 def test_obstacles_stops_and_touching_pads_are_drawn():
-    for name, parts in (("beam_gripper", {"obstacle-work-0", "touch-0-71"}), ("beam_stop", {"stop-bumper-0-0"})):
+    gripper = {"obstacle-work-0", "hatch-work-0", "touch-0-71"}
+    for name, parts in (("beam_gripper", gripper), ("beam_stop", {"stop-bumper-0-0"})):
         figure = figures(solved(name))["shapes"]()
         drawn = {artist.get_gid() for artist in figure.axes[0].get_children()}
         assert parts <= drawn
@@ -301,6 +303,14 @@ def test_pads_alone_leave_the_side_of_a_leaf_out_and_say_so():
     assert "pin_leaf_force" not in result.curve.extra
 
 
+def test_a_side_that_touches_one_obstacle_is_seen_to_pass_through_another():
+    more = "pin: {kind: disc, centre: [50 mm, -10 mm], radius: 4.75 mm, beams: [leaf]}\n"
+    more += "    bore: {kind: hole, centre: [99 mm, 0 mm], radius: 30 mm, nodes: {tip: 1 mm}}"
+    said = {warning.name: warning.message for warning in cfmkit.analyze(over(more)).warnings}
+    assert "passes through 'bore' from 0 mm on, at 0% of its length" in said["side_in_obstacle"]
+    assert "'leaf' and 'pin'" in said["contact_begins"]
+
+
 def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
     own = "support: guided, direction: 90 deg"
     lines = (FLOOR.replace("mm}}", f"mm}}, friction: {friction}}}") for friction in (0, 0.3))
@@ -317,6 +327,7 @@ def test_friction_makes_the_way_back_a_branch_of_its_own_with_hysteresis():
     slips = columns["work_tip_state"].values == "slip"
     assert np.abs(rubbing)[slips] == pytest.approx(0.3 * force[slips], rel=1e-9)
     marks = [mark for mark in columns["event"].values.tolist() if mark]
+    assert "stability_of_sliding" in {warning.name for warning in rough.warnings}
     assert (marks[0], marks[-1]) == ("work tip begins", "work tip ends")
     assert set(marks[1:-1:2]) == {"work tip sticks"}  # where its sliding turns round, and where the drive does
     assert set(marks[2:-1:2]) == {"work tip slips"}

@@ -33,6 +33,7 @@ from cfmkit.elastica.mechanics.compiled import WITHOUT_C_VARIABLE
 from cfmkit.elastica.mechanics.discretise import FlankPlace, discretise
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.contact import BeamOnObstacle, NodeOnObstacle, circle, line, polyline
+from cfmkit.elastica.model.contact import arc as edge_of_arc
 
 DOWN = -np.pi / 2
 HALF = 0.005  # half the thickness: radii of the references are those of the centre line
@@ -132,9 +133,13 @@ def test_a_tip_on_a_floor_that_stretches_has_the_forces_of_shooting():
         (0.5, 2.54509723698775048, {4.0: (0.1998403214625088, (None, -0.64299750901244334))}),
     ],
 )  # fmt: skip
-def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known):
+@pytest.mark.parametrize("is_arc", [False, True])
+def test_a_leaf_wraps_around_a_disc_as_the_closed_form_says(radius, onset, known, is_arc):
+    """An arc begins where the leaf is clamped; before it its edge is straight."""
     drive = Loading(TIP_LOAD, np.array([1.0, 2, 4, 8, 4, 2, 0.5]))
-    path = trace(leaf(side("drum", circle((0, -radius), radius - HALF))), drive, EXACT)
+    centre = (0, -radius), radius - HALF
+    drum = edge_of_arc(*centre, 0.5 * np.pi, -0.5) if is_arc else circle(*centre)
+    path = trace(leaf(side("drum", drum)), drive, EXACT)
     assert path.status is PathStatus.COMPLETE
     kinds, drives = zip(*((event.kind, event.drive) for event in path.contact_events), strict=True)
     assert kinds == ("spreads", "closes")

@@ -22,7 +22,7 @@ from cfmkit.elastica.contact.places_of_sides import (
     lay_anew,
     list_remaining_places,
 )
-from cfmkit.elastica.contact.side_conditions import NEW_PLACE
+from cfmkit.elastica.contact.side_conditions import NEW_PLACE, step_inwards
 from cfmkit.elastica.contact.side_gaps import LoadStage
 from cfmkit.elastica.mechanics.discretise import FlankPlace
 from cfmkit.elastica.mechanics.poses import poses
@@ -414,6 +414,7 @@ def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False
     )
     force = z[mesh.elements.unknowns[element, -2:]]
     place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, end])]).place[0]
+    place = step_inwards(item, place, angle, condition.last)
     lies = presses_where_it_spreads(piece, item, place, force, angle) and not free
     first = FROM_ROOT if lies else BESIDE_ROOT
     parameter, laid = (1 - first, 1) if condition.last else (first, -1)

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.equations import SideData
 
 ON_OBSTACLE = 1e-9  # mean beam lengths, and rad, within which a clamped end lies on an obstacle
+STEP_INWARDS = 1e-6  # mean beam lengths
 NEW_PLACE = 1e-4  # of a beam from its end, or from another place, at which a contact that moves or parts begins
 ROUNDING_OF_KIND = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0, "spreads": 1e-9, "pinch": 0.0,
              "wraps": 1e-9, "pulls": 1e-9}  # fmt: skip
@@ -49,6 +50,13 @@ ROUNDING_OF_KIND = {"touch": 1e-11, "tangent": 1e-11, "end": 0.0, "closes": 0.0,
 
 PAD_OF_SIDE: dict[type, Any] = {BeamOnObstacle: NodeOnObstacle, BeamOnBeam: NodeOnBeam}
 """Contacts of the node at the end of a beam with what its side may touch, too."""
+
+
+def step_inwards(item: Any, place: Any, angle: Any, last: bool) -> Any:
+    """Return places (..., 2) a little along a beam from its clamped end: there the edge may go on as an arc."""
+    if not len(item.outline.length):
+        return place
+    return place + (-STEP_INWARDS if last else STEP_INWARDS) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 class SideCondition(NamedTuple):
@@ -235,8 +243,8 @@ class SideConditions:
         sides = [float(np.real(fitted.angle(at + step, inside) + np.zeros(1))[0]) for step in (PLACE_STEP, -PLACE_STEP)]
         bend = bend + (sides[0] - sides[1]) / (2 * PLACE_STEP) / speed
         place = poses(mesh.attachments, z, [int(mesh.elements.ends[element, side])]).place[:, 0]
-        edge = measure_distance(mesh, item, place, z)
         angle = 0.5 * sum(sides) + z[:, mesh.elements.unknowns[element, 3 + 4 * side]]
+        edge = measure_distance(mesh, item, step_inwards(item, place, angle, condition.last), z)
         rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
         return np.asarray(bend * rises + edge.curvature * rises**2)
 

@@ -394,12 +394,14 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
         ("obstacles", name) for name, obstacle in mechanism.obstacles.items() if sides_of(mechanism, obstacle)
     ]
     smooth += [("contacts", number) for number in range(len(mechanism.contacts))]
-    if smooth and rubs(mechanism):
+    said = any(obstacle.friction and obstacle.beams for obstacle in mechanism.obstacles.values())
+    if smooth and rubs(mechanism) and not said:
         yield (
             smooth[0],
             "flanks of beams beside contacts with friction are not modelled: state the 'nodes' that may touch it, "
             "or leave out 'friction'",
         )
+    yield from _stop_faults(mechanism)
     for name in mechanism.obstacles:
         if name in mechanism.stops:
             yield ("obstacles", name), "a stop has the same name: rename one of them"
@@ -416,6 +418,15 @@ def contact_faults(mechanism: Mechanism) -> Iterator[Fault]:
     )
     if follows:
         yield (key,), "contact is not supported under loads that turn with their node: leave out 'follows'"
+
+
+def _stop_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """Yield which stops are of nodes that do not move."""
+    for name, stop in mechanism.stops.items():
+        support = mechanism.nodes[stop.node]
+        stands = support.support == "clamped" or (support.support == "pinned" and stop.kind_tag == "motion")
+        if stands and support.moved is None and getattr(mechanism.drive, "node", None) != stop.node:
+            yield ("stops", name, stop.kind_tag, "node"), f"node {stop.node!r} is {support.support}: it reaches no stop"
 
 
 def _side_faults(mechanism: Mechanism, obstacle: ObstacleBase, place: tuple[str | int, ...]) -> Iterator[Fault]:

@@ -278,6 +278,7 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 CONTACT_FINDINGS = OF_STOPS | {
     "contact_spreads_between_beams": "two parts begin to lie on each other along a length: the curve ends there",
     "friction_not_unique": "friction leaves several states at a change of contact: the first of them was taken",
+    "stability_of_sliding": "a pad slides against friction: whether what slides is stable is not known",
     "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
     "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
     "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
@@ -292,6 +293,12 @@ def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterat
     resting = [describe(one) for number, one in enumerate(path.network.contacts) if path.contact_force(number)[0] > 0]
     before = [f"closed before the drive moves: {', '.join(resting)}"] if resting else []
     yield from change_sentences(solution, say, before)
+    rubbing = [number for number, contact in enumerate(path.network.contacts) if contact.friction]
+    sliding = [number for number in rubbing if "slip" in path.contact_friction(number)[1][solution.keep]]
+    if sliding:
+        names = ", ".join(describe(path.network.contacts[number]) for number in sliding[:MOST_NAMED])
+        message = f"{names} slides: 'stable' says there only that the drive passes no limit point"
+        yield "stability_of_sliding", message
     yield from _gap_sentences(solution)
     yield from _side_sentences(solution, say)
 
@@ -418,7 +425,7 @@ def _side_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator
             deep = depth > slack + max(yields, 0.0)
             if deep.any():
                 first = int(deep.any(axis=1).argmax())
-                place = float(found.place[int(depth[first].argmax())])
+                place = float(np.broadcast_to(found.place, depth.shape)[first, depth[first].argmax()])
                 yield (
                     "side_in_obstacle",
                     f"the side of beam {beam!r} passes through {name!r} from {say(float(path.drive[keep[first]]))} on, "

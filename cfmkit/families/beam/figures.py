@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
+    from cfmkit.elastica.model.contact import ObstacleEdge
     from cfmkit.families.beam.plane_fem_analysis import SolidSolution
     from cfmkit.families.beam.solution import Solution
     from cfmkit.plots.label_placement import Label
@@ -233,6 +234,9 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
     for name, outline in outlines.items():
         for number, line in enumerate(_both(solution, outline.lines(2 * size))):
             parts.edge(ax, line, f"obstacle-{name}-{number}", color=TEXT_INK, linewidth=1.8, zorder=1.6)
+        strokes = [_hatch(outline, line, 0.02 * size) for line in outline.lines(2 * size)]
+        for number, line in enumerate(_both(solution, strokes)):
+            parts.edge(ax, line, f"hatch-{name}-{number}", color=TEXT_INK, linewidth=0.5, zorder=1.5)
     for number, contact in enumerate(path.network.contacts):
         if isinstance(contact, BeamSide):
             _touching_side(solution, ax, number, poses)
@@ -260,6 +264,16 @@ def _contacts(solution: Solution, ax: Axes, box: tuple[float, float, float, floa
             rim = contact.radius * np.column_stack([np.cos(turn), np.sin(turn)])
             for image, line in enumerate(_both(solution, [place + rim])):
                 parts.edge(ax, line, f"pad-{number}-{pose}-{image}", color=color, linewidth=0.8, zorder=4.4)
+
+
+def _hatch(outline: ObstacleEdge, line: FloatArray, length: float) -> FloatArray:
+    """Return strokes from a part of an outline into the solid, with gaps between them, (n, 2) [m]."""
+    way = np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
+    shares = np.arange(0.5 * length, way[-1], length)
+    begin = np.column_stack([np.interp(shares, way, line[:, k]) for k in (0, 1)])
+    free = outline.distance(begin).normal
+    end = begin - 0.7 * length * (free + np.column_stack([-free[:, 1], free[:, 0]]))
+    return np.stack([begin, end, np.full_like(begin, np.nan)], axis=1).reshape(-1, 2)
 
 
 def _touching_side(solution: Solution, ax: Axes, number: int, poses: list[int]) -> None:
