@@ -81,19 +81,30 @@ class Terminal:
             streams.write_error(f"{visible(line)}\n")
 
     @contextmanager
-    def progress(self) -> Iterator[Report]:
-        """Yield what reports progress: a bar on a terminal, else a line with the time left now and then."""
+    def progress(self, budget: float | None = None) -> Iterator[Report]:
+        """Yield what reports progress: a bar on a terminal, else a line with the time left now and then.
+
+        With a time budget [s] the share of it that is spent counts, where less of the work is done: its end is the end.
+        """
         if self.json or self.quiet:
             yield lambda _fraction, _text: None
             return
-        if not sys.stderr.isatty():
-            yield ProgressLines().report
-            return
-        bar = Bar()
+        start, bar = time.monotonic(), Bar() if sys.stderr.isatty() else None
+        report = ProgressLines().report if bar is None else bar.report
+
+        def report_in_budget(fraction: float, text: str) -> None:
+            spent = 0.0 if budget is None else (time.monotonic() - start) / budget
+            report(max(fraction, min(spent, MAX_SHARE_SPENT)), text)
+
         try:
-            yield bar.report
+            yield report_in_budget
         finally:
-            bar.close()
+            if bar is not None:
+                bar.close()
+
+
+MAX_SHARE_SPENT = 0.99
+"""Share of a time budget that is reported at most while the work goes on."""
 
 
 LINE_EVERY = 10.0

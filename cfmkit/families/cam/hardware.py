@@ -46,7 +46,7 @@ from cfmkit.families.hardware import (
 )
 from cfmkit.stock.joint_strength import pin_that_bears
 from cfmkit.stock.parts_list import ListedPart
-from cfmkit.stock.stock_series import BALL_BEARINGS, bearings_of, screw_through
+from cfmkit.stock.stock_series import BALL_BEARINGS, bearings_of, hole_with_fit, screw_through
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -218,13 +218,16 @@ def _parts(
     of = strength.name + (", assumed" if strength.assumed else "")
     radius = mechanism.roller_radius
     yield ListedPart("cam", "cam plate", 1, f"{of}; geometry/cam.dxf", "make", mm(x1 - x0, y1 - y0, thick), "", "plate")
-    data = f"{of}; {mm(mechanism.brace_length)} between holes of {mm(pin)} and {mm(shaft)}, bears {newton(pull)}"
+    ends = " and ".join(hole_with_fit(diameter, 8) for diameter in (pin, shaft))
+    data = f"{of}; {mm(mechanism.brace_length)} between holes of {ends}, bears {newton(pull)}"
     length = mechanism.brace_length + width
     yield ListedPart("roller to slider", "brace", 2, data, "make", mm(length, width, brace), "", "brace")
     size = f"diameter {mm(2.0 * radius)}, {mm(thick)} wide"
-    yield ListedPart("on the cam", "roller", 2, f"presses with {newton(press)}", "make", size, "", "roller")
+    seat = hole_with_fit(shaft, 8) if bearing is None else f"{hole_with_fit(bearing.outer, 7)} for its bearing"
+    data = f"with a hole of {seat}, presses with {newton(press)}"
+    yield ListedPart("on the cam", "roller", 2, data, "make", size, "", "roller")
     size = mm(2.0 * radius, 2.0 * radius, thick)
-    yield ListedPart("on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", size, "", "slider")
+    yield ListedPart("on its guide", "slider", 1, f"with a hole of {hole_with_fit(pin, 8)}", "make", size, "", "slider")
     yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * pull, "slider pin")
     long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * coil
     yield pin_part("shafts of the rollers", 2, shaft, long, press, "shaft")

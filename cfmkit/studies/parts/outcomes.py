@@ -16,7 +16,7 @@ from cfmkit.families import family
 from cfmkit.metrics import split_name, window_of, windows_judged
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.engine import Silent, Work
+from cfmkit.studies.engine import NullMonitor, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.parts.share import Share
@@ -56,7 +56,7 @@ class Outcomes:
         )
 
 
-class _Progress(Silent):
+class _Progress(NullMonitor):
     """Progress of parts that are analysed."""
 
     def __init__(self, run: Run, what: str, count: int) -> None:
