@@ -103,7 +103,7 @@ def _rankings(found: Findings) -> Iterator[PageTable]:
             *(GridColumn(name_in_words(name), wraps=False, rank=rank) for rank, name in ranked),
         )
         rows = tuple(
-            (_without_block(parameter), *(_index(lines.get(name), metric in shares) for name in indices))
+            (_drop_block(parameter), *(_index(lines.get(name), metric in shares) for name in indices))
             for parameter, lines in each.items()
         )
         yield PageTable("", heads, rows, MAX_PARAMETERS)
@@ -114,7 +114,7 @@ def _in_words(label: str) -> str:
     return name_in_words(label).replace(" ... ", " to ")
 
 
-def _without_block(parameters: str) -> str:
+def _drop_block(parameters: str) -> str:
     """Return parameters without the block that nearly all stand in."""
     return ", ".join(path.removeprefix("mechanism.") for path in parameters.split(", "))
 

@@ -168,10 +168,10 @@ class EndStops:
             reported.append(f"stop {event.name!r} is reached at {mm(event.place)}; its force at the end is {force}")
         if reported:
             yield "contact_begins", "; ".join(reported)
-        if text := self.blocked(float(motion[-1])):
+        if text := self.describe_block(float(motion[-1])):
             yield "blocked", text
 
-    def blocked(self, end: float) -> str:
+    def describe_block(self, end: float) -> str:
         """Return that a motion ends at a rigid stop, and at which; empty if it does not."""
         name = self.blocking(end)
         return "" if name is None else f"the drive is blocked by stop {name!r} at {mm(end)}"

@@ -196,7 +196,7 @@ class ScalarQuantity(Generic[S]):
         return self.dimension, self.definition
 
 
-def without_values(definitions: Mapping[str, tuple[str, str]]) -> dict[str, ScalarQuantity[Any]]:
+def columns_of_absent_values(definitions: Mapping[str, tuple[str, str]]) -> dict[str, ScalarQuantity[Any]]:
     """Return what rows say of results that they never have: studies may ask for them, and their cells are empty."""
     return {
         name.partition("[")[0]: ScalarQuantity(*about, lambda _solution: np.nan, applies=lambda _solution: False)

@@ -50,7 +50,7 @@ class Definition:
         """Whether ``name[branch]`` means something."""
         return self.scope in ("branch", "cycle") and not self.argument
 
-    def of(self, kind: Kind) -> Definition:
+    def in_units_of(self, kind: Kind) -> Definition:
         """Return the definition in the words and units of one kind of curve."""
         text = self.definition.replace("{effort}", kind).replace("{motion}", _WORDS[kind])
         return replace(self, dimension=_PLACEHOLDERS[kind].get(self.dimension, self.dimension), definition=text)

@@ -32,13 +32,18 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
 
 
-METRIC_TABLE = (*window_metrics.IN_WINDOW, *ranges.TRAVELS, *window_metrics.LOADS, *window_metrics.LONG_TERM)
+METRIC_TABLE = (
+    *window_metrics.IN_WINDOW,
+    *ranges.TRAVEL_METRICS,
+    *window_metrics.LOSS_AND_STRESS_METRICS,
+    *window_metrics.LONG_TERM,
+)
 """Every metric of the contract, in the order in which they are shown."""
 
 
 @lru_cache(maxsize=4)
 def _table(kind: Kind) -> tuple[Definition, ...]:
-    return tuple(replace(item.of(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
+    return tuple(replace(item.in_units_of(kind), name=_name_in_words(item.name, kind)) for item in METRIC_TABLE)
 
 
 def _name_in_words(name: str, kind: Kind) -> str:
@@ -58,7 +63,7 @@ def definitions(kind: Kind | None = "force", extra: Iterable[Definition] = ()) -
     """
     own = tuple(extra)
     if kind is not None:
-        return (*_table(kind), *(item.of(kind) for item in own))
+        return (*_table(kind), *(item.in_units_of(kind) for item in own))
     both = (*definitions("force", own), *definitions("torque", own))
     return tuple({(item.name, item.dimension): item for item in both}.values())
 

@@ -359,7 +359,7 @@ IN_WINDOW = (
 )
 """Metrics of the effort in the window, in the order in which they are shown."""
 
-LOADS = (
+LOSS_AND_STRESS_METRICS = (
     Definition(
         "hysteresis_area",
         "work",

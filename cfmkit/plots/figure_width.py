@@ -58,7 +58,7 @@ LETTER_WIDTH = 0.55
 """Mean width of a letter, in parts of the font size."""
 
 
-DIGITS = 4
+BOX_DIGITS = 4
 """Of boxes [mm]: constrained layout differs in its last digits each time, and a figure has the same bytes each time."""
 
 
@@ -273,7 +273,7 @@ def _constrain(
     engine.execute(figure)
     bounds = [ax.get_position(original=True).bounds for ax in axes]
     boxes: FloatArray = np.array(bounds) * np.array([size[0], size[1], size[0], size[1]])
-    return boxes.round(DIGITS)
+    return boxes.round(BOX_DIGITS)
 
 
 def _is_too_long(ax: Axes) -> bool:

@@ -18,7 +18,7 @@ class SuggestionsView(Suggestions):
     block: SuggestBlock | None = field(default=None, compare=False)  # always there; it follows fields with defaults
 
     @classmethod
-    def of(cls, suggestions: Suggestions, block: SuggestBlock) -> SuggestionsView:
+    def answering(cls, suggestions: Suggestions, block: SuggestBlock) -> SuggestionsView:
         """Return suggestions with the block `suggest` that they answer."""
         return cls(**{item.name: getattr(suggestions, item.name) for item in fields(suggestions)}, block=block)
 

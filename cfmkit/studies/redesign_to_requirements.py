@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 FIDELITY = "analysis.fidelity"
 
-FITTED = "the requirements state no {0} that the mechanism could be designed for: require '{0}_mean', or a band of it"
+NO_LEVEL_MESSAGE = (
+    "the requirements state no {0} that the mechanism could be designed for: require '{0}_mean', or a band of it"
+)
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def move_free_values(spec: Spec, run: Run) -> Design:
     kind = nominal.curve.kind
     target = _mean_required(outcomes, kind)
     if target is None:
-        return Design(None, Status.INVALID, FITTED.format(kind))
+        return Design(None, Status.INVALID, NO_LEVEL_MESSAGE.format(kind))
     drawn = _by_beams(spec)
     begun = nominal if drawn is spec else _analyze(drawn, run)
     if not begun.curves:

@@ -41,7 +41,7 @@ from cfmkit.studies.suggest.proposal_making_and_judging import (
     make_proposal,
 )
 from cfmkit.studies.suggest.relaxed_requests import confirm, edges
-from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, order_proposals, suggest
+from cfmkit.studies.suggest.search import FIGURE_SECONDS, RESERVE_OF_FEW, _Times, order_proposals, suggest
 
 REQUESTS = Path(__file__).parents[1] / "requests"
 
@@ -507,10 +507,10 @@ def test_designs_in_a_wide_band_aim_at_the_middle_of_its_logarithm():
 
 def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
     began = time.time()
-    times = _Times.from_budget(60.0, RESERVE)
-    assert times.with_proposals - began == pytest.approx(60.0 - RESERVE, abs=1.0)
+    times = _Times.from_budget(60.0, FIGURE_SECONDS)
+    assert times.with_proposals - began == pytest.approx(60.0 - FIGURE_SECONDS, abs=1.0)
     assert times.without - began == pytest.approx(60.0 - RESERVE_OF_FEW, abs=1.0)
-    short = _Times.from_budget(4.0, RESERVE)
+    short = _Times.from_budget(4.0, FIGURE_SECONDS)
     assert short.without - began == pytest.approx(2.0, abs=1.0)
     bare = _Times.from_budget(60.0, 0.0)
     assert bare.without - began == pytest.approx(57.0, abs=1.0)

@@ -140,7 +140,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     from cfmkit.store import RunFolder
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores
-    from cfmkit.studies.suggest.search import RESERVE, suggest
+    from cfmkit.studies.suggest.search import FIGURE_SECONDS, suggest
 
     start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)
@@ -157,7 +157,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
         with long_run(jobs, options.fresh, folder, plain, open_journal) as working:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
-            reserve = max(FIGURES_RESERVE, WRITING_SHARE * budget) if options.no_plots else RESERVE
+            reserve = max(FIGURES_RESERVE, WRITING_SHARE * budget) if options.no_plots else FIGURE_SECONDS
             found = suggest(block.request(), working, block.prefer, reserve)
             deadlines = suggestion_files.Deadlines(Clock(ends - FIGURES_RESERVE), Clock(ends - WRITING_RESERVE))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None

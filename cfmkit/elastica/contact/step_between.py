@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MOST_SAMPLES = 400  # of a step
 OPEN_GAP_STEPS = 2.0  # times a step's motion by which a gap must be open at both ends for nothing to happen between
-NEARER = 30  # halvings of a step, in which it is looked for where a contact still sticks
+MAX_HALVINGS = 30  # halvings of a step, in which it is looked for where a contact still sticks
 MAX_MISS = 1.0  # motions of a step by which a located change may lie off its guess
 BESIDE_STEP = 0.02  # of a step, by which a change may lie beside it: then it is at its end
 
@@ -152,7 +152,7 @@ class StepBetween:
             begins = self.shares[end - 1 :: -1].tolist()
             if number >= len(part.whole.mesh.contacts) + len(part.sides.all):
                 # what sticks begins at its limit, where the drive turns, and may soon reach the other one
-                begins += [float(self.shares[end]) * 0.5**k for k in range(1, NEARER)]
+                begins += [float(self.shares[end]) * 0.5**k for k in range(1, MAX_HALVINGS)]
             begin = next((share for share in begins if value(share) > 0), None)
             if begin is None:
                 return self.first

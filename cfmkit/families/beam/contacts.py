@@ -249,10 +249,10 @@ def force_extremes(
 ) -> tuple[float, float] | tuple[None, None]:
     """Return the largest and the smallest force of a contact in a window [N]; None of a window that is not reached."""
 
-    def signed(path: Path, sign: float) -> FloatArray:
+    def signed_force(path: Path, sign: float) -> FloatArray:
         return sign * named_force(path, name)[None]
 
-    top, bottom = (largest(solution, partial(signed, sign=sign), window) for sign in (1.0, -1.0))
+    top, bottom = (largest(solution, partial(signed_force, sign=sign), window) for sign in (1.0, -1.0))
     return (None, None) if top is None or bottom is None else (top, -bottom)
 
 

@@ -100,7 +100,7 @@ TRAVEL_EXTENSION = 1.1
 """How far a solid is followed, over its travel, to look for a flatter window."""
 
 
-REACH = 1.02
+FOLLOWED_TRAVEL_RATIO = 1.02
 """Travel up to which parts of one piece are followed, over the reach of their proportions: nothing ends there."""
 
 
@@ -198,7 +198,7 @@ def _offer_pushed(request: Request, lengths: Proportions) -> list[Candidate | fl
     for size in RELATIVE_SIZES:
         pair = size * pair_size(request, lengths)
         for crank, parts in ((size * printed, _single_parts), (pair, _pairs)):
-            for start in _starts(request, REACH * lengths.reach * crank):
+            for start in _starts(request, FOLLOWED_TRAVEL_RATIO * lengths.reach * crank):
                 offers += parts(request, lengths, crank, _window(request, start))
         if size in RELATIVE_SIZES[:2]:
             offers += _slow_parts(request, lengths, size * printed)
@@ -233,7 +233,7 @@ def _single_parts(request: Request, lengths: Proportions, crank: float, travel: 
 
 def _slow_parts(request: Request, lengths: Proportions, crank: float) -> list[Candidate]:
     """Return flexures and tapered strips of one size, which take longer to design; they begin late where they can."""
-    deep, reach = request.depth or max(request.envelope), REACH * lengths.reach * crank
+    deep, reach = request.depth or max(request.envelope), FOLLOWED_TRAVEL_RATIO * lengths.reach * crank
     found = []
     for block in _materials(request):
         wide = strip_width(request, block, crank)

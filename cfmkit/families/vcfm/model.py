@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, L
 from cfmkit.families.vcfm.findings import FINDING_RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stack_laws
-from cfmkit.families.vcfm.quantities import COLUMNS, SCALAR_QUANTITIES
+from cfmkit.families.vcfm.quantities import ROW_COLUMNS, SCALAR_QUANTITIES
 from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
@@ -117,7 +117,7 @@ def _shortfall(solution: Solution) -> str:
         return solution.sampler.problem
     if is_closed(solution).any():
         return str(closed_spring(solution)[0])
-    return solution.curves.stops.blocked(float(solution.nominal.ends[1][0]))
+    return solution.curves.stops.describe_block(float(solution.nominal.ends[1][0]))
 
 
 def travel_grid(spec: VcfmSpec) -> FloatArray:
@@ -154,7 +154,7 @@ def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], So
         for start in range(0, len(members), size):
             chosen = members[start : start + size]
             solution = _solve_kind([specs[index] for index in chosen])
-            yield np.array(chosen), SolvedRows(solution, COLUMNS, FINDING_RULES, _is_complete(solution))
+            yield np.array(chosen), SolvedRows(solution, ROW_COLUMNS, FINDING_RULES, _is_complete(solution))
 
 
 def _is_complete(solution: Solution) -> NDArray[np.bool_]:

@@ -86,7 +86,7 @@ MIN_RISE_RATIO = 0.9
 WIDE_LAST = 100.0
 """Promise of designs whose leaves are too wide to curl: they come after all others."""
 
-FARTHEST = 1.2
+TRAVEL_OVER_LINEAR_REGION = 1.2
 """End of the travel over that of the linear region: the flattest window may lie farther."""
 
 SPRING_CLEARANCE_RATIO = 1.2
@@ -234,7 +234,7 @@ def _with_close_spring(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     if target is None or corner + frame.block > float(leaf.reach):
         return spec
     share, rise, preload = corner / float(leaf.reach), float(leaf.rise), float(target.preload_stroke)
-    end = FARTHEST * float(sizes.linear[1])
+    end = TRAVEL_OVER_LINEAR_REGION * float(sizes.linear[1])
     closest = max(0.5 * preload + share * rise, 0.5 * (preload + end) + share * (rise - end))
     clearance = max(frame.block, closest - float(spring_leaf.rise) - 0.5 * frame.block)
     if clearance >= frame.clearance:

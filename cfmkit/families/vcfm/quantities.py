@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.fem_results import FEM_DEFINITIONS as OF_SOLIDS
 from cfmkit.families.findings import newton
-from cfmkit.families.rows import ScalarQuantity, without_values
+from cfmkit.families.rows import ScalarQuantity, columns_of_absent_values
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
@@ -269,7 +269,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
 }
 """Every scalar result of the family, in the order in which they are shown."""
 
-COLUMNS = without_values(OF_STOPS) | dict(SCALAR_QUANTITIES)
+ROW_COLUMNS = columns_of_absent_values(OF_STOPS) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows; a mechanism with stops is solved by itself."""
 
 SCALAR_DEFINITIONS = {name: quantity.about for name, quantity in SCALAR_QUANTITIES.items()} | OF_STOPS

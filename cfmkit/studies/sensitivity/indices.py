@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-RESAMPLES = 200
+N_RESAMPLES = 200
 """Bootstrap samples behind an interval."""
 
-CONSTANT = 1e-12
+CONSTANT_OUTPUT_RTOL = 1e-12
 """An output that varies less than so much of its size does not vary: it has no variance to share out."""
 
 
@@ -53,4 +53,4 @@ def problem(count: int) -> dict[str, Any]:
 
 def varies_not(outputs: FloatArray) -> bool:
     """Return whether all outputs are the same, but for rounding."""
-    return bool(np.ptp(outputs) <= CONSTANT * np.abs(outputs).max())
+    return bool(np.ptp(outputs) <= CONSTANT_OUTPUT_RTOL * np.abs(outputs).max())

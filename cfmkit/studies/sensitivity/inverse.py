@@ -12,7 +12,7 @@ from cfmkit.studies.parts.distributions import values_at
 from cfmkit.studies.sensitivity.method import Method
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 from cfmkit.studies.sensitivity.result_types import to_stated_value as reported
-from cfmkit.studies.sensitivity.tolerance import DRAWN, judge_samples, with_shares
+from cfmkit.studies.sensitivity.tolerance import DRAWN_ROLE, judge_samples, with_shares
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +37,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     tight = [one.tighten(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
 
     points = values_at(tight, setup.parts.unit(setup.samples, setup.seed))[:, None, :]
-    outputs = evaluator.outputs(points, [DRAWN])
+    outputs = evaluator.outputs(points, [DRAWN_ROLE])
     plain = Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
     return with_shares(plain, *judge_samples(setup, outputs))
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.studies.parts.distributions import values_at
 from cfmkit.studies.parts.share import CONFIDENCE_LEVEL, paired_difference
-from cfmkit.studies.sensitivity.indices import RESAMPLES, Analysis, Index, varies_not
+from cfmkit.studies.sensitivity.indices import N_RESAMPLES, Analysis, Index, varies_not
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,7 +90,7 @@ def variance_drops(outputs: FloatArray, seed: int) -> Analysis:
         gap = np.full(groups, np.nan)
         return (Index(VARIANCE_DROP, gap, gap, gap),)
     count, generator = len(outputs), np.random.default_rng([seed, 2])
-    again = np.array([_drops(outputs[generator.integers(count, size=count)]) for _ in range(RESAMPLES)])
+    again = np.array([_drops(outputs[generator.integers(count, size=count)]) for _ in range(N_RESAMPLES)])
     tail = 50.0 * (1.0 - CONFIDENCE_LEVEL)
     low, high = np.nanpercentile(again, (tail, 100.0 - tail), axis=0)
     return (Index(VARIANCE_DROP, _drops(outputs), low, high),)

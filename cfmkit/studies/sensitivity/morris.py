@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.studies.parts.distributions import values_across
-from cfmkit.studies.sensitivity.indices import RESAMPLES, Analysis, Index, analyze_complete, problem
+from cfmkit.studies.sensitivity.indices import N_RESAMPLES, Analysis, Index, analyze_complete, problem
 from cfmkit.studies.sensitivity.method import Method
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
 
@@ -72,7 +72,7 @@ def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
         problem(count),
         points.reshape(-1, count),
         outputs.ravel(),
-        num_resamples=RESAMPLES,
+        num_resamples=N_RESAMPLES,
         num_levels=N_GRID_LEVELS,
         seed=np.random.default_rng([seed, 1]),
     )

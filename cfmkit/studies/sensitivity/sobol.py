@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.studies.parts.distributions import values_at
 from cfmkit.studies.sensitivity.indices import (
-    RESAMPLES,
+    N_RESAMPLES,
     Analysis,
     Index,
     analyze_complete,
@@ -81,7 +81,7 @@ def analyze(outputs: FloatArray, seed: int) -> Analysis:
 
     # SALib takes a seed of zero for none.
     found = sobol.analyze(
-        problem(count), outputs.ravel(), calc_second_order=False, num_resamples=RESAMPLES, seed=seed + 1
+        problem(count), outputs.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=seed + 1
     )
     return tuple(
         _index(name, found[key], found[f"{key}_conf"]) for name, key in zip(INDEX_NAMES, ("S1", "ST"), strict=True)

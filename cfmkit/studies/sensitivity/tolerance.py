@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.setup import Setup
 
-DRAWN = "drawn"
+DRAWN_ROLE = "drawn"
 """The role of a sample of a Monte Carlo run."""
 
-YIELD = Metric("yield", "ratio", "share of parts that meet every requirement")
+YIELD_METRIC = Metric("yield", "ratio", "share of parts that meet every requirement")
 
 
 def run(setup: Setup, evaluator: Evaluator) -> Findings:
@@ -35,7 +35,7 @@ def run(setup: Setup, evaluator: Evaluator) -> Findings:
     unit = setup.parts.unit(setup.samples, setup.seed).reshape(setup.samples, count)
     points = monte_carlo_yield.sample(unit, spreads, groups)
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
-    outputs = evaluator.outputs(points, [DRAWN, *(f"halved {name}" for name in names)])
+    outputs = evaluator.outputs(points, [DRAWN_ROLE, *(f"halved {name}" for name in names)])
     drops = partial(monte_carlo_yield.variance_drops, seed=setup.seed)
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
@@ -64,7 +64,7 @@ def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
         return found
     met, failed = judge_samples(setup, outputs)
     gains = monte_carlo_yield.yield_gains(np.asarray(met.all(axis=-1)), failed)
-    lines = (*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines)
+    lines = (*lines_of(YIELD_METRIC, names, (gains,), len(outputs)), *found.lines)
     return replace(with_shares(found, met, failed), lines=lines)
 
 

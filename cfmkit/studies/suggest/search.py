@@ -60,7 +60,7 @@ beams."""
 
 UNANSWERED_MESSAGE = "the time budget ended before it had answered"
 
-RESERVE = 14.0
+FIGURE_SECONDS = 14.0
 """Seconds that figures of a dozen proposals take on two cores."""
 
 RESERVE_OF_FEW = 6.0

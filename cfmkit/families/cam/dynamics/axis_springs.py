@@ -20,7 +20,7 @@ class AxisSprings:
     tension_stretch: float = 0.0  # how much farther apart the axes are when springs with initial tension open [m]
 
     @classmethod
-    def of(cls, mechanism: Mechanism) -> AxisSprings:
+    def from_mechanism(cls, mechanism: Mechanism) -> AxisSprings:
         """Return the springs of a mechanism."""
         springs = mechanism.springs
         return cls(springs.total, 2.0 * mechanism.springs_rest, springs.tension_stretch)

@@ -62,7 +62,7 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
             lift,
         ),
         slider_mass=masses.slider if masses else 0.0,
-        springs=AxisSprings.of(mechanism),
+        springs=AxisSprings.from_mechanism(mechanism),
         gravity=STANDARD_GRAVITY * along if spec.gravity else 0.0,
         friction=mechanism.rolling_friction if stated_motion(spec).closed else 0.0,
         sideways=STANDARD_GRAVITY * right_share if spec.gravity and stated_motion(spec).closed else 0.0,

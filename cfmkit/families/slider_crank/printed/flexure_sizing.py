@@ -186,8 +186,8 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         text = f"the stress allows flexures of {mm(thinnest)} at most: less travel, or a stronger material"
         return no_design(finding("target_unreachable", text))
     factors: dict[str, tuple[float | None, str, str]] = {
-        "closed_form_force": (found.force_factor, "factor", f"force {FACTORS[0]}"),
-        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {FACTORS[1]}"),
+        "closed_form_force": (found.force_factor, "factor", f"force {FACTOR_PHRASES[0]}"),
+        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {FACTOR_PHRASES[1]}"),
     }
     return Design(
         _write_flexures(spec, found.flexures, stroke),
@@ -286,7 +286,7 @@ def correct_flexures(
     return Sized(parts, *factors, by_stress)
 
 
-FACTORS = (
+FACTOR_PHRASES = (
     "of flexures sized by the closed forms over that of the springs, on average",
     "of flexures sized by the closed forms over that of pure bending",
 )

@@ -95,7 +95,7 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     reported = (
         () if pressed.ending is PressingEnd.COMPLETE else (finding(_ENDING_NAMES[pressed.ending], pressed.message),)
     )
-    blocked = "" if reported else stops.blocked(float(pressed.travel[-1]))
+    blocked = "" if reported else stops.describe_block(float(pressed.travel[-1]))
     on_stops = tuple(finding(*pair) for pair in stops.sentences(pressed.travel, 0.0)) if usable else ()
     if not usable:
         return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=reported)
@@ -125,12 +125,12 @@ def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
         effort_error=solution.effort_error,
-        closed=solution.course if stops else solution.course or _interpolated(solution),
+        closed=solution.course if stops else solution.course or _interpolate(solution),
         state=solution,
     )
 
 
-def _interpolated(solution: Solution) -> BetweenPoints | None:
+def _interpolate(solution: Solution) -> BetweenPoints | None:
     path, allowed = solution.pressed.path, solution.material.allowable_stress
     return interpolate_path(path, float(solution.legs), allowed=allowed)
 

@@ -25,7 +25,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.end_stops import OF_STOPS
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.rows import SolvedRows, drop_numbers, findings_of_one, values_of_one, without_values
+from cfmkit.families.rows import SolvedRows, columns_of_absent_values, drop_numbers, findings_of_one, values_of_one
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import SCALAR_DEFINITIONS as OF_PARTS
@@ -63,7 +63,7 @@ RATE_KEYS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINT_N
 ROWS_TOGETHER = 32
 """Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
-ROW_COLUMNS = without_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
+ROW_COLUMNS = columns_of_absent_values(OF_PARTS | OF_STOPS) | dict(SCALAR_QUANTITIES)
 """What studies may ask of rows: of values that only printed parts and stops have their cells are empty."""
 
 
