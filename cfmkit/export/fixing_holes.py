@@ -51,7 +51,7 @@ def add_fixing_holes(
     return (*contours, *holes), (note,) if bare else ()
 
 
-def without_screws(spec: Any) -> Any:
+def remove_screws(spec: Any) -> Any:
     """Return a specification without holes for screws: they are in what stands or moves as one, which is not solved."""
     part = spec.mechanism.part
     if part is None or part.screws is None:

@@ -6,7 +6,7 @@ which an extreme may stand, the same ends that are solved for. Curves may have d
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO_EFFORT_SHARE
 from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, WINDOW_RTOL
-from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, mean_of_rows
+from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, extremes_of_all, mean_of_rows
 from cfmkit.metrics.metric_definitions import definitions
 from cfmkit.metrics.ranges_many import RANGE_FUNCTIONS, ManyBranches
 from cfmkit.metrics.spread import ManyWindows, static_balance
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
     Ends = tuple[FloatArray, FloatArray]
 
@@ -62,35 +63,33 @@ class RowSamples:
         )
         return RowSamples(motion, inner, count)
 
-    def merge(self, places: FloatArray, values: FloatArray) -> RowSamples:
-        """Return these samples and others, in order and without doubles; others must lie between the ends of a row."""
-        motion, known = np.hstack([self.motion, places]), np.hstack([self.values, values])
-        order = np.argsort(motion, axis=1, kind="stable")
-        motion, known = (np.take_along_axis(item, order, 1) for item in (motion, known))
-        new = np.ones(motion.shape, dtype=bool)
-        new[:, 1:] = motion[:, 1:] > motion[:, :-1]
-        count, last = new.sum(axis=1), motion.shape[1] - 1 - new[:, ::-1].argmax(axis=1)[:, None]
-        new[:, :1] = False  # it stands first
-        motion, known = (
-            _pack_rows(item, new, count + 1, item[:, :1], np.take_along_axis(item, last, 1))[:, :-1]
-            for item in (motion, known)
-        )
-        return RowSamples(motion, known, count)
-
     def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: Any = False) -> Ends:
         """Return the largest and the smallest value of a function of each row next to its samples, (d,) each."""
         return extremes(function, self.motion, self.values, uneven, self.count - 1)
+
+    def extremes_with(
+        self, function: Callable[[FloatArray], FloatArray], places: FloatArray, values: FloatArray, uneven: Any
+    ) -> Ends:
+        """Return the same next to samples and other places, (d, k), which lie between the ends of a row."""
+        if not places.shape[1]:
+            return self.extremes(function, uneven)
+        return extremes_of_all(function, (self.motion, self.values, self.count - 1), places, values, uneven)
 
 
 def _pack_rows(
     values: FloatArray, kept: NDArray[np.bool_], count: NDArray[np.intp], first: FloatArray, last: FloatArray
 ) -> FloatArray:
-    """Return what is kept of each row between its first and its last value, (d, 1) each, which is repeated behind.
+    """Return what is kept, side by side, of each row between its first and last value, (d, 1), repeated behind.
 
     `count` is the length of each row, both ends included.
     """
-    packed = np.repeat(last, count.max(), axis=1)
-    packed[:, :1] = first
+    packed = np.empty((len(values), int(count.max())))
+    packed[:, :1], packed[:, -1:] = first, last
+    begins = kept.argmax(axis=1)
+    if (begins == begins[0]).all() and (count == count[0]).all():
+        packed[:, 1:-1] = values[:, begins[0] : begins[0] + count[0] - 2]
+        return packed
+    packed[:, 1:-1] = last
     packed[:, 1:-1][np.arange(1, packed.shape[1] - 1) < count[:, None] - 1] = values[kept]
     return packed
 
@@ -131,6 +130,7 @@ class CurveRows(ShortRepr):
     peaks: FloatArray | None = None
     travel: Ends | None = None  # (d,) each, of which windows may be shares; default: from end to end
     traced: bool = False  # whether every place takes an equilibrium of its own
+    followed: TargetCurve | None = None  # what every effort is to follow
     _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
@@ -154,6 +154,15 @@ class CurveRows(ShortRepr):
     def extent(self) -> Ends:
         """First and last place of each row."""
         return self.samples.motion[:, 0], self.samples.motion[:, -1]
+
+    def level_along(self, curve: TargetCurve, size: FloatArray) -> CurveRows:
+        """Return curves less one that they are to follow, on constant efforts (d,)."""
+
+        def effort(places: FloatArray, rows: Any) -> FloatArray:
+            level = size if rows is None else size[rows]
+            return np.asarray(self.effort(places, rows) - curve.evaluate(places) + level[:, None])
+
+        return replace(self, effort=effort, target=size, followed=None)
 
     def restrict_to_window(self, window: Ends | None) -> RowsInWindow:
         """Return the curves in windows, (d,) each; None: over their full travel."""
@@ -203,22 +212,27 @@ class RowsInWindow:
 
     @cached_property
     def _peaks(self) -> tuple[FloatArray, FloatArray]:
-        """The peaks in the window and the efforts there, (d, k); those of a row with fewer repeat its first."""
-        curves = self.curves
+        """The peaks in the window and the efforts there, (d, k), in order; for others an end of the window stands."""
+        curves, inside = self.curves, self.inside
         places, heights = curves.dense if curves.peaks is None else curves.peaks, curves.heights
         low, high = (end[:, None] for end in self._cut)
-        own = (places > low) & (places < high) & np.isfinite(heights)
-        return np.where(own, places, low), np.where(own, heights, self.inside.values[:, :1])
+        if not np.isfinite(heights[(places > low) & (places < high)]).all():
+            places = np.where(np.isfinite(heights), places, np.nan)  # places without an effort go behind all others
+            order = np.argsort(places, axis=1)
+            places, heights = np.take_along_axis(places, order, 1), np.take_along_axis(heights, order, 1)
+        is_early, own = places <= low, (places > low) & (places < high)
+        ends = np.where(is_early, inside.values[:, :1], inside.values[:, -1:])
+        return np.where(own, places, np.where(is_early, low, high)), np.where(own, heights, ends)
 
     @cached_property
     def _uneven(self) -> NDArray[np.bool_]:
-        curves, places = self.curves, self._peaks[0]
+        curves, places, (low, high) = self.curves, self._peaks[0], self._cut
         count = np.isfinite(curves.dense if curves.peaks is None else curves.peaks).sum(axis=1)
-        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (count < FEW_SAMPLES))
+        is_inside = (places > low[:, None]) & (places < high[:, None])
+        return np.asarray(is_inside.any(axis=1) & (count < FEW_SAMPLES))
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
-        known = self.inside.merge(*self._peaks) if self._peaks[0].shape[1] else self.inside
-        return known.extremes(self.curves.all_at, self._uneven)
+        return self.inside.extremes_with(self.curves.all_at, *self._peaks, self._uneven)
 
     @cached_property
     def many(self) -> ManyWindows:
@@ -253,7 +267,7 @@ class RowsInWindow:
             return np.full(len(self.ends[0]), np.nan)
         sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
         places, _ = self._peaks
-        top, _ = sizes.merge(places, function(places)).extremes(function, self._uneven)
+        top, _ = sizes.extremes_with(function, places, function(places), self._uneven)
         return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
 
     def stress_max(self) -> FloatArray:
@@ -301,6 +315,38 @@ class RowsInWindow:
         """Return the root mean square of F - target at places uniform in the motion."""
         return np.where(self._has_target, ranges_many.rms_to_target(self.branches, self.curves.target), np.nan)
 
+    def deviation_from_curve(self) -> FloatArray:
+        """Return the largest |F - F*| over the largest |F*|, F* the curve that is to be followed."""
+        curve, inside = self.curves.followed, self.inside
+        if curve is None:
+            return np.full(len(self.ends[0]), np.nan)
+        offsets = RowSamples(inside.motion, inside.values - curve.evaluate(inside.motion), inside.count)
+        top, bottom = offsets.extremes(lambda places: self.curves.all_at(places) - curve.evaluate(places))
+        return np.asarray(np.maximum(top, -bottom) / self.largest_of_curve(*self.ends))
+
+    def rms_to_curve(self) -> FloatArray:
+        """Return the root mean square of F - F* at places uniform in the motion."""
+        curve, places = self.curves.followed, ranges_many.uniform_places(self.branches)
+        if curve is None:
+            return np.full(len(places), np.nan)
+        offset = self.branches.interpolate(places) - curve.evaluate(places)
+        rms = np.sqrt(np.einsum("ij,ij->i", offset, offset) / ranges_many.UNIFORM_POINTS)
+        return np.asarray(np.where(self._is_followed(*self.ends), rms, np.nan))
+
+    def largest_of_curve(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return the largest effort of the curve that is to be followed between places, (d,); NaN where it is zero."""
+        size, curve, known = np.full(len(low), np.nan), self.curves.followed, self._is_followed(low, high)
+        if curve is not None and known.any():
+            pairs, which = np.unique(np.stack([low, high], axis=1)[known], axis=0, return_inverse=True)
+            size[known] = np.array([curve.largest(*pair) for pair in pairs.tolist()])[which.ravel()]
+        return np.where(size > self.curves.error, size, np.nan)
+
+    def _is_followed(self, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
+        """Return between which places the curve that is to be followed is known, (d,)."""
+        curve = self.curves.followed
+        ends = zip(low.tolist(), high.tolist(), strict=True)
+        return np.array([curve is not None and pair[0] < pair[1] and curve.covers(*pair) for pair in ends])
+
     @property
     def _has_target(self) -> NDArray[np.bool_]:
         return np.abs(self.curves.target) > self.curves.error
@@ -332,6 +378,7 @@ def _value_at(samples: RowSamples, place: FloatArray) -> FloatArray:
 
 def _usable(branches: Mapping[str, RowsInWindow]) -> Ends:
     """Return start and end of the largest interval in which every branch keeps its limits, (d,) each."""
+    branches = _level_branches(branches)
     first = next(iter(branches.values()))
     levels = np.mean([one.reference for one in branches.values()], axis=0)
     known = np.isfinite(levels)
@@ -340,7 +387,24 @@ def _usable(branches: Mapping[str, RowsInWindow]) -> Ends:
     return np.where(known, start, np.nan), np.where(known, end, np.nan)
 
 
+def _level_branches(branches: Mapping[str, RowsInWindow]) -> Mapping[str, RowsInWindow]:
+    """Return branches that follow a curve as ones that are to be level, where the curve is known."""
+    first = next(iter(branches.values()))
+    curve = first.curves.followed
+    if curve is None:
+        return branches
+    low, high = (
+        np.clip(pick([item.curves.extent[end] for item in branches.values()], axis=0), *curve.extent)
+        for end, pick in enumerate((np.max, np.min))
+    )
+    size, (start, stop) = first.largest_of_curve(low, high), first.curves.valid
+    valid = np.maximum(start, low), np.minimum(stop, high)
+    level = {name: replace(item.curves.level_along(curve, size), valid=valid) for name, item in branches.items()}
+    return {name: RowsInWindow(curves, branches[name].ends) for name, curves in level.items()}
+
+
 def _usable_stroke(branches: Mapping[str, RowsInWindow]) -> FloatArray:
+    branches = _level_branches(branches)
     known = np.all([np.isfinite(one.reference) for one in branches.values()], axis=0)
     return np.where(known, ranges_many.usable_stroke(*_usable(branches)), np.nan)
 

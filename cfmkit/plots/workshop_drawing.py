@@ -93,21 +93,12 @@ class _Hole:
 
 @apply_style
 def drawing_figure(
-    drawing: Drawing, title: str, tolerances: Sequence[str] = (), block: TitleBlock | None = None
+    drawing: Drawing,  # of the part
+    title: str,  # what the mechanism is called
+    tolerances: Sequence[str] = (),  # one line for each that the specification states
+    block: TitleBlock | None = None,  # without it there is none, and dimensions have three decimals
 ) -> Figure:
-    """Return a part's drawing.
-
-    Parameters
-    ----------
-    drawing : Drawing
-        Of the part.
-    title : str
-        What the mechanism is called.
-    tolerances : sequence of str
-        One line for each that the specification states.
-    block : TitleBlock, optional
-        Without it there is none, and dimensions have three decimals.
-    """
+    """Return a part's drawing."""
     decimals = block.decimals if block else TitleBlock.decimals
     figure = new_figure(*PAPER_SIZE)
     x0, y0, x1, y1 = mm(drawing.extents).tolist()

@@ -23,14 +23,10 @@ SCHEMA_LINE_START = "# yaml-language-server: $schema="
 """How the line begins by which the YAML language server, and so most editors, finds a schema."""
 
 
-def schema(records: Iterable[Family]) -> dict[str, Any]:
-    """Return the schema of the specifications of some families; metrics are a closed list of names.
-
-    Parameters
-    ----------
-    records : iterable of Family
-        One: its specifications alone; several: any of theirs.
-    """
+def schema(
+    records: Iterable[Family],  # one: its specifications alone; several: any of theirs
+) -> dict[str, Any]:
+    """Return the schema of the specifications of some families; metrics are a closed list of names."""
     known = {record.name: record for record in records}
     found = plain_schema({name: record.spec_type for name, record in known.items()})
     for choice in found.get("oneOf", [found]):
@@ -60,10 +56,10 @@ BASE_SCHEMA = {"type": "string", "description": "another specification, whose va
 
 def metric_names(record: Family) -> Iterator[str]:
     """Yield what a requirement of a family may name: every metric and value, those of a branch with its name."""
-    for item in known_metrics(None, values_of_family(record.values)):
+    for item in known_metrics(None, values_of_family(record.outputs.values)):
         yield item.name
-        if item.scope == "branch" and len(record.branches) > 1:
-            yield from (f"{item.name}[{branch}]" for branch in record.branches)
+        if item.scope == "branch" and len(record.outputs.branches) > 1:
+            yield from (f"{item.name}[{branch}]" for branch in record.outputs.branches)
 
 
 def _close_names(node: dict[str, Any], names: list[str]) -> dict[str, Any]:

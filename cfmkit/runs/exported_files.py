@@ -8,7 +8,6 @@ notes and warnings.
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import CfmError, UsageError
@@ -30,9 +29,11 @@ DRAWING_FORMATS = ("png", "pdf")
 
 
 def export_files(
-    spec: Spec,
+    spec: Spec,  # the mechanism as it is
+    # kerf, tolerance: width of the cut, and largest distance from the exact curves: with a unit, or a number [m]
     kerf: str | float | None = None,
     tolerance: str | float | None = None,
+    # of `cfmkit.export.FILE_FORMATS`, `DECK_FORMAT` and `DRAWING_FORMATS`; default: `cfmkit.export.DEFAULT_FORMATS`
     formats: str | Sequence[str] | None = None,
 ) -> tuple[dict[str, bytes], Drawing, dict[str, CfmError]]:
     """Return the files by name, the outlines with notes and warnings, and errors of formats not made.
@@ -40,23 +41,9 @@ def export_files(
     A body, a deck or a dimensioned drawing that cannot be made does not stop the other formats; if there is nothing
     else, its error is raised.
 
-    Parameters
-    ----------
-    spec : Spec
-        The mechanism as it is.
-    kerf, tolerance : str or float, optional
-        Width of the cut, and largest distance from the exact curves: with a unit, or a number [m].
-    formats : str or sequence of str, optional
-        Of `cfmkit.export.FILE_FORMATS`, `DECK_FORMAT` and `DRAWING_FORMATS`; default: `cfmkit.export.DEFAULT_FORMATS`.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the family has nothing to cut, a length is not above zero, a format is unknown or needs a missing library.
-    cfmkit.errors.SolutionError
-        If the mechanism cannot exist as described.
-    cfmkit.errors.GeometryError
-        If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
+    Raises UsageError if the family has nothing to cut, a length is not above zero, a format is unknown or needs a
+    missing library; SolutionError if the mechanism cannot exist as described; GeometryError if it cannot be cut as it
+    is, or nothing says how thick it is and a format needs that.
     """
     from cfmkit.export import DEFAULT_FORMATS, files
     from cfmkit.runs.values_with_units import read_length
@@ -88,7 +75,7 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
-    outlines = import_module(record.outline).drawing(spec, *given)
+    outlines = record.outline(spec, *given)
     outlines = replace(outlines, warnings=(*outlines.warnings, *_thin_walls(outlines, spec)))
     return engrave_labels(outlines, spec.name)
 
@@ -136,15 +123,15 @@ def _drawing_on_paper(outlines: Drawing, spec: Spec, name: str) -> dict[str, byt
 def _decks(spec: Spec) -> dict[str, bytes]:
     """Return the elastic parts as decks of a finite-element solver: meshed, and as beams."""
     record = family(spec.family)
-    if record.elastic_parts is None:
+    if record.elastic is None:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
     from cfmkit.export.beam_deck_for_abaqus import beam_deck
     from cfmkit.solid.mesh_deck_for_abaqus import deck
 
-    parts = record.driven_parts(spec)
+    parts = record.elastic.solids(spec)
     found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}
     steps = {one.name: len(one.stops) for one in parts}
-    for network in record.driven_networks(spec):
+    for network in record.elastic.beams(spec):
         title = f"{spec.name}, {network.name} as beams"
         found[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
     return found

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, create_model, field_validator, model_validator
 
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
 from cfmkit.specs.leaves import stated_leaves
@@ -181,6 +181,11 @@ AS_MADE = "as_made"
 """Key of the context in which a manufactured part is validated: see `Spec.replace`."""
 
 
+def is_made(info: ValidationInfo) -> bool:
+    """Return True if the values are those of one manufactured part."""
+    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
+
+
 class Spec(Model):
     """A complete specification of one mechanism; families narrow the blocks."""
 
@@ -245,9 +250,10 @@ class Spec(Model):
     @property
     def target_curve(self) -> TargetCurve | None:
         """The curve that the analysis or else the design names; None if the force is to be constant."""
-        design = getattr(self, "design", None)
-        level = getattr(design, "force", None) or getattr(design, "torque", None)
-        return next((target.curve(level) for _, target in self._targets()), None)
+        design, target = getattr(self, "design", None), next((target for _, target in self._targets()), None)
+        if target is None:
+            return None
+        return target.curve(getattr(design, "force", None) or getattr(design, "torque", None))
 
     @model_validator(mode="after")
     def _target_is_of_the_motion(self) -> Self:
@@ -395,6 +401,7 @@ __all__ = [
     "SolidAnalysis",
     "Spec",
     "frozen",
+    "is_made",
     "readable_requirement",
     "refuse",
 ]

@@ -196,14 +196,14 @@ def test_show_lists_families_and_topics(cli):
 def test_show_explains_every_key_value_and_finding_of_a_family(cli, family):
     record = families.family(family)
     document = cli("show", family, "--json").document
-    assert {item["name"] for item in document["findings"]} == set(record.findings)
-    assert {item["name"] for item in document["values"]} == set(record.values)
+    assert {item["name"] for item in document["findings"]} == set(record.outputs.findings)
+    assert {item["name"] for item in document["values"]} == set(record.outputs.values)
     keys = {item["path"]: item for item in document["keys"]}
     assert all(item["kind"] and (item["description"] or path == "family") for path, item in keys.items())
     page = cli("show", family).out
-    for name in (*record.findings, *record.values, *(path.rpartition(".")[2] for path in keys)):
+    for name in (*record.outputs.findings, *record.outputs.values, *(path.rpartition(".")[2] for path in keys)):
         assert name in page
-    assert record.references[0][:20] in page
+    assert record.papers[0].reference[:20] in page
 
 
 def test_show_cam_says_kind_default_and_bounds_of_a_key(cli):
@@ -395,6 +395,23 @@ def test_typer_completes_in_the_shell(cli, shell):
     assert {"--install-completion", "--show-completion"} <= set(cli("--help").out.split())
     script = cli(**{"_CFMKIT_COMPLETE": f"source_{shell}"})
     assert (script.code, "_CFMKIT_COMPLETE" in script.out) == (0, True)
+
+
+def test_a_value_of_the_spec_that_is_given_as_an_option_is_answered_with_set(cli, cam):
+    done = cli("design", cam, "--force", "60 N")
+    assert done.code == 2
+    assert (
+        "No such option: --force; values of the spec are changed with --set, e.g. --set design.force='60 N'" in done.err
+    )
+
+
+def test_a_misspelt_part_of_a_name_is_answered_with_that_part(cli):
+    assert "did you mean 'safety'?" in cli("show", "safty").err
+
+
+def test_an_example_of_a_folder_is_found_by_its_own_name(cli):
+    assert cli("examples", "cam_tolerance", "--no-schema").code == 0
+    assert (cli.folder / "cam_tolerance.yaml").is_file()
 
 
 def test_a_shell_without_completion_is_refused(cli, monkeypatch):

@@ -286,7 +286,7 @@ def test_a_design_takes_springs_that_stand_alone_before_those_that_need_a_rod(vc
 
     def made(*catalogue):
         wanted = {"design.catalogue": catalogue, "design.refine": False, "design.rise": "4.6 mm", "requirements": ()}
-        return family("vcfm").design(vcfm.replace(wanted), Run())
+        return family("vcfm").design.make(vcfm.replace(wanted), Run())
 
     assert made(*listed).spec.mechanism.springs.name == "stands"
     alone = made(listed[1])
@@ -319,7 +319,7 @@ def test_a_spring_that_is_wound_up_must_fit_over_its_pin(pin, binds):
 @pytest.mark.slow
 def test_a_design_takes_springs_that_fit_over_the_pins():
     spec = cfmkit.load(CONFIGS / "slider_crank_bought.yaml").replace({"mechanism.pins": {"diameter": "5 mm"}})
-    found = family("slider-crank").design(spec, Run())
+    found = family("slider-crank").design.make(spec, Run())
     result = cfmkit.analyze(found.spec)
     assert "spring_binds_on_pin" not in {one.name for one in result.warnings}
     for one in found.spec.mechanism.springs.bought:

@@ -16,7 +16,6 @@ from cfmkit.cli.verbs.suggest import SuggestOptions, keys, parse_envelope, secon
 from cfmkit.designing.run_many_starts import UNLIMITED_CLOCK
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.beam.proposals import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
@@ -110,7 +109,7 @@ def test_a_bug_costs_its_own_candidate_only_and_keeps_its_traceback(monkeypatch,
     finish = "oh" if where == "candidate" else None
     candidate = replace(candidate, finish=finish)
     monkeypatch.setattr(search, "names", lambda: ("cam",))
-    monkeypatch.setattr(search, "function_named", lambda _: offer)
+    monkeypatch.setattr(search, "family", lambda name: replace(family(name), propose=offer))
     monkeypatch.setattr(proposal_making_and_judging, "function_named", lambda _: broken)
     monkeypatch.setattr(search, "_with_nearest", lambda answers, *_: (answers, True))
     found = suggest(request(), Run())
@@ -145,6 +144,8 @@ def test_a_material_named_again_is_one_more_and_replaces_none():
 def test_a_room_and_a_time_may_be_written_short():
     assert parse_envelope("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
     assert parse_envelope("8cm x 60 mm") == "[8 cm, 60 mm]"
+    with pytest.raises(UsageError, match="100x100x20 has no unit; write 100x100x20mm"):
+        parse_envelope("100x100x20")
     assert seconds("90s") == 90.0
     assert seconds("2 min") == 120.0
     with pytest.raises(UsageError):
@@ -401,7 +402,7 @@ def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next
 
 
 def test_a_family_out_of_reach_says_what_it_would_need():
-    offer = function_named(family("vcfm").propose)(request(force="2 kN"), Run())
+    offer = family("vcfm").propose(request(force="2 kN"), Run())
     assert not offer.candidates
     assert " mm " in offer.reason
 
@@ -475,7 +476,7 @@ def test_the_order_follows_what_is_preferred():
 
 def test_the_same_seed_gives_the_same_texts():
     asked = request()
-    offers = [function_named(family("cam").propose)(asked, Run(3)) for _ in range(2)]
+    offers = [family("cam").propose(asked, Run(3)) for _ in range(2)]
     texts = [[cfmkit.dumps(one.spec) for one in offer.candidates] for offer in offers]
     assert texts[0] == texts[1]
 
@@ -517,7 +518,7 @@ def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
 
 def test_the_nearest_request_gets_a_proposal_when_it_is_asked():
     asked = request(envelope="[26 mm, 20 mm, 12 mm]")
-    propose = function_named(family("beam").propose)
+    propose = family("beam").propose
     assert not propose(asked, Run()).candidates
     found = {edge.key: confirm(asked, 0, UNLIMITED_CLOCK, edge) for edge in edges(asked, ("beam",), 0, UNLIMITED_CLOCK)}
     confirmed = {key: value for key, value in found.items() if value is not None}
@@ -582,7 +583,7 @@ def test_a_family_whose_candidates_all_miss_is_relaxed_by_a_little_first(monkeyp
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
 def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
     keys = {"force": "1.8 N", "travel": "12.8 mm", "envelope": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
-    offer = function_named(family("slider-crank").propose)(read_request(None, keys).request(), Run())
+    offer = family("slider-crank").propose(read_request(None, keys).request(), Run())
     kinds = [one.variant.partition(",")[0] for one in offer.candidates]
     assert {"strip", "springs at pins", "tapered strip"} <= set(kinds)
     assert "tapered strip" not in kinds[: -kinds.count("tapered strip")]
@@ -593,7 +594,7 @@ def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():
     small, large = (
         read_request(None, keys | {"envelope": room}).request() for room in ("[5 mm, 5 mm]", "[50 mm, 250 mm]")
     )
-    propose = function_named(family("slider-crank").propose)
+    propose = family("slider-crank").propose
     assert "fill the envelope" in propose(small, Run()).reason
     assert propose(large, Run()).candidates
 
@@ -705,7 +706,7 @@ def test_springs_for_a_force_are_the_flattest_of_those_that_fit():
         {"design": {"force": "200 N", "travel": ["0.8 mm", "20.8 mm"], "springs": ["pivot", "crank_pin", "slider_pin"]}}
     )
     with pytest.raises(SolutionError, match="no spring of steel wire fits at the crank pin"):
-        add_custom_springs(family("slider-crank").design(free, Run()).spec, asked)
+        add_custom_springs(family("slider-crank").design.make(free, Run()).spec, asked)
     made = (make_proposal(ProposalJob("slider-crank", one, asked, 0)) for one in offered[:4])
     best = next(one for one in made if one.good)  # the first ones need more room for guide and ground
     assert best.numbers["depth"] <= asked.depth

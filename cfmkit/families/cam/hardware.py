@@ -15,7 +15,6 @@ import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.cam.bought_parts import springs_in_words
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.part_sizes import (
     BRACE_WIDTH,
@@ -27,7 +26,7 @@ from cfmkit.families.cam.part_sizes import (
     stack_height,
 )
 from cfmkit.families.findings import mm as length_in_words
-from cfmkit.families.findings import newton
+from cfmkit.families.findings import newton, rate
 from cfmkit.families.hardware import (
     LEAST_WALL,
     Hardware,
@@ -54,6 +53,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.spec import Mechanism
     from cfmkit.stock.stock_series import Bearing, Screw
 
 BEARING_IN_ROLLER = 0.9
@@ -192,6 +192,17 @@ def _shaft(
     return (fitting[0].bore, fitting[0]) if fitting else (least, None)
 
 
+def _springs_in_words(mechanism: Mechanism) -> str:
+    """Return what the springs between the rollers must be."""
+    springs = mechanism.springs
+    rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
+    limit = f", up to {length_in_words(springs.max_elongation)}" if springs.max_elongation else ""
+    opens = f", initial tension {newton(springs.initial_tension)}" if springs.initial_tension else ""
+    tight = f", stretched by {length_in_words(mechanism.preload)} at the start" if mechanism.preload else ""
+    reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
+    return f"extension spring, {reported}{opens}{limit}{tight}"
+
+
 def _parts(
     solution: Solution,
     strength: PartStrength,
@@ -236,7 +247,7 @@ def _parts(
     springs = mechanism.springs
     wound = springs.wound
     size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
-    data, number = springs_in_words(mechanism), count_of(springs)
+    data, number = _springs_in_words(mechanism), count_of(springs)
     yield ListedPart("between the rollers", springs.name or "", number, data, "buy", size, "", "spring")
 
 

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.measured_deviation_definitions import DEVIATION_DEFINITIONS
 from cfmkit.families.cam.solution import Solution
-from cfmkit.families.cam.solution_of_measured_cam import Built, Sides
+from cfmkit.families.cam.solution_of_measured_cam import MeasuredCam, Sides
 from cfmkit.results import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -30,22 +31,6 @@ if TYPE_CHECKING:
     from cfmkit.families.base import MeasuredLoop
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Result
-
-DEVIATION_DEFINITIONS = {
-    "data_friction": (
-        "ratio",
-        "rolling friction whose loop has the measured area, over the displacements that are compared",
-    ),
-    "data_rest_error": (
-        "length",
-        "by how much the springs' rest length must exceed the stated one to explain the measured midline",
-    ),
-    "data_off_design": ("force", "root mean square of the measured force less that of the design without friction"),
-    "data_by_profile": ("force", "root mean square contribution of the measured errors of the profile"),
-    "data_by_friction": ("force", "root mean square contribution of the friction that gives the measured loop area"),
-    "data_by_rest_length": ("force", "root mean square contribution of the springs' rest length, its error included"),
-    "data_unexplained": ("force", "root mean square of the remainder"),
-}
 
 _MAX_ROUNDS = 12
 _DIFFERENCE_STEP = 1e-6
@@ -63,7 +48,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
         Inside what the model covers.
     """
     state = result.state
-    if not isinstance(state, Built | Solution):
+    if not isinstance(state, MeasuredCam | Solution):
         return {}
     sides, designed = _sides(state, loop.places - state.origin)
     loads, mechanism = state.assembly.loads, state.assembly.spec.mechanism
@@ -88,7 +73,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     return quantities(DEVIATION_DEFINITIONS, numbers)
 
 
-def _sides(state: Built | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
+def _sides(state: MeasuredCam | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
     """Return both sides at some travels: as built, and as designed."""
     track = state.assembly.track
     states = track.states(track.start + travel)

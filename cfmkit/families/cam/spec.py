@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.families.cam.springs_spec import Springs
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveLength, Spec, is_made, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Time, format_short
 from cfmkit.stock.material_and_part_spec import (
@@ -22,7 +22,7 @@ from cfmkit.stock.material_and_part_spec import (
     ProcessField,
     SafetyFactor,
 )
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety, is_made
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
 from cfmkit.stock.stock_series import StockSize, System, stock_faults
 
 Positive = Field(gt=0)

@@ -23,12 +23,13 @@ from cfmkit.specs.spec import (
     PositiveLength,
     SolidAnalysis,
     Spec,
+    is_made,
     refuse,
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, SafetyFactor, sheet_faults, stated_sheet
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety, is_made
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringSafety
 from cfmkit.stock.stock_series import StockSize, stock_faults
 
 if TYPE_CHECKING:

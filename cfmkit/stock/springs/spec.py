@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, WrapVa
 
 from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.spec import AS_MADE, Model, refuse
+from cfmkit.specs.spec import Model, is_made, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.fatigue_and_relaxation_spec import Fatigue
@@ -144,11 +144,6 @@ def _disagree(wound: HelicalSpring, stated: float) -> str:
         f"wire, coil and turns give {wound.rate / stated:.3g} times the rate that is stated: leave one of them out, or "
         f"give the wire's 'material'{other} or modulus"
     )
-
-
-def is_made(info: ValidationInfo) -> bool:
-    """Return True if the values are those of one manufactured part."""
-    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
 
 
 def check_initial_tension(wound: HelicalSpring | None, tension: float) -> None:

@@ -67,7 +67,7 @@ class YieldShares:
 
 
 COLD_DRAWN = YieldShares(0.45, 0.78, 0.75)
-HARDENED = YieldShares(0.50, 0.87, 0.75)
+HARDENED_TEMPERED = YieldShares(0.50, 0.87, 0.75)
 STAINLESS_OR_NONFERROUS = YieldShares(0.35, 0.61, 0.55)
 """[Sh, Tables 10-6 and 10-7, eq. 10-57], of a range the smaller share."""
 
@@ -145,17 +145,17 @@ WIRES_BY_NAME: Mapping[str, WireMaterial] = MappingProxyType(
             ),
             WireMaterial(
                 "oil-tempered", "oil-tempered wire (ASTM A229)", 196.5e9, 77.2e9, "[Sh, Table 10-5]",
-                HARDENED,
+                HARDENED_TEMPERED,
                 (Strength(0.5, 12.7, 1855.0, 0.187),),
             ),
             WireMaterial(
                 "chrome-vanadium", "chrome-vanadium wire (ASTM A232)", 203.4e9, 77.2e9, "[Sh, Table 10-5]",
-                HARDENED,
+                HARDENED_TEMPERED,
                 (Strength(0.8, 11.1, 2005.0, 0.168),),
             ),
             WireMaterial(
                 "chrome-silicon", "chrome-silicon wire (ASTM A401)", 203.4e9, 77.2e9, "[Sh, Table 10-5]",
-                HARDENED,
+                HARDENED_TEMPERED,
                 (Strength(1.6, 9.5, 1974.0, 0.108),),
             ),
             WireMaterial(

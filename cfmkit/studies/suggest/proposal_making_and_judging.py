@@ -192,7 +192,7 @@ def _design_candidate(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]
         return None, OUT_OF_TIME
     if job.candidate.design and record.design is not None:
         seconds, begun = _seconds(clock), time.time()
-        design = record.design(spec, Run(job.seed, time_budget=seconds))
+        design = record.design.make(spec, Run(job.seed, time_budget=seconds))
         if design.spec is None or design.status is not Status.COMPLETE:
             ended = time.time() - begun >= seconds
             return None, OUT_OF_TIME if clock.late() else ENDED_EARLY if ended else design.message
@@ -359,7 +359,7 @@ def judge_proposal(
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
     space: BoundingBox | None = record.envelope(result)
-    result, values = add_size(result, space), values_of_family(record.values)
+    result, values = add_size(result, space), values_of_family(record.outputs.values)
     required = plain.replace(
         {"requirements": list_requirements(request, result, space, values), "design": block_for_redesign(spec, request)}
     )

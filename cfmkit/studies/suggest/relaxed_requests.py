@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.families import family
-from cfmkit.families.base import function_named
 from cfmkit.families.findings import percent
 from cfmkit.families.run_control import Run
 from cfmkit.specs.units import format_short, read_quantity
@@ -130,7 +129,7 @@ def _offer(request: Request, name: str, seed: int) -> Sequence[Candidate]:
     if not propose:
         return ()
     asked = request.with_strengths[-1]
-    candidates: Sequence[Candidate] = function_named(propose)(asked, Run(seed)).candidates
+    candidates = propose(asked, Run(seed)).candidates
     return sorted(candidates, key=lambda candidate: candidate.doubtful)
 
 

@@ -21,7 +21,6 @@ import numpy as np
 
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import Unusable, family, names
-from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.suggestion_request import FamilyOffer
 from cfmkit.results import Status
@@ -238,7 +237,8 @@ class _Making:
                     notes.add(keys[index], proposal.as_record())
             self._tried += jobs[index].near is None
             made = (self._tried + self.reused) / max(self._total, 1)
-            run.progress(min(0.99, made), f"{sum(proposal.good for proposal in self.done)} proposals")
+            count = sum(proposal.good for proposal in self.done)
+            run.progress(min(0.99, made), f"{count} proposal{'s' * (count != 1)}")
         for index in sorted(self._known):
             self._take(jobs[index], self._known[index])
         complete = len(self._known) == len(jobs)
@@ -343,8 +343,6 @@ def _ask_family(request: Request, run: Run, name: str) -> FamilyOffer:
         record = family(name)
     except Unusable:  # of another package; `families.skipped` says why
         return FamilyOffer()
-    if record.propose is None:
-        return FamilyOffer()
     return offer_of(record, request, run)
 
 
@@ -359,11 +357,12 @@ def offer_of(record: Family, request: Request, run: Run) -> FamilyOffer:
     solids; those with a reserve are tried first. Where the strength of a material is not known, parts of a small strain
     come before those of a larger one.
     """
-    propose = function_named(str(record.propose))
-    reserves = (1.0,) if record.elastic_parts is None else (RESERVE_FOR_FILLETS, 1.0)
+    if record.propose is None:
+        return FamilyOffer()
+    reserves = (1.0,) if record.elastic is None else (RESERVE_FOR_FILLETS, 1.0)
     candidates: dict[tuple[str, str], Candidate] = {}
     for requested, reserve in product(request.with_strengths, reserves):
-        offer: FamilyOffer = propose(replace(requested, reserve=reserve), run)
+        offer = record.propose(replace(requested, reserve=reserve), run)
         for candidate in offer.candidates:
             if None not in (candidate.springs, request.springs) and candidate.springs != request.springs:
                 continue
