@@ -72,7 +72,8 @@ class CorrectedValue:
         for name, ends in (("before", self.before_ends), ("after", self.after_ends)):
             numbers |= {f"{name}_low_95": ends and ends[0], f"{name}_high_95": ends and ends[1]}
         shown = {
-            key: None if value is None else float(to_border(value, self.dimension)) for key, value in numbers.items()
+            key: None if value is None else float(f"{float(to_border(value, self.dimension)):.12g}")
+            for key, value in numbers.items()
         }
         return {"value": self.name, "unit": border_unit(self.dimension), **shown}
 

@@ -127,6 +127,24 @@ def test_holes_that_turn_on_pins_and_seat_bearings_have_a_fit():
     assert "with a hole of 8 mm H8 (+0.022), presses" in rows["on the camroller"]["data"]
 
 
+def test_pins_of_a_linkage_are_as_long_as_two_sheets_and_the_springs_around_them():
+    result = cfmkit.analyze(cfmkit.load("configs/slider_crank_bought.yaml"))
+    (pins,) = (row for row in table(result) if row["place"] == "joints")
+    springs, turns = result.spec.mechanism.springs, result.state.extremes.largest_turns[:, 0]
+    joints = ("pivot", "crank_pin", "slider_pin")
+    heights = [
+        2 * coil.wire * (coil.turns + 1.0 + turns[k] / (2.0 * np.pi))
+        for k, name in enumerate(joints)
+        for coil in springs.coils_at(name)
+    ]
+    sheet = float(
+        next(row for row in table(result) if row["name"] == "crank")["size"].split(" x ")[2].removesuffix(" mm")
+    )
+    assert float(pins["size"].split(" x ")[1].removesuffix(" mm")) == pytest.approx(
+        2 * sheet + 1e3 * max(heights), abs=1e-3
+    )
+
+
 def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
     """Half of the press acts at each brace, the springs of a side beyond it; half of them above a bar's hole."""
     result = cfmkit.analyze(cfmkit.load("configs/studies/cam_bought_parts.yaml"))

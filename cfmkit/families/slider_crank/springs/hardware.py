@@ -148,6 +148,17 @@ def _guide_loads(spec: SliderCrankSpec, solution: Solution) -> tuple[float, floa
     return across * legs, pulled * legs, float(np.ptp(slid)), at
 
 
+def _tallest_spring(spec: SliderCrankSpec, solution: Solution) -> float:
+    """Return how much of a pin its torsion springs take, wound up [m]; zero where no wire is known."""
+    turns = solution.extremes.largest_turns[:, 0]
+    heights = dict.fromkeys(JOINT_NAMES[:3], 0.0)
+    for entry in spec.mechanism.springs.bought:
+        if entry.at in heights and entry.coil is not None:
+            turn = float(turns[JOINT_NAMES.index(entry.at)])
+            heights[entry.at] += entry.count * entry.coil.body_length_wound_up(turn)
+    return max(heights.values())
+
+
 def _parts(
     spec: SliderCrankSpec, solution: Solution, strength: PartStrength, sizes: tuple[float, float, float], load: float
 ) -> Iterator[ListedPart]:
@@ -168,7 +179,8 @@ def _parts(
         "",
         "slider",
     )
-    yield pin_part("joints", 3 * legs, pin, 2.0 * sheet, load, "joint")
+    long = 2.0 * sheet + _tallest_spring(spec, solution)
+    yield pin_part("joints", 3 * legs, pin, long, load, "joint")
     for entry in mechanism.springs.bought:
         value = getattr(mechanism.springs, entry.at)
         rate = format_short(value, "stiffness" if entry.at == "slider" else "rotational_stiffness")
