@@ -171,6 +171,13 @@ def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], places: F
     """Return beams at fractions of elements before any load."""
     rule, e = basis(mesh.degree), mesh.elements
     through = _matrices(mesh.degree, tuple(places.tolist())).interpolation
+    bundle = mesh.fits.bundle
+    if not bundle.others and e.moved_cuts is None and bundle.coefficients.shape[-1] <= len(rule.places):
+        # plain beams: their angle is a polynomial, their speed and thickness are even
+        cuts = e.cuts[elements]
+        thickness = np.array([net.beams[e.beam[element]].section.thickness for element in elements])
+        place = cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * places
+        return _BeamAtRest(place, e.angle[elements] @ through.T, thickness[:, None] + 0.0 * places)
     rows = []
     for element in elements:
         cuts = e.cuts[element] if e.moved_cuts is None else e.moved_cuts[..., element, :]

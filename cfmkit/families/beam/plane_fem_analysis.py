@@ -18,7 +18,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
-from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import (
     assemble,
     constant_load,
