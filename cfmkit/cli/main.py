@@ -72,12 +72,12 @@ def main(
 ) -> int:
     """Run the program; return its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    streams.prepare()
+    streams.make_tolerant()
     try:
         try:
             return int(_run(given))
         finally:
-            streams.settle()
+            streams.flush()
     except Stopped as stop:  # while it was told how the command has ended
         return int(stop.exit_code)
 

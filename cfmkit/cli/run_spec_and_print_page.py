@@ -23,8 +23,10 @@ NO_MOTION = (
 """What is said where a film was requested and there is none."""
 
 
-def execute(verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool = False) -> Document:
-    """Run a verb over the spec that the options name and write the folder."""
+def execute(
+    verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool = False, budget: float | None = None
+) -> Document:
+    """Run a verb over the spec that the options name, in a time budget [s] if there is one, and write the folder."""
     out = folder_of(options.out, options.spec, verb.name)
     wanted = RunTask(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
     wanted = replace(wanted, page=page, form=options.form, animate=getattr(options, "animate", None))
@@ -32,7 +34,7 @@ def execute(verb: Verb, options: ComputeOptions, terminal: Terminal, page: bool 
         from cfmkit.plots.animation import require_ffmpeg
 
         require_ffmpeg()
-    with terminal.progress() as progress:
+    with terminal.progress(budget) as progress:
         outcome = carry_out(verb, wanted, terminal.arguments, progress)
     found = _document(outcome)
     if wanted.animate and f"figures/motion.{wanted.animate}" not in outcome.written:

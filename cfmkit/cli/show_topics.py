@@ -56,7 +56,9 @@ def explain(name: str | None) -> Document:
     topics = [*TOPIC_HEADINGS, *families.names()]
     by_name = "keys, materials, metrics, values, warnings, units, papers and symbols by their names"
     every = f"there are {', '.join(topics)}, and {by_name}"
-    hint = did_you_mean(name, [*topics, *names()]) or every
+    known = names()
+    parts = (part for one in known for part in one.split("_"))  # which lead to all names that have them
+    hint = did_you_mean(name, [*topics, *known, *parts]) or every
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 

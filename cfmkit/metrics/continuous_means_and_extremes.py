@@ -33,6 +33,10 @@ way is a sixth as long after each round: of a cam at 31 points the last extreme 
 """
 
 
+EXTREME_SIGNS = np.array([1.0, -1.0])
+"""By which values are multiplied of which the largest is wanted: for the largest and for the smallest one."""
+
+
 def places_inside(places: FloatArray, low: float, high: float) -> FloatArray:
     """Return the ends of a window and the places between them, increasing."""
     between = places[(places > low) & (places < high)]
@@ -92,22 +96,104 @@ def extremes(
     (1.0, 0.0)
     """
     end = np.full(len(effort), effort.shape[1] - 1) if last is None else last
-    sign = np.array([1.0, -1.0])
-    top, bottom = effort.max(axis=1), effort.min(axis=1)
-    if not (end >= 2).any():
-        return top, bottom
     highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)
     middle = np.maximum(np.minimum(highest, end[:, None] - 1), 1)
     near = np.minimum(middle[..., None] + np.arange(-1, 2), effort.shape[1] - 1)
     rows = np.arange(len(effort))[:, None, None]
-    x, y = np.broadcast_to(motion, effort.shape)[rows, near], sign[:, None] * effort[rows, near]
-    best = sign * effort[rows[..., 0], highest]
+    x, y = np.broadcast_to(motion, effort.shape)[rows, near], EXTREME_SIGNS[:, None] * effort[rows, near]
+    return _refine_extremes(function, x, y, EXTREME_SIGNS * effort[rows[..., 0], highest], end, uneven)
+
+
+def extremes_of_all(
+    function: Callable[[FloatArray], FloatArray],
+    samples: tuple[FloatArray, FloatArray, NDArray[np.intp]],
+    places: FloatArray,
+    values: FloatArray,
+    uneven: bool | NDArray[np.bool_],
+) -> tuple[FloatArray, FloatArray]:
+    """Return `extremes` of samples and other places in one order, without sorting all of them.
+
+    Parameters
+    ----------
+    function, uneven
+        As there.
+    samples : (d, n) array, (d, n) array, (d,) array of int
+        Motion, increasing, values, and the index of the last of each row.
+    places, values : (d, k) array
+        Others, in order, between the ends of a row; those that are at a sample or at each other count once.
+    """
+    motion, effort, last = samples
+    motion, rows = np.broadcast_to(motion, effort.shape), np.arange(len(effort))[:, None]
+    highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)
+    other = np.stack([values.argmax(axis=1), values.argmin(axis=1)], axis=1)
+    own_x, other_x = motion[rows, highest], places[rows, other]
+    own, others = EXTREME_SIGNS * effort[rows, highest], EXTREME_SIGNS * values[rows, other]
+    is_other = (others > own) | ((others == own) & (other_x < own_x))
+    for row, side in np.argwhere(is_other):
+        highest[row, side] = np.searchsorted(motion[row, : last[row] + 1], other_x[row, side])
+    near = np.clip(highest[..., None] + np.arange(-2, 3), 0, last[:, None, None])
+    beside = _find_neighbours(places, np.where(is_other, other_x, own_x))
+    rows = rows[..., None]
+    x = np.concatenate([motion[rows, near], places[rows, beside]], axis=2)
+    y = EXTREME_SIGNS[:, None] * np.concatenate([effort[rows, near], values[rows, beside]], axis=2)
+    order = np.argsort(x, axis=2, kind="stable")
+    x, y = np.take_along_axis(x, order, 2), np.take_along_axis(y, order, 2)
+    double = np.zeros(x.shape, dtype=bool)
+    double[..., 1:] = x[..., 1:] == x[..., :-1]
+    order = np.argsort(double, axis=2, kind="stable")  # doubles behind all others
+    x, y = np.take_along_axis(x, order, 2), np.take_along_axis(np.where(double, -np.inf, y), order, 2)
+    count = x.shape[2] - double.sum(axis=2)
+    middle = np.maximum(np.minimum(y.argmax(axis=2), count - 2), 1)
+    near = np.minimum(middle[..., None] + np.arange(-1, 2), count[..., None] - 1)
+    x, y = np.take_along_axis(x, near, 2), np.take_along_axis(y, near, 2)
+    ends = _count_distinct(motion, last, places) - 1
+    return _refine_extremes(function, x, y, np.maximum(own, others), ends, uneven)
+
+
+def _find_neighbours(places: FloatArray, x: FloatArray) -> NDArray[np.intp]:
+    """Return indices of the two places before each x (d, 2), of the one at it, and of the two behind it, (d, 2, 5)."""
+    rows, last = np.arange(len(places))[:, None], places.shape[1] - 1
+
+    def count_below(at: FloatArray) -> NDArray[np.intp]:
+        return np.asarray(np.stack([(places < at[:, [k]]).sum(axis=1) for k in range(2)], axis=1))
+
+    def count_up_to(at: FloatArray) -> NDArray[np.intp]:
+        return np.asarray(np.stack([(places <= at[:, [k]]).sum(axis=1) for k in range(2)], axis=1))
+
+    below, behind = count_below(x), count_up_to(x)
+    second = count_below(places[rows, np.maximum(below - 1, 0)]), count_up_to(places[rows, np.minimum(behind, last)])
+    return np.clip(np.stack([second[0] - 1, below - 1, below, behind, second[1]], axis=2), 0, last)
+
+
+def _count_distinct(motion: FloatArray, last: NDArray[np.intp], places: FloatArray) -> NDArray[np.intp]:
+    """Return how many different places samples and others have, (d,); exact where it matters: of few."""
+    count = last + 1 + places.shape[1]
+    for row in np.flatnonzero((last < 2) | ((last < FEW_SAMPLES) & (count > FEW_SAMPLES))):
+        count[row] = len(np.unique(np.concatenate([motion[row, : last[row] + 1], places[row]])))
+    return np.asarray(count)
+
+
+def _refine_extremes(
+    function: Callable[[FloatArray], FloatArray],
+    x: FloatArray,
+    y: FloatArray,
+    best: FloatArray,
+    end: NDArray[np.intp],
+    uneven: bool | NDArray[np.bool_],
+) -> tuple[FloatArray, FloatArray]:
+    """Return the largest and the smallest value next to three samples each, (d, 2, 3), of which the best is known.
+
+    Values of the smallest have their sign changed; `end` is the index of the last of all samples of a row.
+    """
+    top, bottom = best[:, 0], -best[:, 1]
+    if not (end >= 2).any():
+        return top, bottom
     few = (end < FEW_SAMPLES) | uneven
     rounds, beside = (N_PARABOLAS, VERTEX_OFFSETS) if few.any() else (1, np.zeros(1))
     beside = np.where(few[:, None, None], beside, 0.0)
     for number in range(rounds):
         places = _vertex_places(x, y, beside)
-        found = sign[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
+        found = EXTREME_SIGNS[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
         found = np.where(np.isfinite(found), found, -np.inf)
         counts = few[:, None] if number else True  # of many samples one parabola is enough
         best = np.where(counts, np.maximum(best, found.max(axis=-1)), best)

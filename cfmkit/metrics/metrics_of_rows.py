@@ -16,7 +16,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO_EFFORT_SHARE
 from cfmkit.metrics.branches_cut_to_window import BAND_RTOL, WINDOW_RTOL
-from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, mean_of_rows
+from cfmkit.metrics.continuous_means_and_extremes import FEW_SAMPLES, extremes, extremes_of_all, mean_of_rows
 from cfmkit.metrics.metric_definitions import definitions
 from cfmkit.metrics.ranges_many import RANGE_FUNCTIONS, ManyBranches
 from cfmkit.metrics.spread import ManyWindows, static_balance
@@ -63,35 +63,33 @@ class RowSamples:
         )
         return RowSamples(motion, inner, count)
 
-    def merge(self, places: FloatArray, values: FloatArray) -> RowSamples:
-        """Return these samples and others, in order and without doubles; others must lie between the ends of a row."""
-        motion, known = np.hstack([self.motion, places]), np.hstack([self.values, values])
-        order = np.argsort(motion, axis=1, kind="stable")
-        motion, known = (np.take_along_axis(item, order, 1) for item in (motion, known))
-        new = np.ones(motion.shape, dtype=bool)
-        new[:, 1:] = motion[:, 1:] > motion[:, :-1]
-        count, last = new.sum(axis=1), motion.shape[1] - 1 - new[:, ::-1].argmax(axis=1)[:, None]
-        new[:, :1] = False  # it stands first
-        motion, known = (
-            _pack_rows(item, new, count + 1, item[:, :1], np.take_along_axis(item, last, 1))[:, :-1]
-            for item in (motion, known)
-        )
-        return RowSamples(motion, known, count)
-
     def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: Any = False) -> Ends:
         """Return the largest and the smallest value of a function of each row next to its samples, (d,) each."""
         return extremes(function, self.motion, self.values, uneven, self.count - 1)
+
+    def extremes_with(
+        self, function: Callable[[FloatArray], FloatArray], places: FloatArray, values: FloatArray, uneven: Any
+    ) -> Ends:
+        """Return the same next to samples and other places, (d, k), which lie between the ends of a row."""
+        if not places.shape[1]:
+            return self.extremes(function, uneven)
+        return extremes_of_all(function, (self.motion, self.values, self.count - 1), places, values, uneven)
 
 
 def _pack_rows(
     values: FloatArray, kept: NDArray[np.bool_], count: NDArray[np.intp], first: FloatArray, last: FloatArray
 ) -> FloatArray:
-    """Return what is kept of each row between its first and its last value, (d, 1) each, which is repeated behind.
+    """Return what is kept, side by side, of each row between its first and last value, (d, 1), repeated behind.
 
     `count` is the length of each row, both ends included.
     """
-    packed = np.repeat(last, count.max(), axis=1)
-    packed[:, :1] = first
+    packed = np.empty((len(values), int(count.max())))
+    packed[:, :1], packed[:, -1:] = first, last
+    begins = kept.argmax(axis=1)
+    if (begins == begins[0]).all() and (count == count[0]).all():
+        packed[:, 1:-1] = values[:, begins[0] : begins[0] + count[0] - 2]
+        return packed
+    packed[:, 1:-1] = last
     packed[:, 1:-1][np.arange(1, packed.shape[1] - 1) < count[:, None] - 1] = values[kept]
     return packed
 
@@ -214,22 +212,27 @@ class RowsInWindow:
 
     @cached_property
     def _peaks(self) -> tuple[FloatArray, FloatArray]:
-        """The peaks in the window and the efforts there, (d, k); those of a row with fewer repeat its first."""
-        curves = self.curves
+        """The peaks in the window and the efforts there, (d, k), in order; for others an end of the window stands."""
+        curves, inside = self.curves, self.inside
         places, heights = curves.dense if curves.peaks is None else curves.peaks, curves.heights
         low, high = (end[:, None] for end in self._cut)
-        own = (places > low) & (places < high) & np.isfinite(heights)
-        return np.where(own, places, low), np.where(own, heights, self.inside.values[:, :1])
+        if not np.isfinite(heights[(places > low) & (places < high)]).all():
+            places = np.where(np.isfinite(heights), places, np.nan)  # places without an effort go behind all others
+            order = np.argsort(places, axis=1)
+            places, heights = np.take_along_axis(places, order, 1), np.take_along_axis(heights, order, 1)
+        is_early, own = places <= low, (places > low) & (places < high)
+        ends = np.where(is_early, inside.values[:, :1], inside.values[:, -1:])
+        return np.where(own, places, np.where(is_early, low, high)), np.where(own, heights, ends)
 
     @cached_property
     def _uneven(self) -> NDArray[np.bool_]:
-        curves, places = self.curves, self._peaks[0]
+        curves, places, (low, high) = self.curves, self._peaks[0], self._cut
         count = np.isfinite(curves.dense if curves.peaks is None else curves.peaks).sum(axis=1)
-        return np.asarray((places > self._cut[0][:, None]).any(axis=1) & (count < FEW_SAMPLES))
+        is_inside = (places > low[:, None]) & (places < high[:, None])
+        return np.asarray(is_inside.any(axis=1) & (count < FEW_SAMPLES))
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
-        known = self.inside.merge(*self._peaks) if self._peaks[0].shape[1] else self.inside
-        return known.extremes(self.curves.all_at, self._uneven)
+        return self.inside.extremes_with(self.curves.all_at, *self._peaks, self._uneven)
 
     @cached_property
     def many(self) -> ManyWindows:
@@ -264,7 +267,7 @@ class RowsInWindow:
             return np.full(len(self.ends[0]), np.nan)
         sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
         places, _ = self._peaks
-        top, _ = sizes.merge(places, function(places)).extremes(function, self._uneven)
+        top, _ = sizes.extremes_with(function, places, function(places), self._uneven)
         return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
 
     def stress_max(self) -> FloatArray:

@@ -250,9 +250,10 @@ class Spec(Model):
     @property
     def target_curve(self) -> TargetCurve | None:
         """The curve that the analysis or else the design names; None if the force is to be constant."""
-        design = getattr(self, "design", None)
-        level = getattr(design, "force", None) or getattr(design, "torque", None)
-        return next((target.curve(level) for _, target in self._targets()), None)
+        design, target = getattr(self, "design", None), next((target for _, target in self._targets()), None)
+        if target is None:
+            return None
+        return target.curve(getattr(design, "force", None) or getattr(design, "torque", None))
 
     @model_validator(mode="after")
     def _target_is_of_the_motion(self) -> Self:

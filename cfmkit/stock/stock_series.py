@@ -190,6 +190,23 @@ def missing_size(kind: Kind, system: System, size: float, material: str | None =
     return f"no {system} {KIND_WORDS[kind].format(stated)} ({about}); the nearest is {nearest}"
 
 
+FIT_LIMITS = _mm(3, 6, 10, 18, 30, 50, 80)
+FIT_TOLERANCES = {7: (10, 12, 15, 18, 21, 25, 30), 8: (14, 18, 22, 27, 33, 39, 46)}
+"""ISO 286-2: largest diameter of each range, and upper deviation of holes H7 and H8 there, in thousandths of a mm [read
+in the tables of public fit calculators that name ISO 286-2:2010]."""
+
+
+def hole_with_fit(diameter: float, grade: Literal[7, 8]) -> str:
+    """Return a hole of a diameter [m] with its fit: H8 turns on a pin h8, H7 seats a bearing or a dowel.
+
+    >>> hole_with_fit(0.003, 8), hole_with_fit(0.022, 7), hole_with_fit(0.1, 7)
+    ('3 mm H8 (+0.014)', '22 mm H7 (+0.021)', '100 mm')
+    """
+    text = format_short(diameter, "length")
+    place = next((k for k, largest in enumerate(FIT_LIMITS) if diameter <= largest * (1 + SIZE_RTOL)), None)
+    return text if place is None else f"{text} H{grade} (+{1e-3 * FIT_TOLERANCES[grade][place]:.3f})"
+
+
 Path = tuple[str | int, ...]
 StockSize = tuple[Path, Kind, float | None]
 

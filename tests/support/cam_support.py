@@ -110,6 +110,6 @@ def take_gravity_of_the_note(monkeypatch):
 
 def design_exactly(spec):
     """Return the specification that the family designs, before its digits are those of the process."""
-    found = family(spec.family).design(spec, Run())
+    found = family(spec.family).design.make(spec, Run())
     assert found.spec is not None, found.message
     return found.spec

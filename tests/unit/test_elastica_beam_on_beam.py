@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from contact_paths import at_drive, check_complementarity, place_of
+from contact_paths import at_drive, check_complementarity, check_work, place_of
 
 from cfmkit.elastica import (
     CLAMPED_SUPPORT,
@@ -239,3 +239,15 @@ def test_between_points_two_sides_touch_as_at_them():
     known = trace(BULGE, replace(drive, points=np.array([0.1, 0.25])), EXACT)
     assert between.contact_force(UPPER)[0] == pytest.approx(known.contact_force(UPPER)[-1], rel=1e-9)
     assert known.contact_force(UPPER)[-1] > 0.1
+
+
+def test_the_work_of_the_drive_is_the_energy_of_two_leaves_that_shear():
+    """So the tangent of both where they touch is the right one."""
+    depth = 1 / 12
+    section = Section(12 / depth**3, 1.0, depth, axial=True, shear=True)
+    beams = {name: replace(beam, section=section) for name, beam in BULGE.beams.items()}
+    nodes = BULGE.nodes | {
+        "root": Node(0, 0.1 + depth, CLAMPED_SUPPORT),
+        "tip": replace(BULGE.nodes["tip"], y=BULGE.nodes["tip"].y + depth),
+    }
+    check_work(replace(BULGE, nodes=nodes, beams=beams), "tip", 0.1, 0.3)

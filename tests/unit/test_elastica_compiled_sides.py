@@ -50,7 +50,7 @@ OUTLINES = {
 SHAPES = {"straight": Polynomial(), "curved": Polynomial((0.1, 0.4, 0.2))}
 LEAF_PLACES = FlankPlace(0, 0.3), FlankPlace(1, 0.7), FlankPlace(3, 0.4), FlankPlace(2, 0.6)
 DRIVE = np.array([0.3])
-SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True, shear=True)}
+SECTIONS = {"stiff": THIN_SECTION, "soft": replace(THIN_SECTION, axial=True)}
 
 
 def leaf(shape: str = "straight", section: str = "stiff") -> Network:

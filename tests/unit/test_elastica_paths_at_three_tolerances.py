@@ -127,11 +127,11 @@ def drives_that_turn() -> Iterator[Case]:
                 LEAF_RISE * np.array(at), branches=branches, control={"sign": sign},
             )  # fmt: skip
     for count in (1, 2):
-        there_and_back = [*POINTS, *POINTS[-2::-1], 0]
+        loading_and_unloading = [*POINTS, *POINTS[-2::-1], 0]
         yield Case(
-            f"{count} leaves down and up", leaves((1.0,) * count), press("d", there_and_back),
+            f"{count} leaves down and up", leaves((1.0,) * count), press("d", loading_and_unloading),
             changes(0, count, 0, count, 0), (BEGIN, END, END, BEGIN),
-            alone=((LEAF, press("d", there_and_back)),) * count,
+            alone=((LEAF, press("d", loading_and_unloading)),) * count,
         )  # fmt: skip
     yield Case(
         "a path that ends in a stretch does not begin the next", arch(), load("t", [0.3, 2.0, 0.3]), changes(0, 1),

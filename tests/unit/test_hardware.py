@@ -118,6 +118,15 @@ def test_numbers_of_the_assembly_are_those_of_the_list():
         assert len(table(result)) == len(found.parts)
 
 
+def test_holes_that_turn_on_pins_and_seat_bearings_have_a_fit():
+    rows = {
+        row["place"] + (row["name"] or ""): row
+        for row in table(cfmkit.analyze(cfmkit.load("configs/cam_friction.yaml")))
+    }
+    assert "between holes of 6 mm H8 (+0.018) and 8 mm H8 (+0.022)" in rows["roller to sliderbrace"]["data"]
+    assert "with a hole of 8 mm H8 (+0.022), presses" in rows["on the camroller"]["data"]
+
+
 def test_shafts_and_hook_bars_of_a_cam_bear_the_springs_beyond_the_braces():
     """Half of the press acts at each brace, the springs of a side beyond it; half of them above a bar's hole."""
     result = cfmkit.analyze(cfmkit.load("configs/studies/cam_bought_parts.yaml"))

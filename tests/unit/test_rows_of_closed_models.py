@@ -24,8 +24,9 @@ ENDS_OF_WINDOWS = ("analysis.window.1", "analysis.travel", "analysis.travel.1", 
 
 
 CLOSED = (
-    "cam", "cam_catalogue", "cam_friction", "cam_gravity", "cam_no_undercut", "cam_preloaded",
-    "cam_six_springs", "make_finger", "slider_crank_bilancia2019", "slider_crank_bilancia2019_optimum",
+    "cam", "cam_balance", "cam_catalogue", "cam_friction", "cam_gravity", "cam_linear", "cam_no_undercut",
+    "cam_preloaded", "cam_six_springs", "cam_step", "make_finger", "slider_crank_bilancia2019",
+    "slider_crank_bilancia2019_optimum",
     "slider_crank_bought", "slider_crank_friction", "slider_crank_li2019", "slider_crank_li2019_bistable",
     "slider_crank_li2019_from_singularity", "slider_crank_li2019_full_turn", "slider_crank_li2019_prototype",
     "slider_crank_li2019_widest", "slider_crank_rising", "studies/cam_bought_parts", "studies/cam_radius_and_constant",
@@ -39,15 +40,14 @@ CLOSED = (
     "vcfm_cosine", "vcfm_ding2022", "vcfm_falling", "vcfm_folded", "vcfm_pa12", "vcfm_pla", "vcfm_pla_adjustable",
     "vcfm_straight", "vcfm_titanium", "vcfm_u_shape",
 )  # fmt: skip
-"""Configurations whose model is closed; cams that are cut for a curve are analysed one by one."""
+"""Configurations whose model is closed."""
 
 
 def is_closed(spec):
-    """Return True if the model of a specification is closed, and it is no cam that is cut for a curve."""
+    """Return True if the model of a specification is closed, and no cam is measured."""
     profile = getattr(spec.mechanism, "profile", None)
-    follows_curve = profile is not None and (spec.target_curve is not None or profile.curve is not None)
     measured = profile is not None and profile.file is not None
-    return getattr(spec, "fidelity", None) in CLOSED_FIDELITIES and not follows_curve and not measured
+    return getattr(spec, "fidelity", None) in CLOSED_FIDELITIES and not measured
 
 
 def own_metrics(spec):

@@ -43,9 +43,8 @@ def run(options: DesignOptions, terminal: Terminal) -> Document:
 
     budget = None if options.time_budget is None else seconds(options.time_budget)
     running = partial(long_run, options.jobs or cores(), options.fresh, budget=budget)
-    return execute(
-        Verb("design", "designed and analysed", run_design, running=running), options, terminal, options.report
-    )
+    verb = Verb("design", "designed and analysed", run_design, running=running)
+    return execute(verb, options, terminal, options.report, budget)
 
 
 def long_run(

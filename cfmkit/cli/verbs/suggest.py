@@ -150,7 +150,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Document:
     ends = begun + budget
     block = read_request(options.request, given)
     out = folder_of(options.out, options.request or "options", "suggest")
-    with RunFolder(out) as folder, terminal.progress() as progress:
+    with RunFolder(out) as folder, terminal.progress(budget) as progress:
         folder.check("metrics.json", "suggestions.csv")
         plain = Run(options.seed, progress, time_budget=budget - (time.perf_counter() - start))
         jobs = options.jobs or cores()
@@ -229,6 +229,7 @@ def parse_envelope(text: str) -> str:
     if text.strip().startswith("["):
         return text
     sides = [side.strip() for side in re.split(r"(?<=[\d. a-z])x(?=[\d. ])", text.strip())]
-    unit = re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])
+    if not (unit := re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])):
+        raise UsageError(f"--envelope: {text.strip()} has no unit; write {text.strip()}mm")
     full = [side if re.search(r"[a-zA-Z]", side) else f"{side} {unit}" for side in sides]
     return "[" + ", ".join(re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", side) for side in full) + "]"

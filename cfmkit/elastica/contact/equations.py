@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.contact.terms import gaps, press
+from cfmkit.elastica.contact.terms import contact_contribution, gaps
 from cfmkit.elastica.mechanics.equations import LinearEquations, NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.contact import FrictionState
@@ -142,7 +142,7 @@ class ContactEquations(NumpyEquations):
         whole_gradients = np.array(self.plain.gradients(z, drive))
         for contact in self.mesh.contacts:
             for number in np.flatnonzero(z[:, contact.unknown]).tolist():
-                term = press(self.mesh, contact, z[number])
+                term = contact_contribution(self.mesh, contact, z[number])
                 whole_gradients[number, term.unknowns] += term.gradient
         return whole_gradients
 
@@ -150,7 +150,7 @@ class ContactEquations(NumpyEquations):
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
         gradient, hessian = self.plain.evaluate(z, drive, share)
         for contact in self.mesh.contacts:
-            term = press(self.mesh, contact, z)
+            term = contact_contribution(self.mesh, contact, z)
             gradient[term.unknowns] += term.gradient
             hessian[np.ix_(term.unknowns, term.unknowns)] += term.hessian
         return gradient, hessian
@@ -197,7 +197,7 @@ class ContactEquations(NumpyEquations):
                 tangent[held, held] = -1.0
                 residual[held[:2]] = -free[held[:2]]  # flag and anchor of one with friction stay
                 continue
-            term = press(mesh, contact, z)
+            term = contact_contribution(mesh, contact, z)
             slots = self.slots[term.unknowns]
             inside = slots >= 0
             rows = slots[inside]

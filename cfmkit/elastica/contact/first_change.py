@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.elastica.contact.changes import PieceOfPath, StepBetween
 from cfmkit.elastica.contact.path_items import ContactChange
 from cfmkit.elastica.contact.side_changes import locate_side_change
+from cfmkit.elastica.contact.step_between import StepBetween
 from cfmkit.elastica.model.contact import BeamOnObstacle
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.path import PathStop, WhyStopped
@@ -16,6 +16,7 @@ from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.contact.changes import PieceOfPath
     from cfmkit.elastica.model.contact import BeamSide
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 

@@ -311,10 +311,11 @@ def _enter(
         return _enter_friction(beyond, change, sense, number)
     near = beyond.shrink(change.at)
     at = beyond.own.solve(near.x, near.drive)
-    names = beyond.say(number)
     if at is None or not np.abs(at.rate).max(initial=0.0) < RIGID_RATE:
         if not begins:
-            return PathStop(WhyStopped.JUMPS, near.drive, STABILITY_LOSS_MESSAGE.format(names=names, what="ends"))
+            return PathStop(
+                WhyStopped.JUMPS, near.drive, STABILITY_LOSS_MESSAGE.format(names=beyond.say(number), what="ends")
+            )
         return PathStop(WhyStopped.BLOCKED, near.drive, BLOCKED_MESSAGE.format(names=beyond.say_all(number)))
     whole = beyond.grow(at)
     turned = bool(beyond.grows_along(whole, number) * sense < 0)

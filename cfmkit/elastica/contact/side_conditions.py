@@ -18,12 +18,14 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.contact.edges import find_mate, measure_distance
+from cfmkit.elastica.contact.line_tangent import line_leaves_normal, measure_compliances, measure_line_tangent
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
 from cfmkit.elastica.mechanics.contact_arrays import side_contacts
 from cfmkit.elastica.mechanics.element_tables import smooth_marks
+from cfmkit.elastica.mechanics.energy import line_load
 from cfmkit.elastica.mechanics.march import equations
-from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at
+from cfmkit.elastica.mechanics.moving_elements import PLACE_STEP, lengths_at, with_places
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.beam_fits import beam_end_at
@@ -202,7 +204,7 @@ class SideConditions:
         if condition.kind == "pulls":
             return self._pull(contact, z)
         if condition.kind == "tangent":
-            return self._run_away(contact, condition, z)
+            return self._run_away(contact, condition, z, stage)
         if condition.kind == "spreads":
             return self._least_curvature(contact, z)
         if condition.kind in ("closes", "pinch"):
@@ -238,7 +240,7 @@ class SideConditions:
         rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
         return np.asarray(bend * rises + edge.curvature * rises**2)
 
-    def _run_away(self, pad: ContactAt, condition: SideCondition, z: FloatArray) -> FloatArray:
+    def _run_away(self, pad: ContactAt, condition: SideCondition, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return how much the side of a beam runs away from the obstacle from a pad at its end."""
         mesh = self.mesh
         elements = [k for k, name in enumerate(mesh.elements.beam) if name == condition.item.beam]
@@ -252,7 +254,17 @@ class SideConditions:
             normal = away / np.hypot(*away.T)[:, None]
         else:
             normal = measure_distance(mesh, condition.item, place, z).normal
-        along = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
+        if line_leaves_normal(mesh.fits.network.beams[condition.item.beam].section):
+            inwards = -1.0 if condition.last else 1.0
+            force = z[:, mesh.elements.unknowns[element, -2:]] + inwards * 0.5 * z[:, [pad.unknown]] * normal
+            if not condition.last:
+                force = (
+                    force + (line_load(mesh, *stage) * with_places(mesh, z).elements.length[..., None])[..., element, :]
+                )
+            compliances = measure_compliances(mesh, condition.item.beam, float(side))
+            along = measure_line_tangent(angle, normal, force, *compliances).across
+        else:
+            along = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
         return np.asarray(-along if condition.last else along)
 
     def _least_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.edges import half_thickness_of, measure_distance
+from cfmkit.elastica.contact.line_tangent import find_reach, line_leaves_normal, round_off
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_arrays import edge_rows
 from cfmkit.elastica.mechanics.equations import LineTables, SideData
@@ -28,14 +29,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.elastica.model.contact import BeamSide
+    from cfmkit.elastica.model.section import Section
 
 N_ALONG = 33  # places of an element at which the gap of its side is measured
 NEAR_GAP = 1e-3  # share of a mean beam length within which the least gap is found exactly
 PARALLEL_GAP = 1e-9  # mean beam lengths by which the gap along a beam changes that is parallel to an obstacle
-N_ROUNDS, SLOPE_LEVEL = (
-    20,
-    1e-9,
-)  # of the search for the place of a least gap, and the slope there: its square is the error
+N_ROUNDS, SLOPE_LEVEL = 20, 1e-9  # of the search for a least gap, and the slope there: its square is the error
 GAP_RESOLUTION = 1e-13
 BESIDE_CONTACT = 1e-7  # mean beam lengths by which a side may lie in an obstacle beside a contact: rounding
 
@@ -48,6 +47,10 @@ class SideStates(NamedTuple):
     angle: Any  # of the tangent
     ahead: Any  # arc length to the end of the element
     parameter: Any
+    slope: Any  # (n, m, k, 2) of the middle line, by the unloaded arc length
+
+
+MeasuredGaps = tuple[Any, Any, SideStates]
 
 
 class LoadStage(NamedTuple):
@@ -94,6 +97,7 @@ def side_states(
         angle @ at.interpolation.T + turn,
         length[..., None] - speed @ at.integrals.T,
         cuts[..., :1] + (cuts[..., 1:] - cuts[..., :1]) * fractions,
+        np.einsum("kq,nmqd->nmkd", at.interpolation, slope / speed[..., None]),
     )
 
 
@@ -187,6 +191,11 @@ class SideGaps:
         """Elements of the beam, (m,)."""
         return np.array([number for number, name in enumerate(self.mesh.elements.beam) if name == self.item.beam])
 
+    @property
+    def section(self) -> Section:
+        """Section of the beam."""
+        return self.mesh.fits.network.beams[self.item.beam].section
+
     @cached_property
     def fractions(self) -> FloatArray:
         """Places of an element at which gaps are measured."""
@@ -200,34 +209,50 @@ class SideGaps:
 
     def half_thickness(self, parameter: Any, element: int) -> Any:
         """Return half the thickness at parameters of an element, in mean beam lengths."""
-        mesh, name = self.mesh, self.item.beam
-        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
-        section = mesh.fits.network.beams[name].section
+        fitted, inside = self.mesh.fits[self.item.beam], float(self.mesh.elements.cuts[element].mean())
         along = fitted.arc(np.clip(parameter, 0.0, 1.0)), float(np.real(fitted.arc(inside)))
-        return 0.5 * (np.real(section.thickness_at(*along)) + 0.0 * parameter) / mesh.scales.length
+        return 0.5 * (np.real(self.section.thickness_at(*along)) + 0.0 * parameter) / self.mesh.scales.length
 
     def _taper(self, parameter: Any, element: int) -> Any:
         """Return the slope of half the thickness along the unloaded beam."""
-        mesh, name = self.mesh, self.item.beam
-        fitted, inside = mesh.fits[name], float(mesh.elements.cuts[element].mean())
-        if not isinstance(mesh.fits.network.beams[name].section.thickness, Taper):
+        mesh = self.mesh
+        if not isinstance(self.section.thickness, Taper):
             return np.zeros(np.shape(parameter))
+        fitted, inside = mesh.fits[self.item.beam], float(mesh.elements.cuts[element].mean())
         sides = [self.half_thickness(parameter + step, element) for step in (PLACE_STEP, -PLACE_STEP)]
         return (sides[0] - sides[1]) / (2 * PLACE_STEP) / (fitted.speed(parameter, inside) / mesh.scales.length)
 
-    def measure(
-        self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray
-    ) -> tuple[Any, Any, SideStates]:
+    def measure(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
         """Return gaps and their slopes along the beam (by arc length) at places of elements, (n, m, k) each."""
+        gap, slope, seen = self._measure_line(z, stage, elements, fractions)
+        if self.section.shear:
+            kinks, ways = self.find_kinks(z, stage, elements), (seen.ahead[..., :1] - seen.ahead, seen.ahead)
+            gap, slope = round_off(gap, slope, *ways, kinks, find_reach(self.mesh, self.item, elements))
+        return gap, slope, seen
+
+    def _measure_line(self, z: FloatArray, stage: LoadStage, elements: Any, fractions: FloatArray) -> MeasuredGaps:
+        """Return the same with the kinks of beams that shear."""
         seen = side_states(self.mesh, z, stage, elements, fractions)
         value, normal = self.distance(seen.place, z, stage)
-        half = np.stack(
-            [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)], axis=1
-        )
-        slope = normal[..., 0] * np.cos(seen.angle) + normal[..., 1] * np.sin(seen.angle)
+        half = [self.half_thickness(seen.parameter[:, k], number) for k, number in enumerate(elements)]
+        if line_leaves_normal(self.section):
+            slope = (normal * seen.slope).sum(axis=-1)
+        else:
+            slope = normal[..., 0] * np.cos(seen.angle) + normal[..., 1] * np.sin(seen.angle)
         taper = [self._taper(seen.parameter[:, k], number) for k, number in enumerate(elements)]
-        slope = slope - np.stack(taper, axis=1)
-        return value - half, slope, seen
+        return value - np.stack(half, axis=1), slope - np.stack(taper, axis=1), seen
+
+    def find_kinks(self, z: FloatArray, stage: LoadStage, elements: Any) -> FloatArray:
+        """Return how steeply the gap falls from contacts at both ends of elements in n states, (n, m, 2)."""
+        numbers = np.asarray(elements)
+        sides = [
+            contact for contact in self.mesh.contacts if contact.slide >= 0 and contact.item.name == self.item.name
+        ]
+        pressed = [contact.element for contact in sides if contact.item.beam == self.item.beam]  # type: ignore[union-attr]
+        gap, slope, _ = self._measure_line(z, stage, numbers, np.array([0.0, 1.0]))
+        at_pad = np.isin(numbers, self.touched)[:, None] & (np.abs(gap) < BESIDE_CONTACT)
+        ends = np.stack([np.isin(numbers - 1, pressed), np.isin(numbers, pressed)], axis=1) | at_pad
+        return np.where(ends, np.maximum(slope * (-1.0, 1.0), 0.0), 0.0)
 
     def distance(self, places: Any, z: FloatArray, stage: LoadStage) -> tuple[Any, Any]:
         """Return the distances of places (n, ..., 2) from what may be touched in n states, and their gradients."""
@@ -236,9 +261,10 @@ class SideGaps:
     def is_parallel(self, z: FloatArray, stage: LoadStage) -> bool:
         """Return True if the whole side is parallel to the obstacle in one state (size,): no place touches first."""
         result = self._search(z[None], stage)
-        if result is not None:
-            return bool(result[0, 4] < PARALLEL_GAP)
-        return bool(np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) < PARALLEL_GAP)
+        spread = (
+            np.ptp(self.measure(z[None], stage, self.elements, self.fractions)[0]) if result is None else result[0, 4]
+        )
+        return bool(spread < PARALLEL_GAP)
 
     def least(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray:
         """Return the least gap in each of n states, plus what it may be negative by rounding beside contacts, (n,).
@@ -263,16 +289,13 @@ class SideGaps:
         gap, rows, seen = self._dips(z[None], stage)
         slack = self.slack[:, None]
         row, place = np.unravel_index(int((gap[0] + slack).argmin()), gap[0].shape)
-        best, least = (
-            float((gap[0] + slack).min()),
-            LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place])),
-        )
+        best = float((gap[0] + slack).min())
+        least = LeastGap(float(gap[0, row, place]), float(seen.parameter[0, row, place]))
         for number, value, fraction in zip(rows.row, *self._refine(z[None], stage, rows), strict=True):
             if value + self.slack[number] <= best:
-                indices = self._measure_at(
-                    self._take_element(z[None], stage, int(self.elements[number])), np.array([fraction])
-                )
-                best, least = value + float(self.slack[number]), LeastGap(value, float(indices.parameter[0]))
+                states = self._take_element(z[None], stage, int(self.elements[number]))
+                parameter = float(self._measure_at(states, np.array([fraction])).parameter[0])
+                best, least = value + float(self.slack[number]), LeastGap(value, parameter)
         return least
 
     def _search(self, z: FloatArray, stage: LoadStage, watch: bool = False) -> FloatArray | None:
@@ -282,7 +305,7 @@ class SideGaps:
 
     @cached_property
     def packed(self) -> SideData | None:
-        """The side as compiled code takes it; None if the thickness varies."""
+        """The side as compiled code takes it; None if the thickness varies, or it shears."""
         mesh, item = self.mesh, self.item
         beams, edge, counts, circle = [item.beam], np.empty((0, 6)), (0, 0, 0), (-1, 0.0)
         if isinstance(item, BeamOnObstacle):
@@ -293,7 +316,8 @@ class SideGaps:
             circle = -1, half_thickness_of(mesh, item.partner)
         else:
             circle = mesh.nodes[item.node], item.radius / mesh.scales.length
-        if any(isinstance(mesh.fits.network.beams[beam].section.thickness, Taper) for beam in beams):
+        sections = [mesh.fits.network.beams[beam].section for beam in beams]
+        if any(section.shear or isinstance(section.thickness, Taper) for section in sections):
             return None
         half, own, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
         elements = np.zeros((own + len(partner), 2))
@@ -315,12 +339,10 @@ class SideGaps:
         dips = (low < 0) & (high > 0)
         share = np.where(dips, (gap[..., 1:] - high - gap[..., :-1]) / np.where(dips, low - high, 1.0), 0.0)
         bound = gap[..., :-1] + share * low  # where the tangents at both places meet
-        allowed = gap + self.slack[:, None]
-        lower = (
-            bound + self.slack[:, None] < np.minimum(allowed.min(axis=(1, 2)), NEAR_GAP)[:, None, None] - GAP_RESOLUTION
-        )
-        dips_near = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
-        state, row, place = dips_near
+        slack = self.slack[:, None]
+        least = np.minimum((gap + slack).min(axis=(1, 2)), NEAR_GAP)[:, None, None]
+        lower = bound + slack < least - GAP_RESOLUTION
+        state, row, place = np.nonzero(dips & lower)  # else the least of the gaps that are known is the least
         return gap, _Dips(state, row, place, slope[state, row, place], slope[state, row, place + 1]), seen
 
     def _refine(self, z: FloatArray, stage: LoadStage, dips: _Dips) -> tuple[FloatArray, FloatArray]:
@@ -351,17 +373,14 @@ class SideGaps:
         fields = energy.fields(moved, z, *stage)
         speed = np.broadcast_to(e.weight, (count, *e.weight.shape[-2:]))[:, element] / basis(self.mesh.degree).weights
         cuts = e.cuts if e.moved_cuts is None else e.moved_cuts
+        kinks = self.find_kinks(z, stage, np.array([element]))[:, 0] if self.section.shear else None
         return _ElementStates(
-            element,
-            z,
-            stage,
-            poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
-            fields.slope_x[:, element] * speed,
-            fields.slope_y[:, element] * speed,
+            element, z, stage, poses(self.mesh.attachments, z, [int(e.ends[element, 0])]).place[:, 0],
+            fields.slope_x[:, element] * speed, fields.slope_y[:, element] * speed,
             z[:, e.unknowns[element]][:, energy.rotation_columns(self.mesh.degree)],
             np.broadcast_to(e.angle, (count, *e.angle.shape[-2:]))[:, element],
-            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element],
-        )
+            np.broadcast_to(cuts, (count, *cuts.shape[-2:]))[:, element], speed, kinks,
+        )  # fmt: skip
 
     def _measure_at(self, states: _ElementStates, fraction: FloatArray) -> _Beside:
         """Return gap, slope and parameter at one place of an element in each of n states."""
@@ -371,9 +390,18 @@ class SideGaps:
         angle = (states.angle * through).sum(axis=1) + (states.rotation * values).sum(axis=1)
         parameter = states.cuts[:, 0] + (states.cuts[:, 1] - states.cuts[:, 0]) * fraction
         value, normal = self.distance(np.stack([x, y], axis=-1), states.z, states.stage)
-        slope = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
+        gap = value - self.half_thickness(parameter, states.element)
+        if line_leaves_normal(self.section):
+            along = ((states.x * normal[:, :1] + states.y * normal[:, 1:]) * through).sum(axis=1)
+            slope = along / (states.speed * through).sum(axis=1)
+        else:
+            slope = normal[:, 0] * np.cos(angle) + normal[:, 1] * np.sin(angle)
         slope = slope - self._taper(parameter, states.element)
-        return _Beside(value - self.half_thickness(parameter, states.element), slope, parameter)
+        if states.kinks is not None:
+            behind, length = (states.speed * upto).sum(axis=1), states.speed @ basis(self.mesh.degree).weights
+            reach = find_reach(self.mesh, self.item, [states.element])[0, 0]
+            gap, slope = round_off(gap, slope, behind, length - behind, states.kinks, reach)
+        return _Beside(gap, slope, parameter)
 
 
 class _ElementStates(NamedTuple):
@@ -388,6 +416,8 @@ class _ElementStates(NamedTuple):
     rotation: FloatArray  # (n, degree + 1)
     angle: FloatArray  # (n, q) unloaded
     cuts: FloatArray  # (n, 2)
+    speed: FloatArray  # (n, q) arc length by the place along the element
+    kinks: FloatArray | None  # (n, 2) of beams that shear
 
 
 class _Dips(NamedTuple):

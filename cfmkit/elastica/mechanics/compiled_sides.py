@@ -34,6 +34,7 @@ def are_sides_compiled(mesh: Discretisation) -> bool:
         and kinds <= {Stop, NodeOnObstacle, BeamOnObstacle, NodeOnBeam, BeamOnBeam}
         and all(contact.rub < 0 and not contact.laid for contact in mesh.contacts)
         and all(is_plain(mesh.fits.network.beams[beam]) for beam in beams)
+        and not any(mesh.fits.network.beams[beam].section.shear for beam in beams)
     )
 
 

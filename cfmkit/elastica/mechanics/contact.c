@@ -1,7 +1,7 @@
 /* Contacts of nodes as terms: stops that limit a motion or a rotation, round pads on obstacles; without friction.
  *
- * The formulas are those of `press` and `measure` in contact/terms.py and of `ObstacleEdge.distance`, which a test holds
- * equal to these. */
+ * The formulas are those of `contact_contribution` and `measure` in contact/terms.py and of `ObstacleEdge.distance`, which a
+ * test holds equal to these. */
 #include <math.h>
 #include <string.h>
 

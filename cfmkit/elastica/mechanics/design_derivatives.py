@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.contact_unknowns import ContactAt
 from cfmkit.elastica.mechanics.designs import design_of
@@ -206,7 +206,7 @@ def _term(acting: Acting, z: Any, drive: float) -> Contribution:
     """Return the term of a spring, a load or a contact in one state."""
     network, attached = acting
     if isinstance(attached, ContactAt):
-        return press(network, attached, z)
+        return contact_contribution(network, attached, z)
     return ENERGY_TERMS[type(attached.item)](network, attached, z, 1.0, drive)
 
 

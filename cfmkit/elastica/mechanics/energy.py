@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.contact.terms import press
+from cfmkit.elastica.contact.terms import contact_contribution
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import ENERGY_TERMS
@@ -155,7 +155,7 @@ def _contributions(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
     for attached in (*mesh.springs, *mesh.loads):
         yield ENERGY_TERMS[type(attached.item)](mesh, attached, z, share, drive)
     for contact in mesh.contacts:
-        yield press(mesh, contact, z)
+        yield contact_contribution(mesh, contact, z)
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
@@ -189,8 +189,8 @@ def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
     reach = stack([(e.weight * at.slope_x).sum(axis=-1), (e.weight * at.slope_y).sum(axis=-1)])
     count = e.unknowns.shape[1]
     yield tuple(rotation_columns(mesh.degree).tolist()), turned
-    yield (0, 1, 2), -start.works(first)
-    yield (4, 5, 6), end.works(last)
+    yield (0, 1, 2), -start.generalised_forces(first)
+    yield (4, 5, 6), end.generalised_forces(last)
     yield (count - 2, count - 1), end.place - start.place - reach - (1.0 - share) * e.gap
 
 
@@ -238,7 +238,9 @@ def strain_energy(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) ->
     strain = e.axial * at.normal**2 + e.shear * at.shear**2
     beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
     springs = (ENERGY_TERMS[type(spring.item)](mesh, spring, z, share, drive).energy for spring in mesh.springs)
-    return beams.sum() / 2 + sum(springs) + sum(press(mesh, contact, z).energy for contact in mesh.contacts)
+    return (
+        beams.sum() / 2 + sum(springs) + sum(contact_contribution(mesh, contact, z).energy for contact in mesh.contacts)
+    )
 
 
 def count_unstable(mesh: Discretisation, tangent: Any) -> int:

@@ -36,7 +36,7 @@ from cfmkit.elastica.mechanics.equations import (
     SolvedStates,
     begin,
 )
-from cfmkit.elastica.mechanics.moving_elements import with_own_tables
+from cfmkit.elastica.mechanics.moving_elements import copy_moved_tables
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
@@ -73,7 +73,7 @@ def equations(mesh: Discretisation, ramp: bool = False) -> NumpyEquations:
         kinds = {type(attached.item) for attached in (*mesh.springs, *mesh.loads)}
         plain = kinds <= set(COMPILED_TERMS) and mesh.degree <= MAX_DEGREE
         if mesh.moving is not None and plain and key[2] and are_sides_compiled(mesh):
-            mesh.known[key] = CompiledSides(with_own_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
+            mesh.known[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
             mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif plain and key[2] and are_compiled(mesh):

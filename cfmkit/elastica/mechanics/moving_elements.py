@@ -72,8 +72,8 @@ def lengths_at(mesh: Discretisation, z: Any, number: int) -> Any:
     return (high - low) * fitted.length / mesh.scales.length
 
 
-def with_own_tables(mesh: Discretisation) -> Discretisation:
-    """Return the arrays with tables of the elements of their own, of several states those of the first."""
+def copy_moved_tables(mesh: Discretisation) -> Discretisation:
+    """Return the arrays with copies of the tables that moving contacts change; of several states those of the first."""
     e = mesh.elements
     names = [name for name in (*MOVED_TABLES, "length") if getattr(e, name) is not None]
     if e.weight.ndim > 2:

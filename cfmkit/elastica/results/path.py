@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
-from cfmkit.elastica.contact.terms import gaps, press
+from cfmkit.elastica.contact.terms import contact_contribution, gaps
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -450,7 +450,7 @@ def strain_energy(at: Equilibria) -> Any:
         )
     for contact in at.mesh.contacts:
         if contact.slide < 0:
-            total = total + np.array([press(at.mesh, contact, z).energy for z in at.z])
+            total = total + np.array([contact_contribution(at.mesh, contact, z).energy for z in at.z])
     return total
 
 

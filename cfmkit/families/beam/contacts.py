@@ -197,10 +197,8 @@ def _columns(solution: Solution) -> dict[str, Column]:
 
 def _mark(path: Path, event: ContactEvent) -> str:
     contact = path.network.contacts[event.number]
-    if isinstance(contact, NodeOnBeam | BeamOnBeam):
-        return f"{toucher(contact)} {counterpart(contact)} {event.kind}"
-    name = contact.name if isinstance(contact, Stop) else f"{contact.name} {toucher(contact)}"
-    return f"{name} {event.kind}"
+    names_both = isinstance(contact, Stop | BeamOnBeam) or contact.name == f"{toucher(contact)}_{counterpart(contact)}"
+    return f"{contact.name if names_both else f'{contact.name} {toucher(contact)}'} {event.kind}"
 
 
 # -- scalar results ----------------------------------------------------------------------------------------------------

@@ -210,7 +210,7 @@ def _swept(assembly: Assembly, places: Sequence[HeldPlace]) -> Any:
     half = 0.5 * max(float(one.thickness.max()) for one in rest)
     lines = with_image(assembly, [PosedBody.line("beam", "free", one.points, half) for one in rest])
     poses = bodies(solution, choose_points(solution, N_SWEPT), places)
-    moving = (body if body.closed else replace(body, half=half) for body in poses if body.role != "held")
+    moving = (body if body.closed else replace(body, half_thickness=half) for body in poses if body.role != "held")
     return swept([*lines, *moving])
 
 

@@ -4,8 +4,9 @@ Mechanisms that differ in what moves neither the roller nor the brace on the cam
 of the contact) share one cam and its track, which is found once. Others have a cam each, or a track of their own on it,
 and these stand side by side. Each cam is put together as that of a run is.
 
-What no rows have is analysed alone: motions, measured cams, drawn ones, envelopes, forces that follow a curve, whatever
-does not reach the end of the travel, and what cannot be built.
+What no rows have is analysed alone: motions, measured cams, drawn ones, envelopes, cams cut for a curve that no target
+names, whatever does not reach the end of the travel, and what cannot be built. Cams that are cut for a curve and for
+friction or weights of their own each take a solution of their own.
 """
 
 from __future__ import annotations
@@ -90,9 +91,9 @@ def solve_rows(variants: Variants) -> Iterator[Group]:
 
 def _is_left_out(spec: CamSpec) -> bool:
     mechanism, analysis = spec.mechanism, spec.analysis
-    curves = spec.target_curve is not None or mechanism.profile.curve is not None
+    unnamed_curve = mechanism.profile.curve is not None and spec.target_curve is None  # it grows with the springs
     other = mechanism.profile.file is not None or mechanism.left is not None or mechanism.envelope is not None
-    return spec.fidelity != "quasi-static" or analysis.manufacturing is not None or curves or other
+    return spec.fidelity != "quasi-static" or analysis.manufacturing is not None or unnamed_curve or other
 
 
 def _plain_numbers(spec: CamSpec) -> set[str]:
@@ -152,7 +153,8 @@ def _kind(spec: CamSpec) -> str:
     """Return what mechanisms side by side have in common beside the way that their computation takes."""
     analysis = spec.analysis
     settings = analysis.points, analysis.window, analysis.origin
-    return repr((settings, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
+    curves = spec.mechanism.profile.curve, spec.target_curve
+    return repr((settings, curves, [drop_numbers(block) for block in (spec.mechanism, analysis, spec.design)]))
 
 
 def _in_parcels(members: Rows, spec_of: Callable[[Rows], CamSpec]) -> Iterator[Group]:

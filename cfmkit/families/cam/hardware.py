@@ -15,7 +15,6 @@ import numpy as np
 
 from cfmkit.export.contours import OUTLINE_TOLERANCE, Arc
 from cfmkit.export.posed_part import PosedBody
-from cfmkit.families.cam.bought_parts import springs_in_words
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.part_sizes import (
     BRACE_WIDTH,
@@ -27,7 +26,7 @@ from cfmkit.families.cam.part_sizes import (
     stack_height,
 )
 from cfmkit.families.findings import mm as length_in_words
-from cfmkit.families.findings import newton
+from cfmkit.families.findings import newton, rate
 from cfmkit.families.hardware import (
     LEAST_WALL,
     Hardware,
@@ -47,13 +46,14 @@ from cfmkit.families.hardware import (
 )
 from cfmkit.stock.joint_strength import pin_that_bears
 from cfmkit.stock.parts_list import ListedPart
-from cfmkit.stock.stock_series import BALL_BEARINGS, bearings_of, screw_through
+from cfmkit.stock.stock_series import BALL_BEARINGS, bearings_of, hole_with_fit, screw_through
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Solution
+    from cfmkit.families.cam.spec import Mechanism
     from cfmkit.stock.stock_series import Bearing, Screw
 
 BEARING_IN_ROLLER = 0.9
@@ -192,6 +192,17 @@ def _shaft(
     return (fitting[0].bore, fitting[0]) if fitting else (least, None)
 
 
+def _springs_in_words(mechanism: Mechanism) -> str:
+    """Return what the springs between the rollers must be."""
+    springs = mechanism.springs
+    rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
+    limit = f", up to {length_in_words(springs.max_elongation)}" if springs.max_elongation else ""
+    opens = f", initial tension {newton(springs.initial_tension)}" if springs.initial_tension else ""
+    tight = f", stretched by {length_in_words(mechanism.preload)} at the start" if mechanism.preload else ""
+    reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
+    return f"extension spring, {reported}{opens}{limit}{tight}"
+
+
 def _parts(
     solution: Solution,
     strength: PartStrength,
@@ -207,13 +218,16 @@ def _parts(
     of = strength.name + (", assumed" if strength.assumed else "")
     radius = mechanism.roller_radius
     yield ListedPart("cam", "cam plate", 1, f"{of}; geometry/cam.dxf", "make", mm(x1 - x0, y1 - y0, thick), "", "plate")
-    data = f"{of}; {mm(mechanism.brace_length)} between holes of {mm(pin)} and {mm(shaft)}, bears {newton(pull)}"
+    ends = " and ".join(hole_with_fit(diameter, 8) for diameter in (pin, shaft))
+    data = f"{of}; {mm(mechanism.brace_length)} between holes of {ends}, bears {newton(pull)}"
     length = mechanism.brace_length + width
     yield ListedPart("roller to slider", "brace", 2, data, "make", mm(length, width, brace), "", "brace")
     size = f"diameter {mm(2.0 * radius)}, {mm(thick)} wide"
-    yield ListedPart("on the cam", "roller", 2, f"presses with {newton(press)}", "make", size, "", "roller")
+    seat = hole_with_fit(shaft, 8) if bearing is None else f"{hole_with_fit(bearing.outer, 7)} for its bearing"
+    data = f"with a hole of {seat}, presses with {newton(press)}"
+    yield ListedPart("on the cam", "roller", 2, data, "make", size, "", "roller")
     size = mm(2.0 * radius, 2.0 * radius, thick)
-    yield ListedPart("on its guide", "slider", 1, f"with a hole of {mm(pin)}", "make", size, "", "slider")
+    yield ListedPart("on its guide", "slider", 1, f"with a hole of {hole_with_fit(pin, 8)}", "make", size, "", "slider")
     yield pin_part("slider pin", 1, pin, thick + 2.0 * brace, 2.0 * pull, "slider pin")
     long = thick + 2.0 * brace + min(count_of(mechanism.springs), 2) * coil
     yield pin_part("shafts of the rollers", 2, shaft, long, press, "shaft")
@@ -233,7 +247,7 @@ def _parts(
     springs = mechanism.springs
     wound = springs.wound
     size = f"wire {mm(wound.wire)}, coil {mm(wound.coil)}, {wound.turns:g} turns" if wound else ""
-    data, number = springs_in_words(mechanism), count_of(springs)
+    data, number = _springs_in_words(mechanism), count_of(springs)
     yield ListedPart("between the rollers", springs.name or "", number, data, "buy", size, "", "spring")
 
 

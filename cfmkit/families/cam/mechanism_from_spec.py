@@ -89,7 +89,7 @@ def slope_law(spec: CamSpec) -> SlopeLaw:
     plain = SlopeLaw(profile.force_constant, x0, brace, profile.friction, profile.slope_factor, springs)
     if profile.curve is None:
         return plain
-    return with_curve(plain, profile.curve.shape, float(profile.stroke or 0.0))
+    return with_curve(plain, profile.curve.shape, profile.stroke)
 
 
 def hanging_weights(masses: Masses | None) -> tuple[float, float]:
@@ -173,7 +173,7 @@ def assemble(spec: CamSpec) -> Assembly:
     assert stroke is not None  # of a resolved spec
     assert radius is not None
     lengths = stroke, radius, offset, mechanism.roller_radius, mechanism.brace_length, *law.numbers
-    if type(law) is not SlopeLaw or agree(law.friction != 0.0) or method == "ode":
+    if agree(law.friction != 0.0) or method == "ode":
         refuse_columns(*lengths)  # the height of such a path is no formula
     missing = np.maximum(-offset, 0.0)
     check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))

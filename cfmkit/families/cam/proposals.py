@@ -224,7 +224,7 @@ def with_wire(spec: CamSpec, request: Request) -> CamSpec:
     return spec.replace({"mechanism.springs": {**stated, **as_stated(coil)}})
 
 
-def with_plate(spec: CamSpec, request: Request) -> CamSpec:
+def widen_plate(spec: CamSpec, request: Request) -> CamSpec:
     """Return a designed cam whose plate bears its rollers: the pressure goes with the root of force over thickness."""
     from cfmkit.families.cam.model import analyze
     from cfmkit.families.run_control import Run
@@ -249,7 +249,7 @@ def _from_catalogue(made: Candidate, request: Request) -> Candidate:
         made,
         variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant),
         spec=spec,
-        finish=f"{__name__}:with_plate",
+        finish=f"{__name__}:widen_plate",
         springs="catalogue",
     )
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
-from cfmkit.families.cam.assembly import TRAVEL_RTOL, constant_force
+from cfmkit.families.cam.assembly import TRAVEL_RTOL, target_force
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 from cfmkit.families.cam.geometry.path import RollerPath
@@ -291,21 +291,21 @@ class Solution(ShortRepr):
         motion, dense = (self._of_each(places) for places in (self.travel + self.origin, self.places))
         corner, first = self.column(self.corner_travel), self.column(self.travel[..., :1])
         valid = np.maximum(corner, first) + self.column(self.origin), motion[:, -1]
-        design = self.assembly.spec.design  # forces that follow a curve are no rows
-        target = constant_force(self.assembly) if design is None else design.force
+        target = target_force(self.assembly.spec, self.assembly)
         return {
             name: CurveRows(
                 RowSamples(motion, self._of_each(state.slider), np.full(self.count, motion.shape[1])),
                 dense,
                 partial(self._effort_in_rows, name),
                 self.column(self.effort_error),
-                self.column(target),
+                np.full(self.count, np.nan) if target is None else self.column(target),
                 self.column(self.assembly.spec.analysis.band),
                 valid,
                 partial(self._part_efforts_in_rows, name),
                 self._stress_rows(name, state),
                 peaks=self._of_each(self.peaks),
                 travel=(motion[:, 0], self.column(self.requested) + self.column(self.origin)),
+                followed=self.assembly.spec.target_curve,
             )
             for name, state in (("load", self.up), ("unload", self.down))
         }

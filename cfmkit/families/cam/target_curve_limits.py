@@ -7,7 +7,7 @@ law for it, comes out. A curve that no cam can follow raises an error with the r
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.findings import format_at_most, mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible
+from cfmkit.families.rows import fails, refuse_columns
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
@@ -84,7 +85,7 @@ def target_shape(design: CamDesign, slider_weight: float) -> ThroughPoints | Non
     return replace(wanted, values=tuple((value - slider_weight) / most for value in wanted.values))
 
 
-def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: float) -> CurveSlopeLaw:
+def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: Any) -> CurveSlopeLaw:
     """Return the law for a force that follows a curve of shares over travel [m], up to a stroke [m].
 
     Raises
@@ -92,7 +93,7 @@ def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: float) -> CurveSlope
     CannotBuild
         If there is no such path: the finding says why.
     """
-    if stroke > shape.places[-1] * (1 + 1e-6):
+    if fails(stroke > shape.places[-1] * (1 + 1e-6)):
         raise CannotBuild(
             finding(
                 "target_curve",
@@ -100,9 +101,10 @@ def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: float) -> CurveSlope
                 "points, or a shorter stroke ('curve' and 'stroke' of 'mechanism.profile')",
             )
         )
+    refuse_columns(law.friction, law.slope_factor)  # such a path is integrated, or has a guide of its own
     curved = CurveSlopeLaw(**vars_of(law), shape=shape)
     least = min(shape.values) - curved.carried
-    if shape.values[0] == 0.0 and law.preload:
+    if shape.values[0] == 0.0 and fails(np.not_equal(law.preload, 0.0)):
         raise CannotBuild(
             finding(
                 "target_curve",
@@ -129,7 +131,7 @@ def vars_of(law: SlopeLaw) -> dict[str, float]:
 def check_bends(law: CurveSlopeLaw, profile: CamProfile) -> None:
     """Raise where a force that falls quickly bends the path more tightly than the roller, beyond the start."""
     place, radius = law.tightest(profile.end, profile.start)
-    if radius < profile.roller_radius * (1 - 1e-9) and place > profile.start:
+    if fails(np.logical_and(radius < profile.roller_radius * (1 - 1e-9), place > profile.start)):
         at = float(law.travel(place))
         raise CannotBuild(
             finding(

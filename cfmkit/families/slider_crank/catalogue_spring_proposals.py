@@ -1,6 +1,7 @@
-"""Linkages with springs of the generic series at their pins, for a force: the family's own design chooses them.
+"""Proposals of slider-cranks for a constant force with catalogue torsion springs at their pins.
 
-Only springs that fit beside the links are its catalogue; links that bear them are added as for custom springs.
+The family's own design chooses the springs from those of the generic series that fit beside the links; then links
+that bear the loads are added, as for custom springs.
 """
 
 from __future__ import annotations

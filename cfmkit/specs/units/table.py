@@ -176,16 +176,6 @@ def border_unit(dimension: str) -> str:
     return dimension_of(dimension).unit
 
 
-def border_factor(dimension: str) -> float:
-    """Return how many border units one SI unit is: 1000.0 for a length.
-
-    To convert, prefer `to_border`, which is exact to the last digit also where
-    this factor is not (0.001 for N/m to N/mm).
-    """
-    item = dimension_of(dimension)
-    return item.up / item.down
-
-
 def to_border(values: Any, dimension: str) -> Any:
     """Return SI values (a number or an array) in the border unit of `dimension`."""
     item = dimension_of(dimension)

@@ -23,7 +23,7 @@ from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.stock.processes import PROCESSES_BY_NAME
+from cfmkit.studies.suggest.material_and_fastening_of_proposal import add_process_and_materials, add_screws
 from cfmkit.studies.suggest.misses_in_words import (
     disqualifying,
     largest_force,
@@ -351,7 +351,8 @@ def judge_proposal(
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file
-    plain = spec_of(name, dump(add_process_and_materials(spec, request).replace({"design": None, "name": called})))
+    spec = add_process_and_materials(spec, request) if near is None else add_screws(record, spec)
+    plain = spec_of(name, dump(spec.replace({"design": None, "name": called})))
     begun = time.perf_counter()
     result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, request)}))), Run())
     seconds = time.perf_counter() - begun
@@ -407,35 +408,6 @@ def judge_proposal(
 def model_of(name: str, spec: Spec) -> str:
     """Return the model that a specification picks, or else the only one of its family."""
     return spec.fidelity or next(iter(family(name).models))
-
-
-def add_process_and_materials(spec: Spec, request: Request) -> Spec:
-    """Return a specification whose material is as stated, and whose part says by which process it is made if one is.
-
-    Its inside corners are as round as before, or as round as the process makes them: a smaller radius has more stress.
-    """
-    mechanism = spec.get_value("mechanism")
-    owners = {"mechanism": mechanism, "mechanism.contact": getattr(mechanism, "contact", None)}
-    for path, owner in owners.items():
-        if (material := getattr(owner, "material", None)) is not None:
-            block = material.model_dump(exclude_unset=True)
-            if (stated := request.stated_material(block)) != block:
-                spec = spec.replace({f"{path}.material": dict(stated)})
-    if request.process is None:
-        return spec
-    radius = PROCESSES_BY_NAME[request.process].least_radius
-    fillet = getattr(spec.get_value("mechanism"), "fillet", 0.0)
-    changes: tuple[dict[str, Any], ...] = (
-        {"mechanism.part.process": request.process, "mechanism.part.fillet": max(radius, fillet)},
-        {"mechanism.part.process": request.process},
-        {"mechanism.plate.process": request.process},
-    )
-    for one in changes:
-        try:
-            return spec.replace(one)
-        except CfmError:  # another kind of part
-            continue
-    return spec
 
 
 def numbers_of(result: Result, space: BoundingBox | None, request: Request) -> dict[str, float | None]:

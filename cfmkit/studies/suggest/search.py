@@ -237,7 +237,8 @@ class _Making:
                     notes.add(keys[index], proposal.as_record())
             self._tried += jobs[index].near is None
             made = (self._tried + self.reused) / max(self._total, 1)
-            run.progress(min(0.99, made), f"{sum(proposal.good for proposal in self.done)} proposals")
+            count = sum(proposal.good for proposal in self.done)
+            run.progress(min(0.99, made), f"{count} proposal{'s' * (count != 1)}")
         for index in sorted(self._known):
             self._take(jobs[index], self._known[index])
         complete = len(self._known) == len(jobs)

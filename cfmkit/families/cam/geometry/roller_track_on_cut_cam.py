@@ -379,9 +379,12 @@ def _join_states(on_corner: NDArray[np.bool_], corner: TrackStates, flank: Track
     """Return states of which some are on the corner; those on the flank are given where the others are not, or all."""
     found = []
     for some, rest in zip(corner.fields(), flank.fields(), strict=True):
-        joined = np.empty(on_corner.shape, dtype=some.dtype)
+        if rest.ndim > 1:
+            joined = np.array(np.broadcast_to(rest, on_corner.shape), dtype=some.dtype)
+        else:
+            joined = np.empty(on_corner.shape, dtype=some.dtype)
+            joined[~on_corner] = rest
         joined[on_corner] = some.ravel()
-        joined[~on_corner] = rest if rest.ndim == 1 else rest[~on_corner]
         found.append(joined)
     return TrackStates(*found)
 

@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw, brace_tangent, drop
-from cfmkit.numerics.roots import bracketed_root, invert_increasing
+from cfmkit.families.rows import agree
+from cfmkit.numerics.roots import FLOAT_EPS, bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -37,8 +38,8 @@ NEAR_START = 1e-7
 PATH_END_FACTOR = 1.05
 """Times the curve's end: so far a path that is cut for friction is integrated."""
 
-NEWTON_STEPS = 6
-"""On the first piece of the curve: its first guess is that of a straight line, which most curves begin with."""
+N_EVEN_PLACES = 2001
+"""Places of a path among which the tightest one is looked for, beside those next to the points of the curve."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class CurveSlopeLaw(SlopeLaw):
     @property
     def begins_at_zero(self) -> bool:
         """Whether there is no force at the start, and springs at rest: the slope is a limit there."""
-        return self.shape.values[0] == 0.0 and self.preload == 0.0
+        return self.shape.values[0] == 0.0 and agree(np.equal(self.preload, 0.0))
 
     @property
     def travel_end(self) -> float:
@@ -75,25 +76,37 @@ class CurveSlopeLaw(SlopeLaw):
 
     def undercuts(self, roller_radius: float) -> bool:
         """Return whether the path is curved more tightly at its start than a roller [m]; it may be hollow there."""
-        return 0.0 < self.curvature_radius(self.rest_half_width) < roller_radius
+        radius = self.curvature_radius(self.rest_half_width)
+        return agree(np.logical_and(radius > 0.0, radius < roller_radius))
 
     def travel(self, x: Any) -> Any:
         """Return the travel with the roller at x [m]."""
-        at = np.asarray(x, dtype=np.float64)
-        flat = np.atleast_1d(at).ravel()
-        found = self._evaluate_travel(flat) if self.friction else self._from_energy(flat)
-        return found.reshape(at.shape) if at.ndim else float(found[0])
+        values = np.asarray(x if self.friction else self._energy(x), dtype=np.float64)
+        flat = np.atleast_1d(values).ravel()
+        travel = self._evaluate_travel(flat) if self.friction else self._from_energy(flat)
+        return travel.reshape(values.shape) if values.ndim else float(travel[0])
 
     def _work(self, travel: Any) -> Any:
         """Return the integral of phi - gamma [m]."""
         return self.shape.integral(travel) - self.carried * travel
 
-    def _from_energy(self, x: FloatArray) -> FloatArray:
-        """Return the travel at which work and energy agree [m]."""
+    def _energy(self, x: Any) -> Any:
+        """Return the energy of the springs with the roller at x, less that of the weights, over 4 K A [m]."""
         out = x - self.rest_half_width
-        energy = out * (out + 2.0 * self.preload) / (2.0 * self.force_constant)
-        if self.carried:
-            energy = energy - self.carried * drop(x, self.rest_half_width, self.brace_length)
+        energy: Any = out * (out + 2.0 * self.preload) / (2.0 * self.force_constant)
+        return energy - self.carried * drop(x, self.rest_half_width, self.brace_length) if self.carried else energy
+
+    def _from_energy(self, energy: FloatArray) -> FloatArray:
+        """Return the travel at which work and energy agree [m]."""
+        travel = self.shape.invert_integral(energy, self.carried)
+        fine = 16.0 * FLOAT_EPS * float(np.abs(energy).max(initial=0.0))
+        rest = np.flatnonzero(~(np.abs(self._work(travel) - energy) <= fine))
+        if rest.size:
+            travel[rest] = self._invert_work(energy[rest])
+        return travel
+
+    def _invert_work(self, energy: FloatArray) -> FloatArray:
+        """Return the same from the whole curve: beyond its ends, too, and where a piece of it bends much [m]."""
         least = max(float(self.shape.evaluate(self.travel_end)) - self.carried, 1e-9)
         beyond = max(float(energy.max(initial=0.0)) - float(self._work(self.travel_end)), 0.0)
         far = self.travel_end + 1.01 * beyond / least
@@ -102,25 +115,7 @@ class CurveSlopeLaw(SlopeLaw):
             return self._work(travel), self.shape.evaluate(travel) - self.carried
 
         places = self._guide
-        guess = np.interp(energy, places[1], places[0])
-        return self._near_start(energy, invert_increasing(work, energy, (0.0, far), guess))
-
-    def _near_start(self, energy: FloatArray, found: FloatArray) -> FloatArray:
-        """Return travels that are exact in their own digits on the first piece, not in those of the largest only."""
-        piece = self.shape.places[1]
-        first = np.flatnonzero(energy < self._work(piece))
-        if not first.size:
-            return found
-        wanted, begin = np.maximum(energy[first], 0.0), float(self.shape.evaluate(0.0)) - self.carried
-        growth = float(self.shape.slope(0.0))
-        root = np.sqrt(np.maximum(begin * begin + 2.0 * growth * wanted, 0.0))
-        travel = np.minimum(2.0 * wanted / np.maximum(begin + root, 1e-300), piece)
-        for _ in range(NEWTON_STEPS):
-            rate = np.maximum(self.shape.evaluate(travel) - self.carried, 1e-300)
-            travel = np.clip(travel - (self._work(travel) - wanted) / rate, 0.0, piece)
-        better = np.abs(self._work(travel) - wanted) <= np.abs(self._work(found[first]) - wanted)
-        found[first] = np.where(better, travel, found[first])
-        return found
+        return invert_increasing(work, energy, (0.0, far), np.interp(energy, places[1], places[0]))
 
     @cached_property
     def _guide(self) -> tuple[FloatArray, FloatArray]:
@@ -181,56 +176,62 @@ class CurveSlopeLaw(SlopeLaw):
         travel = np.asarray(self.travel(at))
         return at, travel, self.shape.evaluate(travel)
 
-    def _evaluate_rates(self, x: Any) -> tuple[Any, Any]:
-        """Return dy/dx - tan a without friction, and phi's change along the path over phi - gamma."""
+    def _slope_and_rise(self, x: Any) -> tuple[Any, Any]:
+        """Return p(x), the slope before friction turns the contact normal, and dp/dx [1/m].
+
+        The latter is below zero where the force grows so quickly that the flank is hollow.
+        """
         at, travel, phi = self._regular(x)
-        tangent = brace_tangent(at, self.brace_length)
-        left = phi - self.carried
+        tangent, left = brace_tangent(at, self.brace_length), phi - self.carried
         rate = ((at - self.rest_half_width + self.preload) / self.force_constant + self.carried * tangent) / left
         along = self._rate(at, travel) if self.friction else rate
-        return rate, self.shape.slope(travel) * along / left
+        across = (self.brace_length - x) * (self.brace_length + x)
+        turn = self.brace_length**2 / (across * across**0.5)
+        bend = (1.0 / self.force_constant + self.carried * turn) / left - rate * self.shape.slope(travel) * along / left
+        return rate + brace_tangent(x, self.brace_length), bend + turn
 
     def frictionless(self, x: Real) -> Real:
         """Return p(x), the slope before the contact normal is turned by friction."""
-        slope: Any = self._evaluate_rates(x)[0] + brace_tangent(x, self.brace_length)
+        slope: Any = self._slope_and_rise(x)[0]
         return slope
 
     def slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return dy/dx and d2y/dx2 [1/m] of the path."""
-        return self.slope(x), self.slope_derivative(x)
+        p, rise = self._slope_and_rise(x)
+        turn = 1.0 - self.friction * p
+        return (p + self.friction) / turn, rise * (1.0 + self.friction**2) / (turn * turn)
 
-    def _rise(self, x: Real) -> Real:
-        """Return dp/dx [1/m]: below zero where the force grows so quickly that the flank is hollow."""
-        rate, change = self._evaluate_rates(x)
-        left = self._regular(x)[2] - self.carried
-        across = (self.brace_length - x) * (self.brace_length + x)
-        turn = self.brace_length**2 / (across * across**0.5)
-        rise: Any = (1.0 / self.force_constant + self.carried * turn) / left - rate * change + turn
-        return rise
+    def slope_derivative(self, x: Real) -> Real:
+        """Return d2y/dx2 of the path [1/m]."""
+        derivative: Any = self.slopes(np.asarray(x))[1]
+        return derivative
 
     def curvature_radius(self, x: Real) -> Real:
         """Return the radius of curvature of the path [m], negative where it is hollow: no roller undercuts there."""
-        p = self.frictionless(x)
+        p, rise = self._slope_and_rise(x)
         turn = (1.0 - self.friction * p) / (1.0 + self.friction**2) ** 0.5
-        bend = np.asarray(turn * self._rise(x))
+        bend = np.asarray(turn * rise)
         radius: Any = np.asarray(1.0 + p * p) ** 1.5 / np.where(bend == 0.0, 1e-300, bend)
-        own: Any = radius if np.ndim(x) else float(radius)
+        own: Any = radius if np.ndim(radius) else float(radius)
         return own
 
-    def tightest(self, end: float, start: float = 0.0) -> tuple[float, float]:
+    def tightest(self, end: Any, start: Any = 0.0) -> tuple[Any, Any]:
         """Return where the path is bent most of all convex places from `start` to `end` [m], and the radius there.
 
         That is infinite where none is convex.
         """
-        start = max(start, self.rest_half_width)
+        start = np.maximum(start, self.rest_half_width)
         knots = np.asarray(self.position(np.array(self.shape.places)))
-        eps = 1e-9 * (end - start)
-        x = np.concatenate([np.linspace(start, end, 2001), knots - eps, knots + eps])
-        x = np.unique(np.clip(x, start, end))
+        width = end - start
+        parts = [start + width * np.linspace(0.0, 1.0, N_EVEN_PLACES), knots - 1e-9 * width, knots + 1e-9 * width]
+        rows = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+        x = np.concatenate([np.broadcast_to(part, (*rows, part.shape[-1])) for part in parts], axis=-1)
+        x = np.sort(np.clip(x, start, end), axis=-1)
         radius = np.asarray(self.curvature_radius(x))
-        radius = np.where(radius > 0, radius, np.inf)
-        at = int(np.argmin(radius))
-        return float(x[at]), float(radius[at])
+        radius = np.broadcast_to(np.where(radius > 0, radius, np.inf), x.shape)
+        at = np.argmin(radius, axis=-1)[..., None]
+        place, least = (np.take_along_axis(item, at, axis=-1) for item in (x, radius))
+        return (place, least) if place.ndim > 1 else (place.item(), least.item())
 
     def smallest_force_constant(self, roller_radius: float) -> float | None:
         """Return the smallest A from which on the roller fits everywhere on the path; None if none is [m]."""
