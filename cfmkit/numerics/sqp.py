@@ -69,6 +69,9 @@ class Effort:
     # `_MIN_VIOLATION_FALL`: the constraints contradict each other there, and the steps are the rounding of a line
     # search
     patience: int | None = None
+    # end where a point without violation was seen, and so many evaluations in a row brought no better one: the line
+    # search is among rounding, or at a kink
+    idle: int | None = None
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,7 @@ class _Memory:
         self.slope: Any = None
         self.best: tuple[tuple[float, float], FloatArray, float, FloatArray] | None = None
         self.fell, self.since = np.inf, 0
+        self.improved = 0  # evaluations up to the last point that was better, or up to the first without violation
 
     def evaluate(self, z: FloatArray) -> Any:
         if self.point is None or not np.array_equal(z, self.point):
@@ -183,8 +187,12 @@ class _Memory:
         excess = _excess(constraints)
         self._wait(excess)
         rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
+        if self.best is None or rank < (0.0, self.best[0][1] - self.effort.tolerance) or self.best[0][0] > 0:
+            self.improved = self.evaluations
         if self.best is None or rank < self.best[0]:
             self.best = rank, z.copy(), objective, constraints
+        if self.effort.idle is not None and self.evaluations - self.improved >= self.effort.idle:
+            raise _Enough(SearchEnding.STUCK)
 
     def _wait(self, excess: float) -> None:
         patience = self.effort.patience

@@ -200,3 +200,13 @@ def test_a_search_with_patience_ends_where_the_constraints_cannot_be_met_and_onl
     else:
         assert found.ending is SearchEnding.STUCK
         assert len(hasty.asked) < 20 < 30 < len(patient.asked)
+
+
+def test_a_search_ends_where_no_point_is_better_for_long_and_only_there():
+    rises = Known(lambda z: 1.0 + 1e-9 * z.sum(), lambda z: -np.ones(2))
+    found = minimize(rises, np.array([3.0, 2.0]), FREE, Effort(idle=5))
+    assert (found.ending, found.evaluations) == (SearchEnding.STUCK, 6)
+    falls, usual = rosenbrock(), rosenbrock()
+    at = minimize(falls, np.array([-1.2, 1.0]), FREE, Effort(idle=20)).z
+    np.testing.assert_array_equal(at, minimize(usual, np.array([-1.2, 1.0]), FREE).z)
+    np.testing.assert_array_equal(falls.asked, usual.asked)

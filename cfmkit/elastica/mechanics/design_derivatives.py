@@ -36,6 +36,8 @@ from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, slopes_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
@@ -65,37 +67,37 @@ class Equilibria:
         return read_only(equations(self.mesh).gradients(self.z, self.drive))
 
 
-def partials(mesh: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
-    """Return the derivatives of the functional by the arrays of the elements, (p, ...) each.
+def partials(mesh: Discretisation, z: Any, drive: Any, names: Collection[str]) -> dict[str, Any]:
+    """Return the derivatives of the functional by some arrays, (p, ...) each.
 
     By name those of `Elements`, and `origin`, `arm` and `frame` of the attachments that elements end at.
     """
-    e, at = mesh.elements, energy.fields(mesh, z, drive)
-    load = energy.line_load(mesh, drive)
+    e, at, load = mesh.elements, energy.fields(mesh, z, drive), energy.line_load(mesh, drive)
     last = z[..., e.unknowns[:, -2:]]
     first = last + load * e.length[..., None]
-    w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
-    bent = bending(e, at.curvature)
-    density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
+    w, bent = e.weight, bending(e, at.curvature)
     start = poses(mesh.attachments, z, e.ends[:, 0])
-    found = {
-        "weight": density,
-        "rigidity": w * bent.energy / e.rigidity,
-        "rest": w * bent.by_rest,
-        "curl": w * bent.by_curl,
-        "hindrance": w * bent.by_hindrance,
-        "angle": -w * at.shear * f,
-        "axial": -w * at.normal**2 / 2,
-        "shear": -w * at.shear**2 / 2,
-        "ahead": -w * (at.slope_x * load[..., :1] + at.slope_y * load[..., 1:]),
-        "length": -(load * start.place).sum(axis=-1),
+
+    def by_line() -> Any:
+        reach = np.stack([(w * e.ahead * slope).sum(axis=-1) for slope in (at.slope_x, at.slope_y)], axis=-1)
+        constant, grows = -(start.place * e.length[:, None] + reach), np.asarray(drive)[..., None, None]
+        return np.stack([constant + 0 * grows, constant * grows], axis=-2)
+
+    by_elements: dict[str, Callable[[], Any]] = {
+        "weight": lambda: bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2,
+        "rigidity": lambda: w * bent.energy / e.rigidity,
+        "rest": lambda: w * bent.by_rest,
+        "curl": lambda: w * bent.by_curl,
+        "hindrance": lambda: w * bent.by_hindrance,
+        "angle": lambda: -w * at.turning,
+        "axial": lambda: -w * at.normal**2 / 2,
+        "shear": lambda: -w * at.shear**2 / 2,
+        "ahead": lambda: -w * (at.slope_x * load[..., :1] + at.slope_y * load[..., 1:]),
+        "length": lambda: -(load * start.place).sum(axis=-1),
+        "line": by_line,
     }
-    reach = np.stack([(w * e.ahead * slope).sum(axis=-1) for slope in (at.slope_x, at.slope_y)], axis=-1)
-    constant = -(start.place * e.length[:, None] + reach)
-    grows = np.asarray(drive)[..., None, None]
-    found["line"] = np.stack([constant + 0 * grows, constant * grows], axis=-2)
-    found["gap"] = np.zeros_like(last)
-    return found | _by_attachments(mesh, z, first, last)
+    by_places = _by_attachments(mesh, z, first, last) if {"origin", "arm", "frame"} & {*names} else {}
+    return {name: by_places[name] if name in by_places else by_elements[name]() for name in names}
 
 
 def _by_attachments(mesh: Discretisation, z: Any, first: Any, last: Any) -> dict[str, Any]:
@@ -149,22 +151,23 @@ def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | N
     """
     mesh, motions = at.mesh, effort_motions(at, rates)
     stepped = at.z + 1j * COMPLEX_STEP * motions
-    total = _contract(partials(mesh, stepped, at.drive), designs)
+    idle = {"gap"} if mesh.elements.line.any() else {"gap", "ahead", "length"}  # the effort does not depend on these
+    changes = {
+        name: table
+        for name, table in (designs.tables | designs.places).items()
+        if np.iscomplexobj(table) and name not in idle
+    }
+    by_table = partials(mesh, stepped, at.drive, changes)
+    total = np.zeros((len(at.z), designs.count))
+    for name, table in changes.items():
+        slopes = np.imag(by_table[name]).reshape(len(at.z), -1) / COMPLEX_STEP
+        total += slopes @ (table.imag.reshape(designs.count, -1) / COMPLEX_STEP).T
     for k, pair in enumerate(_changed_terms(designs)):
         for own in pair:
             total[:, k] += _term_slopes(own, at, motions)
     if designs.base is not None:
         total += _held_forces(at, motions) @ (np.imag(designs.base) / COMPLEX_STEP).T
     return np.asarray(total * mesh.scales.moment / mesh.scales.drive)
-
-
-def _contract(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
-    total = 0.0
-    for name, table in (designs.tables | designs.places).items():
-        if np.iscomplexobj(table):
-            change = table.imag.reshape(designs.count, -1) / COMPLEX_STEP
-            total = total + known[name].imag.reshape(len(known[name]), -1) / COMPLEX_STEP @ change.T
-    return np.asarray(total + np.zeros((len(known["length"]), designs.count)))
 
 
 def _changed_terms(designs: NetworkDesigns) -> list[list[Acting]]:

@@ -171,6 +171,10 @@ def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], places: F
     """Return beams at fractions of elements before any load."""
     rule, e = basis(mesh.degree), mesh.elements
     through = _matrices(mesh.degree, tuple(places.tolist())).interpolation
+    bundle = mesh.fits.bundle
+    if not bundle.others and e.moved_cuts is None and bundle.coefficients.shape[-1] <= len(rule.places):
+        thickness = np.array([net.beams[e.beam[element]].section.thickness for element in elements])
+        return _plain_rest(mesh, elements, places, thickness[:, None])
     rows = []
     for element in elements:
         cuts = e.cuts[element] if e.moved_cuts is None else e.moved_cuts[..., element, :]
@@ -203,13 +207,16 @@ def _rest_of_designs(
             dual_of_steps(template_beam.angle, [beam.angle for beam in beams]),
             dual_of_steps(template_beam.thickness, [beam.thickness for beam in beams]),
         )
-    # plain beams: their angle is a polynomial, their speed and thickness are even
-    cuts = template.elements.cuts[elements]
-    angle = mesh.elements.angle[elements] @ _matrices(template.degree, tuple(places.tolist())).interpolation.T
     steps: Any = np.array([[net.beams[name].section.thickness for name in names] for net, _ in designs.networks])
     first: Any = np.array([template.fits.network.beams[name].section.thickness for name in names])
-    even = dual_of_steps(first[:, None], steps[..., None])
-    return _BeamAtRest(cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * places, angle, even + 0.0 * places)
+    return _plain_rest(mesh, elements, places, dual_of_steps(first[:, None], steps[..., None]))
+
+
+def _plain_rest(mesh: Discretisation, elements: Sequence[int], places: FloatArray, thickness: Any) -> _BeamAtRest:
+    """Return plain beams of a thickness (m, 1): their angle is a polynomial, their speed is even."""
+    cuts, through = mesh.elements.cuts[elements], _matrices(mesh.degree, tuple(places.tolist())).interpolation
+    place = cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * places
+    return _BeamAtRest(place, mesh.elements.angle[elements] @ through.T, thickness + 0.0 * places)
 
 
 def _states(at: Equilibria, elements: list[int], places: FloatArray, rest: _BeamAtRest) -> BeamStates:

@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.section import curl_hindered, curling
-from cfmkit.elastica.results.beam_states import elements_of, states_of_elements
+from cfmkit.elastica.results.beam_states import elements_of, forces_of_elements
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -43,22 +43,24 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
     mesh, names = path.mesh, list(path.network.beams)
     places = basis(mesh.degree).places
     energies, lost = (np.zeros((len(names), len(path))) for _ in range(2))
+    whole = forces_of_elements(path.network, path.at, range(len(mesh.elements.beam)), places)
     for number, name in enumerate(names):
         section, fitted = path.network.beams[name].section, mesh.fits[name]
         for element in elements_of(mesh, name):
-            found = states_of_elements(path.network, path.at, [element], places)
+            own = slice(element * len(places), (element + 1) * len(places))
+            moment, thickness = whole.moment[..., own], whole.thickness[..., own]
             left, right = mesh.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = (
                 np.imag(fitted.angle(t + 1j * _COMPLEX_STEP, inside)) / _COMPLEX_STEP / np.real(fitted.speed(t, inside))
             )
-            rigidity = section.youngs_modulus * section.width * found.thickness**3 / 12
+            rigidity = section.youngs_modulus * section.width * thickness**3 / 12
             weights = mesh.elements.weight[..., element, :] * mesh.scales.length
-            density = 0.5 * found.moment**2 / rigidity * weights
+            density = 0.5 * moment**2 / rigidity * weights
             energies[number] += density.sum(axis=1)
             if not section.wide:
-                curl, plate = curling(section.width, found.thickness, section.poisson_ratio)
-                hindered = plate * curl_hindered(curl * (rest + found.moment / rigidity) ** 2)
+                curl, plate = curling(section.width, thickness, section.poisson_ratio)
+                hindered = plate * curl_hindered(curl * (rest + moment / rigidity) ** 2)
                 lost[number] += (density * hindered).sum(axis=1)
     total = energies.sum(axis=0)
     bent = total > _ENERGY_RTOL * total.max(initial=0.0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,30 +26,11 @@ from cfmkit.elastica.results.between_points import (
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.results.observed import Observed
     from cfmkit.elastica.results.path import EquilibriumPath
-
-
-class Observed(Protocol):
-    """Observed values of a path."""
-
-    @property
-    def motion(self) -> FloatArray:
-        """Motion at every point [m or rad]."""
-
-    @property
-    def effort(self) -> FloatArray:
-        """Force or torque at every point; NaN where the tolerance is not reached."""
-
-    @property
-    def stress(self) -> FloatArray:
-        """The largest stress at every point [Pa]; NaN likewise."""
-
-    @property
-    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-        """Of each beam, the largest stress [Pa] and its place."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from cfmkit.families.beam.contact_spec import MAX_OVERLAP_SHARE, column_names, f
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.end_stops import DEFINITIONS, LARGEST_FORCE
-from cfmkit.families.end_stops import FINDINGS as OF_STOPS
 from cfmkit.numerics.quadrature import clenshaw_curtis
 from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
@@ -275,14 +274,6 @@ def _mean(solution: Solution, name: str, window: tuple[float, float]) -> float |
 
 
 # -- findings ----------------------------------------------------------------------------------------------------------
-CONTACT_FINDINGS = OF_STOPS | {
-    "contact_spreads_between_beams": "two parts begin to lie on each other along a length: the curve ends there",
-    "friction_not_unique": "friction leaves several states at a change of contact: the first of them was taken",
-    "stability_of_sliding": "a pad slides against friction: whether what slides is stable is not known",
-    "near_contact": "a gap nearly closes but stays open: whether there is contact depends on tolerances",
-    "obstacle_out_of_reach": "an obstacle is so far from the nodes that may touch it that it plays no part",
-    "side_in_obstacle": "the side of a beam that is not in `beams` passes through an obstacle",
-}
 
 
 def contact_sentences(solution: Solution, say: Callable[[float], str]) -> Iterator[tuple[str, str]]:

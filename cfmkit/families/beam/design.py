@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import InputError
-from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.network_from_spec import thickest
 from cfmkit.families.beam.path_ending import ending_of

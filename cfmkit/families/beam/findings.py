@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica import PathStatus, hindered_curling
+from cfmkit.elastica import PathStatus
 from cfmkit.families.beam.constant_force_range_and_extremes import window_of
-from cfmkit.families.beam.contacts import CONTACT_FINDINGS as ON_CONTACTS
 from cfmkit.families.beam.contacts import change_sentences, contact_sentences
+from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of
 from cfmkit.families.beam.path_ending import drive_text, ending_of, in_units
 from cfmkit.families.beam.scalar_results import find_in_window
 from cfmkit.families.beam.solution import pairs_in_contact
-from cfmkit.families.findings import finder, stiffer, too_soft
+from cfmkit.families.findings import stiffer, too_soft
 from cfmkit.families.rows import FindingRule, findings_of_one
 from cfmkit.specs.units import format_short
 
@@ -31,47 +31,6 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.strips_and_gaps import BeamGap
     from cfmkit.results import Finding
-
-
-BEAM_FINDINGS = {
-    "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
-    "closure_prestress": "beams are forced into place between rounded nodes: the mechanism is prestressed at rest",
-    "self_contact": "the part as a solid touches itself: the curve ends there",
-    "ends_early": "the path ends before the requested travel or load",
-    "inaccurate": "at some points the tolerance is not reached: no force is reported there",
-    "limit_point": "the load has an extremum on the path: under load control the mechanism snaps there",
-    "bifurcation": "the path branches: the mechanism leaves the symmetric or straight form",
-    "unstable": "a part of the path is not stable: the mechanism would leave it",
-    "flutter": "under forces that rotate with their node two natural frequencies coincide: oscillations grow",
-    "flutter_not_judged": "forces rotate with their node: stability is checked against divergence, not against flutter",
-    "imperfection": "the beams were bent in the first buckling mode, as requested",
-    "overstressed": "the stress exceeds the allowable stress within the window",
-    "rescale_approximate": "the scaling law for the force is exact only for inextensible beams",
-    "rescale_stress": "after scaling, the stress reaches the allowable stress within the window",
-    "design_unsound": "the best shape that was found fails its audit",
-    "objective_ill_posed": "the objective of the paper rewards a force that falls",
-    "starts_lost": "worker processes died, and the starts that they were working on are lost",
-    "search_cut_short": "the time budget ended before all starts were finished",
-    "surface_out_of_reach": "following the surface requires more displacement than the solved travel",
-    "surface_hole": "a part of the surface was not measured: the force there is not known, nor any extreme along it",
-    "tip_lifts_off": "the mechanism no longer presses on the surface: the tip lifts off",
-    "surface_stress_exceeded": "the stress along the surface exceeds the allowable one",
-    "tip_jams": "somewhere the surface is too steep for the friction at the tip",
-    "thick_beam": "a beam is short for its thickness: beam theory is inaccurate",
-    "wide_beam": "the anticlastic bending of a wide beam is suppressed: it is stiffer than in beam theory",
-    "beams_touch": "two beams touch, or cross: contact is not modelled",
-    "joined_away_from_nodes": "the part as drawn is one piece where the mechanism has beams, pads or bars apart: they "
-    "cross, touch or lie on one another, or fillets fill the gap between them",
-    "pins_not_drawn": "beams turn on pins in the mechanism, but are one piece in the drawing",
-    "gap_small": "two beams are closer than can be cut",
-    "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
-    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
-    "feature_small": "a beam is thinner than can be made",
-    **ON_CONTACTS,
-}
-
-finding = finder(BEAM_FINDINGS)
-"""Return a finding of this family; the name must be one that `BEAM_FINDINGS` explains."""
 
 
 def percent(share: float) -> str:
@@ -329,7 +288,7 @@ def _hindered_share(solution: Solution) -> tuple[float, str]:
     """Return by what share of their energy beams that are solved as narrow ones are too soft, and where."""
     if not _has_curve(solution) or solution.spec.mechanism.wide_beams:
         return 0.0, ""
-    found = hindered_curling(solution.path)
+    found = solution.curling
     share, beam = found.share[solution.keep], found.beam[solution.keep]
     worst = int(share.argmax())
     place = format_short(float(solution.motion[worst]), solution.motion_dimension)

@@ -19,7 +19,7 @@ from cfmkit.errors import GeometryError
 from cfmkit.export.fixing_holes import remove_screws
 from cfmkit.families.beam.constant_force_range_and_extremes import AlongMotion
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
-from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import (
     assemble,
     constant_load,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cfmkit.families.base import DesignMethod, ElasticParts, Family, Pictures, ResultNames
-from cfmkit.families.beam.findings import BEAM_FINDINGS
+from cfmkit.families.beam.finding_names import BEAM_FINDINGS
 from cfmkit.families.beam.network_from_spec import resolve
 from cfmkit.families.beam.scalar_results import SCALAR_DEFINITIONS
 from cfmkit.families.beam.spec import BeamSpec

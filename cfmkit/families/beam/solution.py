@@ -15,6 +15,7 @@ from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.model.contact import BeamOnBeam, NodeOnBeam
 from cfmkit.elastica.results.between_loads import interpolate_loads
 from cfmkit.elastica.results.between_points import interpolate_path
+from cfmkit.elastica.results.curling_stiffening import HinderedCurling, hindered_curling
 from cfmkit.elastica.results.folding_path_between_points import interpolate_folding_path
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
@@ -84,6 +85,11 @@ class Solution(ShortRepr):
             along = None if drive.turns else self.assembly.direction
             return interpolate_loads(self.path, self.assembly.driven, along, unit, axial, allowed)
         return interpolate_path(self.path, unit, axial, allowed)
+
+    @cached_property
+    def curling(self) -> HinderedCurling:
+        """By what share beams that are solved as narrow ones are too soft."""
+        return hindered_curling(self.path)
 
     @cached_property
     def along(self) -> AlongMotion:

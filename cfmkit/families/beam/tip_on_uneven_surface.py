@@ -26,7 +26,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
-from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.end_stops import LARGEST_FORCE
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
 from cfmkit.numerics.holes_in_samples import MAX_HOLE_SHARE, holes_between

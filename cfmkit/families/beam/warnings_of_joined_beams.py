@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock, DrawnStrip, NodesAndBodies, joined_away_from_nodes
-from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.finding_names import finding
 from cfmkit.families.beam.network_from_spec import is_on_axis, mirror_axis, moving_nodes
 from cfmkit.families.beam.strips_and_gaps import mirror_points
 from cfmkit.specs.units import format_short

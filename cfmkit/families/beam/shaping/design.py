@@ -13,7 +13,8 @@ import numpy as np
 from cfmkit.designing import objective_and_constraints as design_limits
 from cfmkit.designing.bounds_and_rounding import find_active_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
-from cfmkit.families.beam.findings import finding, percent
+from cfmkit.families.beam.finding_names import finding
+from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
 from cfmkit.families.beam.shaping.multistart import Explored, explore, rank
 from cfmkit.families.beam.shaping.report import REISSNER_MODEL, Judged, judge_design, notes_of, search_of, starts_table

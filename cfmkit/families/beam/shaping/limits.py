@@ -267,10 +267,10 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     wanted = ((limits.clearance or 0.0) + half[first] + half[second])[:, None, None]
     is_near = opening * ways.length < wanted
     required = np.where(is_near, opening * ways.length, wanted)
-    required[~_choose_pairs(couples, ways.length)] = np.nan
+    compared = _choose_pairs(couples, ways.length)
     dx, dy = (line[first][..., :, None] - line[second][..., None, :] for line in (beams.x, beams.y))
-    distance = np.hypot(dx, dy) + 1e-12
-    ratio = np.nan_to_num(distance / required[:, None], nan=np.inf)
+    distance = np.sqrt(dx * dx + dy * dy) + 1e-12
+    ratio = np.where(compared[:, None], distance / np.where(compared, required, 1.0)[:, None], np.inf)
     soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), BOUND_SHARPNESS)
 
     def slopes() -> FloatArray:

@@ -46,6 +46,7 @@ _MIN_WINDOW_GAIN = 2e-3  # of the end of the window: a gain that is not worth an
 _REPAIRABLE_VIOLATION = 2e-3  # a limit missed by less is repaired afterwards
 _GIVEN_UP_SHARE = 0.1  # of the gain is given up where it cannot be
 _OBJECTIVE_TOL = 1e-5  # of the objective
+_MAX_IDLE_EVALUATIONS = 50  # without a better point: nearly a third of all evaluations came after so many
 _START_HALF_BAND = 0.05  # a random network with this half band is flat enough to begin with
 _BAND_SHARE = 0.5  # of the band of the widest window: flat enough to be taken on to the model of the task
 _NEAR_ROWS = 0.5  # of a limit: of rows that hold by more than this no derivatives are needed
@@ -84,7 +85,7 @@ class StartBudget:
 
     def effort(self, steps: int, enough: float = -np.inf, violation: float = VIOLATION_TOL) -> Effort:
         """Return the effort of one minimisation."""
-        return Effort(steps, _OBJECTIVE_TOL, violation, self.late, enough)
+        return Effort(steps, _OBJECTIVE_TOL, violation, self.late, enough, idle=_MAX_IDLE_EVALUATIONS)
 
 
 @dataclass(frozen=True)

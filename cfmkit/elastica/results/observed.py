@@ -1,0 +1,30 @@
+"""Values of a path that others than the engine observe."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+
+
+class Observed(Protocol):
+    """Observed values of a path."""
+
+    @property
+    def motion(self) -> FloatArray:
+        """Motion at every point [m or rad]."""
+
+    @property
+    def effort(self) -> FloatArray:
+        """Force or torque at every point; NaN where the tolerance is not reached."""
+
+    @property
+    def stress(self) -> FloatArray:
+        """The largest stress at every point [Pa]; NaN likewise."""
+
+    @property
+    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """Of each beam, the largest stress [Pa] and its place."""
